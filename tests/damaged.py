@@ -8,10 +8,10 @@ from airtouch.logs.files import parse
 
 def is_read_or_refused(log: bytes, data: st.DataObject) -> None:
     """With a few bytes changed and its end cut off, as `data` draws, a log is read or refused in one line."""
-    changed = bytearray(log)
+    damaged = bytearray(log)
     for _ in range(data.draw(st.integers(1, 6))):
-        changed[data.draw(st.integers(0, len(changed) - 1))] = data.draw(st.integers(0, 255))
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
     try:
-        parse(bytes(changed[: data.draw(st.integers(1, len(changed)))]), "log00")
+        parse(bytes(damaged[: data.draw(st.integers(1, len(damaged)))]), "log00")
     except AirTouchError as error:
         assert "\n" not in str(error)

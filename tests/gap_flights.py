@@ -29,17 +29,17 @@ def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=Non
     pwm = np.where(resting[:, None], 0.0, np.full((n, 4), 40000.0))
     log = FlightLog({"t_s": np.arange(n) * PERIOD_S, **{f"m{i}_pwm": pwm[:, i - 1] for i in range(1, 5)}},
                     {"source": name})
-    made = Flight(
+    hover = Flight(
         name, log, replay.signals_of(log, VEHICLE), np.zeros((n, 3)), np.zeros((n, 3)) + gyro, pwm,
         np.tile(np.eye(3), (n, 1, 1)), np.where(resting, GROUND, phase).astype(np.int8), np.ones(n, bool),
         np.zeros(n), np.zeros(n, bool) if lost is None else lost, np.zeros(n, bool))
-    return replace(made, acceleration=force - residual(made, VEHICLE)[:, :3])
+    return replace(hover, acceleration=force - residual(hover, VEHICLE)[:, :3])
 
 
-def flown(count, seed, chosen=()):
+def fly(count, seed, chosen=()):
     """Flights of the diagnosis' scenario, ready for it, with the chosen effects alone."""
-    off = [e for e in scenario.load("diagnosis").table.get("effects", {}) if e not in dict(chosen)]
-    logs = batch.flights("diagnosis", count, vehicle=VEHICLE, effects=chosen, without=off, seed=seed, workers=1)
+    left_out = [e for e in scenario.load("diagnosis").table.get("effects", {}) if e not in dict(chosen)]
+    logs = batch.flights("diagnosis", count, vehicle=VEHICLE, effects=chosen, without=left_out, seed=seed, workers=1)
     return [ready(log, VEHICLE) for log in logs]
 
 

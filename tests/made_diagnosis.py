@@ -16,7 +16,7 @@ VEHICLE = vehicle.load("crazyflie-2.1-flow")
 FOUND = Found("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
 
 
-def flown():
+def fly_pushed():
     """Two short flights whose accelerometer reads 0.8 m/s^2 too much forward."""
     return [log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + 0.8}) for log in short_flights.fly(2)]
 
@@ -27,25 +27,26 @@ def cell(channel, phase, gap, floor=0.1, after=None, blocks=10, **more):
 
 
 def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **more):
-    rest = [Ranked(n, p, Quantity(0.0), "another fits better")
-            for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
+    rejected = [Ranked(n, p, Quantity(0.0), "another fits better")
+                for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
     answer = effects[0].name if effects else verdict
-    ranking = [Ranked(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rest if r.name != answer)]
-    made = GapMap(tuple(cells), BASELINE, ("one.csv", "two.csv"))
+    ranking = [Ranked(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
+    whole = GapMap(tuple(cells), BASELINE, ("one.csv", "two.csv"))
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),
         {"before": 4.0, "after": 1.3, "floor": 1.0}, Quantity(0.9, 0.8, 0.95) if effects else None,
         {"name": "wind", "before": 4.0, "after": 3.9, "floor": 1.0, "shrink": Quantity(0.03, -0.05, 0.1)},
         "Weigh the <vehicle>.", {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
-        map=made, headline=headline or summary.headline(cells, bool(effects)),
+        map=whole, headline=headline or summary.headline(cells, bool(effects)),
         next=(Step("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
 
 
-def of_flights(flown, effects=(FOUND,), **more):
+def of_flights(logs, effects=(FOUND,), **more):
     """A diagnosis with map and curves of flights."""
-    study, flights = calibrate.declared(VEHICLE, ()), [ready(f, VEHICLE) for f in flown]
+    study, flights = calibrate.declared(VEHICLE, ()), [ready(f, VEHICLE) for f in logs]
     terms = [term_of(e) for e in effects]
-    made = gap_map(study, flights, terms=terms)
-    found = diagnosis(made.cells, effects=effects, **more)
-    return replace(found, where=tuple(where(made)), pictures=of(study, flights, [], terms, found.headline, made.cells))
+    whole = gap_map(study, flights, terms=terms)
+    result = diagnosis(whole.cells, effects=effects, **more)
+    pictures = of(study, flights, [], terms, result.headline, whole.cells)
+    return replace(result, where=tuple(where(whole)), pictures=pictures)

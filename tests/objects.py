@@ -20,16 +20,16 @@ def compiled(compiler: str, flags: Sequence[str | Path], sources: Sequence[Path]
     version = subprocess.run([compiler, "--version"], capture_output=True).stdout
     common = version + "\0".join(words).encode() + b"".join(str(h).encode() + h.read_bytes() for h in headers)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    made = []
+    objects = []
     with (FOLDER / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         for source in sources:
             key = hashlib.sha256(common + str(source).encode() + source.read_bytes()).hexdigest()[:24]
-            made.append(FOLDER / f"{source.stem}-{key}.o")
-            if not made[-1].exists():
-                part = made[-1].with_suffix(".part")
-                done = subprocess.run([compiler, *words, "-c", source, "-o", part], capture_output=True, text=True)
-                if done.returncode:
-                    return [], done.stderr
-                part.rename(made[-1])
-    return made, ""
+            objects.append(FOLDER / f"{source.stem}-{key}.o")
+            if not objects[-1].exists():
+                part = objects[-1].with_suffix(".part")
+                process = subprocess.run([compiler, *words, "-c", source, "-o", part], capture_output=True, text=True)
+                if process.returncode:
+                    return [], process.stderr
+                part.rename(objects[-1])
+    return objects, ""

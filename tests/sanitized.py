@@ -36,16 +36,16 @@ def link(parts: Sequence[tuple[list[str], Sequence[Path]]], program: Path) -> Pa
     compiler = shutil.which(os.environ.get("CC", "cc"))
     if compiler is None:
         pytest.skip("no C compiler on this machine")
-    made: list[Path] = []
+    linked: list[Path] = []
     for flags, sources in parts:
         objects, error = compiled(compiler, flags, sources)
         if "libclang_rt" in error:
             pytest.skip(f"{compiler} has no sanitizers")
         assert not error, error
-        made += objects
-    done = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", program], capture_output=True,
-                          text=True)
-    if "cannot find -lasan" in done.stderr or "libclang_rt" in done.stderr:
+        linked += objects
+    process = subprocess.run([compiler, *SANITIZERS, *linked, "-pthread", "-lm", "-o", program], capture_output=True,
+                             text=True)
+    if "cannot find -lasan" in process.stderr or "libclang_rt" in process.stderr:
         pytest.skip(f"{compiler} has no sanitizers")
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
     return program

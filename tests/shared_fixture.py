@@ -18,8 +18,8 @@ def once(factory, name, make):
         fcntl.flock(lock, fcntl.LOCK_EX)
         if path.exists():
             return pickle.loads(path.read_bytes())
-        made = make()
+        value = make()
         part = path.with_suffix(".part")
-        part.write_bytes(pickle.dumps(made))
+        part.write_bytes(pickle.dumps(value))
         part.rename(path)
-    return made
+    return value

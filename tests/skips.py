@@ -13,7 +13,7 @@ import pytest
 
 #: reasons that name a compiler, a package or a checkout that a machine need not have
 TOOLS = re.compile(r"could not import|pip install|needs the extra|needs cflib|on this machine|sanitizer|"
-                   r"no C compiler|no cross compiler|set CRAZYFLIE_BASE|no CMSIS-DSP")
+                   r"no C compiler|no cross compiler|no arm-none-eabi-gcc|set CRAZYFLIE_BASE|no CMSIS-DSP")
 
 
 def folder() -> Path:
@@ -31,10 +31,10 @@ def _guard(report: pytest.TestReport | pytest.CollectReport) -> None:
     if not report.skipped or hasattr(report, "wasxfail") or not isinstance(report.longrepr, tuple):
         return
     path, line, reason = report.longrepr
-    there = [place for place in (folder(), Path(__file__).parents[2] / "shared" / "flights") if place.is_dir()]
-    if there and not TOOLS.search(reason):
+    folders = [place for place in (folder(), Path(__file__).parents[2] / "shared" / "flights") if place.is_dir()]
+    if folders and not TOOLS.search(reason):
         report.outcome = "failed"
-        report.longrepr = f"{path}:{line}: recorded flights are in {there[0]}, and yet: {reason}"
+        report.longrepr = f"{path}:{line}: recorded flights are in {folders[0]}, and yet: {reason}"
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -28,8 +28,8 @@ def path(log, tmp_path_factory):
 def test_the_import_itself_brings_nothing_heavy():
     code = ("import sys, airtouch; "
             f"print([m for m in {NEVER!r} if m in sys.modules], sorted(airtouch.__all__) == dir(airtouch))")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[] True\n"
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert process.stdout == "[] True\n"
 
 
 def test_everything_promised_is_there():
@@ -42,8 +42,8 @@ def test_everything_promised_is_there():
 def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
     table = at.to_pandas(path)
     assert list(table.columns) == list(at.read(path).columns) and len(table) == len(log)
-    found = [at.detect(flight, "baseline").edges for flight in (path, str(path), at.read(path), table)]
-    assert found[0] == found[1] == found[2] == found[3]
+    edges = [at.detect(flight, "baseline").edges for flight in (path, str(path), at.read(path), table)]
+    assert edges[0] == edges[1] == edges[2] == edges[3]
     scores = [at.evaluate(f, "baseline", speed_mps=0.3) for f in (path, [at.read(path)], table)]
     assert len({s["edges"] for s in scores}) == 1 and scores[0]["flights"] == 1 and scores[0]["edges"] >= 2
     assert len({s["missed_count"] for s in scores}) == 1
@@ -64,9 +64,9 @@ def test_a_table_goes_there_and_back(log):
 
 
 def test_simulate_is_what_the_command_flies():
-    (one,) = at.simulate("hover", effects={"wind": {"x": 0.3}}, seed=3)
-    (other,) = at.simulate("hover", effects=[("wind", {"x": 0.3})], seed=3)
-    np.testing.assert_array_equal(one["gyro_x_radps"], other["gyro_x_radps"])
+    (flight,) = at.simulate("hover", effects={"wind": {"x": 0.3}}, seed=3)
+    (again,) = at.simulate("hover", effects=[("wind", {"x": 0.3})], seed=3)
+    np.testing.assert_array_equal(flight["gyro_x_radps"], again["gyro_x_radps"])
     with pytest.raises(at.AirTouchError, match="wind has no parameter"):
         at.simulate("hover", effects={"wind": {"speed": 0.3}})
 
@@ -93,8 +93,8 @@ def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
     for number in range(2):
         at.write(at.simulate("hover", seed=number)[0], tmp_path / "flown" / f"{number}.csv")
     (tmp_path / "flown" / "manifest.csv").write_text("file,use\n0.csv,clean\n")
-    found = at.gap.measure(tmp_path / "flown")
-    assert [Path(f).name for f in found.flights] == ["0.csv", "1.csv"]
+    gap = at.gap.measure(tmp_path / "flown")
+    assert [Path(f).name for f in gap.flights] == ["0.csv", "1.csv"]
     (tmp_path / "empty").mkdir()
     with pytest.raises(at.AirTouchError, match="no flights in this folder"):
         at.gap.measure(tmp_path / "empty")

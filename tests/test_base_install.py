@@ -61,47 +61,48 @@ class Done:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def outcomes(tmp_path_factory):
     """Every command without any extra."""
     folder = tmp_path_factory.mktemp("base")
     flight = folder / "flight.csv.gz"
     logs.write(short_flights.fly(1)[0], flight)
     commands = [*WORKS, *TRAINS, *DRAWS]
     places = [folder / str(i) for i in range(len(commands))]
-    asked = []
+    jobs = []
     for command, place in zip(commands, places, strict=True):
         place.mkdir()
-        asked.append(([word.format(flight=flight, out=place) for word in command], str(place)))
-    ran = subprocess.run([sys.executable, "-c", BLOCK], input=json.dumps(asked), capture_output=True, text=True,
-                         timeout=HANG_S)
-    assert ran.returncode == 0, ran.stderr
+        jobs.append(([word.format(flight=flight, out=place) for word in command], str(place)))
+    process = subprocess.run([sys.executable, "-c", BLOCK], input=json.dumps(jobs), capture_output=True, text=True,
+                             timeout=HANG_S)
+    assert process.returncode == 0, process.stderr
     return {command: Done(int(code), place.with_name(place.name + ".err").read_text(), place)
-            for command, place, code in zip(commands, places, ran.stdout.split(), strict=True)}
+            for command, place, code in zip(commands, places, process.stdout.split(), strict=True)}
 
 
 @pytest.mark.parametrize("command", WORKS)
-def test_works_without_any_extra(done, command):
-    assert done[command].code == 0, done[command].error
+def test_works_without_any_extra(outcomes, command):
+    assert outcomes[command].code == 0, outcomes[command].error
 
 
 @pytest.mark.parametrize("command", TRAINS)
-def test_training_says_at_once_what_is_missing(done, command):
-    said = done[command]
-    assert said.code == 2 and "pip install 'airtouch[train]'" in said.error and "tensorflow" in said.error, said.error
-    assert "Traceback" not in said.error and not list(said.out.iterdir())
+def test_training_says_at_once_what_is_missing(outcomes, command):
+    outcome = outcomes[command]
+    assert outcome.code == 2 and "tensorflow" in outcome.error, outcome.error
+    assert "pip install 'airtouch[train]'" in outcome.error
+    assert "Traceback" not in outcome.error and not list(outcome.out.iterdir())
 
 
-def test_a_report_without_matplotlib_says_which_extra_brings_pictures(done):
-    page = (done[WORKS[2]].out / "gap.html").read_text(encoding="utf-8")
+def test_a_report_without_matplotlib_says_which_extra_brings_pictures(outcomes):
+    page = (outcomes[WORKS[2]].out / "gap.html").read_text(encoding="utf-8")
     assert "airtouch[plots]" in page and "<img" not in page
 
 
 @pytest.mark.parametrize("command", DRAWS)
-def test_plots_say_at_once_what_is_missing(done, command):
-    said = done[command]
-    assert said.code == 2 and f"pip install 'airtouch[{DRAWS[command]}]'" in said.error
-    assert "Traceback" not in said.error
-    assert not list(said.out.iterdir())
+def test_plots_say_at_once_what_is_missing(outcomes, command):
+    outcome = outcomes[command]
+    assert outcome.code == 2 and f"pip install 'airtouch[{DRAWS[command]}]'" in outcome.error
+    assert "Traceback" not in outcome.error
+    assert not list(outcome.out.iterdir())
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):

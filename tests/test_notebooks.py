@@ -17,8 +17,8 @@ def printed(name, tmp_path):
     """What the cells of a notebook print, executed in a kernel of this Python."""
     book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     nbformat.validate(book)
-    where = {"metadata": {"path": str(tmp_path)}}
-    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources=where).execute()
+    resources = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources=resources).execute()
     return "".join(out.get("text", "") for cell in book.cells if cell.cell_type == "code" for out in cell.outputs)
 
 
@@ -30,9 +30,9 @@ def test_every_notebook_is_run_and_stored_without_outputs():
 
 
 def test_the_first_flight_is_felt(tmp_path):
-    said = printed("first-flight", tmp_path)
-    assert "entry declared" in said and "exit  declared" in said
-    missed, edges = map(int, re.search(r"missed (\d+) of (\d+)", said).groups())
+    output = printed("first-flight", tmp_path)
+    assert "entry declared" in output and "exit  declared" in output
+    missed, edges = map(int, re.search(r"missed (\d+) of (\d+)", output).groups())
     assert edges == 6 and missed <= 1
 
 
@@ -45,13 +45,13 @@ def test_a_detector_of_ones_own_is_scored_beside_the_others(tmp_path):
 def test_the_gap_is_diagnosed(tmp_path):
     from airtouch.gap import example
 
-    said = printed("diagnose-a-gap", tmp_path)
-    assert "times the floor" in said
-    assert f"\neffect\n{next(iter(example.answer()))} " in said
+    output = printed("diagnose-a-gap", tmp_path)
+    assert "times the floor" in output
+    assert f"\neffect\n{next(iter(example.answer()))} " in output
 
 
 def test_an_effect_is_added_and_its_typo_told(tmp_path):
-    said = printed("add-an-effect", tmp_path)
-    without, effect = map(float, re.search(r"([\d.]+) without, ([\d.]+) with", said).groups())
-    assert without == pytest.approx(1.0, abs=0.12) and effect == pytest.approx(1.4, abs=0.15)
-    assert "no plant field 'giro_scale'; did you mean gyro_scale" in said
+    output = printed("add-an-effect", tmp_path)
+    without_effect, with_effect = map(float, re.search(r"([\d.]+) without, ([\d.]+) with", output).groups())
+    assert without_effect == pytest.approx(1.0, abs=0.12) and with_effect == pytest.approx(1.4, abs=0.15)
+    assert "no plant field 'giro_scale'; did you mean gyro_scale" in output

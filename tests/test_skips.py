@@ -30,11 +30,12 @@ def outcomes(folder, **environment):
     for name, text in FILES.items():
         (tests / name).write_text(text)
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("AIRTOUCH", "PYTEST"))}
-    done = subprocess.run([sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--continue-on-collection-errors",
-                           "--rootdir", tests, tests], capture_output=True, text=True, cwd=tests,
-                          env=clean | {"PYTHONPATH": str(tests)} | environment)
-    counts = {name: int(n) for n, name in re.findall(r"(\d+) (passed|failed|skipped|error|xfailed)", done.stdout)}
-    return counts, done.stdout
+    process = subprocess.run([sys.executable, "-m", "pytest", "-p", "no:cacheprovider",
+                              "--continue-on-collection-errors", "--rootdir", tests, tests],
+                             capture_output=True, text=True, cwd=tests,
+                             env=clean | {"PYTHONPATH": str(tests)} | environment)
+    counts = {name: int(n) for n, name in re.findall(r"(\d+) (passed|failed|skipped|error|xfailed)", process.stdout)}
+    return counts, process.stdout
 
 
 @pytest.mark.parametrize("place", ["../shared/flights", "AIRTOUCH_FLIGHTS"])

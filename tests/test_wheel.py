@@ -38,10 +38,10 @@ def unpacked(wheel, tmp_path_factory):
     out = tmp_path_factory.mktemp("installed")
     zipfile.ZipFile(wheel).extractall(out)
     # What Numba made of the same sources, which their sizes and times tell: else 25 s of compiling.
-    for made in (*PACKAGE.rglob("__pycache__/*.nb[ic]"), *PACKAGE.rglob("__pycache__/sources.stamp")):
-        place = out / made.relative_to(PACKAGE.parent)
+    for cached in (*PACKAGE.rglob("__pycache__/*.nb[ic]"), *PACKAGE.rglob("__pycache__/sources.stamp")):
+        place = out / cached.relative_to(PACKAGE.parent)
         place.parent.mkdir(exist_ok=True)
-        shutil.copy2(made, place)
+        shutil.copy2(cached, place)
     for source in out.rglob("airtouch/**/*.py"):
         shutil.copystat(PACKAGE.parent / source.relative_to(out), source)
     return out
@@ -56,17 +56,17 @@ def run(unpacked, cwd, *arguments):
 
 
 def test_every_module_and_every_file_of_data_is_in_it(wheel):
-    held = set(zipfile.ZipFile(wheel).namelist())
-    wanted = [f for pattern in ("**/*.py", *DATA)
-              for f in PACKAGE.glob(pattern) if f.is_file() and "__pycache__" not in f.parts]
-    assert len(wanted) > 200 and all(any(PACKAGE.glob(pattern)) for pattern in DATA)
-    assert not [f for f in wanted if str(f.relative_to(PACKAGE.parent)) not in held]
+    names = set(zipfile.ZipFile(wheel).namelist())
+    sources = [f for pattern in ("**/*.py", *DATA)
+               for f in PACKAGE.glob(pattern) if f.is_file() and "__pycache__" not in f.parts]
+    assert len(sources) > 200 and all(any(PACKAGE.glob(pattern)) for pattern in DATA)
+    assert not [f for f in sources if str(f.relative_to(PACKAGE.parent)) not in names]
 
 
 def test_the_kernels_are_compiled_and_no_test_is_in_it(wheel):
-    held = zipfile.ZipFile(wheel).namelist()
-    assert [name for name in held if name.startswith("airtouch/kernels/_kernels") and name.endswith(".so")]
-    assert {name.split("/")[0] for name in held} <= {"airtouch", f"{wheel.name.split('-cp')[0]}.dist-info"}
+    names = zipfile.ZipFile(wheel).namelist()
+    assert [name for name in names if name.startswith("airtouch/kernels/_kernels") and name.endswith(".so")]
+    assert {name.split("/")[0] for name in names} <= {"airtouch", f"{wheel.name.split('-cp')[0]}.dist-info"}
     assert wheel.stat().st_size < 10e6
 
 
@@ -74,6 +74,6 @@ def test_it_detects_and_simulates_away_from_the_tree(unpacked, tmp_path):
     logs.write(short_flights.fly(1)[0], tmp_path / "flight.csv.gz")
     for command in (("evaluate", "flight.csv.gz", "--speed", "0.3"),
                     ("simulate", "hover", "--out", "flown", "--workers", "1")):
-        done = run(unpacked, tmp_path, *command)
-        assert done.returncode == 0, done.stderr
+        process = run(unpacked, tmp_path, *command)
+        assert process.returncode == 0, process.stderr
     assert (tmp_path / "flown" / "hover_0_000000.csv.gz").is_file()

@@ -15,9 +15,9 @@ def generated(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flights")
     rows = []
     for i, log in enumerate(short_flights.fly(4)):
-        drawn = log.meta["condition"]
+        condition = log.meta["condition"]
         logs.write(log, folder / f"f{i}.csv.gz")
-        rows.append(f"f{i}.csv.gz,clean,{i % 2},low,{drawn['angle']:g},none,{drawn['speed']:.3f}\n")
+        rows.append(f"f{i}.csv.gz,clean,{i % 2},low,{condition['angle']:g},none,{condition['speed']:.3f}\n")
     (folder / "manifest.csv").write_text(HEADER + "".join(rows))
     return folder
 

@@ -34,12 +34,12 @@ def test_every_flight_is_scored_by_a_model_that_never_saw_it(generated, tmp_path
     scores, folds, left_out = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
     assert len(scores) == 4 and len(folds) == 2 and not left_out
     assert len(scored) == 4 and all(name not in trained[fold] for name, fold in scored)
-    again, _, _ = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
+    repeat, _, _ = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
     assert len(trained) == 2, "finished folds are not done again"
-    assert [s.as_dict() for s in again] == [s.as_dict() for s in scores]
+    assert [s.as_dict() for s in repeat] == [s.as_dict() for s in scores]
 
 
-def test_command_with_ledger(generated, tmp_path):
+def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(generated, tmp_path):
     out, ledger = tmp_path / "cv.json", tmp_path / "looks.md"
     call = (generated, "--detector", "baseline", "--out", tmp_path / "folds", "--json", out, "--ledger", ledger)
     result = run(*call)
@@ -69,13 +69,13 @@ def test_the_cache_changes_with_the_conditions(generated, tmp_path):
     assert crossval.cache_key("baseline", (files := dataset.collect([generated])), files[2:], 0, {}) != before
 
 
-@pytest.mark.parametrize(("old", "new", "said"),
+@pytest.mark.parametrize(("old", "new", "message"),
                          [(",clean,1,", ",clean,0,", "two folds"), (",clean,1,", ",clean,,", "no fold")])
-def test_folds_are_needed(generated, tmp_path, old, new, said):
+def test_folds_are_needed(generated, tmp_path, old, new, message):
     folder = shutil.copytree(generated, tmp_path / "copy")
     manifest = folder / "manifest.csv"
     manifest.write_text(manifest.read_text().replace(old, new))
-    with pytest.raises(AirTouchError, match=said):
+    with pytest.raises(AirTouchError, match=message):
         crossval.crossval("baseline", dataset.collect([folder]), tmp_path / "out")
 
 

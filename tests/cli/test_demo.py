@@ -35,8 +35,8 @@ def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     assert "paper" in result.output and "baseline" in result.output and "false/min" in result.output
     assert (out / "report.html").stat().st_size > 100_000
     assert (out / "model" / "airtouch_model.c").exists() and (out / "model" / "paper.npz").exists()
-    again = run("--out", out)
-    assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+    repeat = run("--out", out)
+    assert isinstance(repeat.exception, AirTouchError) and "--force" in str(repeat.exception)
 
 
 def test_the_seconds_run_on_a_terminal_while_nothing_is_told():
@@ -46,14 +46,14 @@ def test_the_seconds_run_on_a_terminal_while_nothing_is_told():
     master, slave = os.openpty()
     process = subprocess.Popen([sys.executable, "-c", code], stderr=slave, env={**os.environ, "TERM": "xterm"})
     os.close(slave)
-    shown = b""
+    output = b""
     with contextlib.suppress(OSError):  # Linux ends a pseudo-terminal so
         while part := os.read(master, 4096):
-            shown += part
+            output += part
     os.close(master)
     assert process.wait() == 0
-    assert {b"0:00:00", b"0:00:01", b"0:00:02"} <= set(re.findall(rb"\d:\d\d:\d\d", shown))
-    assert b"1/1" in shown
+    assert {b"0:00:00", b"0:00:01", b"0:00:02"} <= set(re.findall(rb"\d:\d\d:\d\d", output))
+    assert b"1/1" in output
 
 
 def test_few_flights_are_too_few(generated, tmp_path):

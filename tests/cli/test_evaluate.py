@@ -23,7 +23,7 @@ def no_constant(name):
     raise ValueError(name)
 
 
-def test_folder_of_flights(generated, tmp_path):
+def test_the_scores_of_a_folder_are_those_of_its_edges(generated, tmp_path):
     out = tmp_path / "out.json"
     result = run(generated, "--detector", "baseline", "--json", out)
     assert result.exit_code == 0, result.output
@@ -57,11 +57,11 @@ def test_flights_that_the_manifest_leaves_out_are_counted(generated, tmp_path):
         shutil.copy(generated / name, tmp_path)
     (tmp_path / "manifest.csv").write_text("file,use,fold,speed_mps\nf0.csv.gz,clean,0,0.3\nf1.csv.gz,clean,1,0.3\n"
                                            "f2.csv.gz,messy,0,0.3\n")
-    said = ("airtouch: 1 flights are scored, 3 are not: 1 messy in the manifest, 1 not in the manifest, "
-            "1 of another fold")
+    warning = ("airtouch: 1 flights are scored, 3 are not: 1 messy in the manifest, 1 not in the manifest, "
+               "1 of another fold")
     result = run(tmp_path, "--detector", "baseline", "--fold", 0)
     assert result.exit_code == 0
-    assert said in result.stderr.splitlines(), result.stderr
+    assert warning in result.stderr.splitlines(), result.stderr
     # a flight that is named is taken
     assert "are not" not in run(tmp_path / "f2.csv.gz", "--detector", "baseline").stderr
 
@@ -79,13 +79,13 @@ def test_bad_files_are_named_once_and_the_others_go_on(generated, bad, tmp_path)
     assert table["flights"] == 1 and len(table["left_out"]) == len(bad)
 
 
-@pytest.mark.parametrize(("name", "said"), [
+@pytest.mark.parametrize(("name", "message"), [
     ("fast", "airtouch logs convert --rate 100"), ("nan", "missing (NaN)"), ("constant", "constant"),
     ("stuck", "gyro y is constant"), ("copied", "is a copy of"), ("grounded", "no flight"), ("short", "1.50 s of data"),
     ("empty", "empty")])
-def test_the_reason_and_the_remedy(bad, name, said):
+def test_the_reason_and_the_remedy(bad, name, message):
     result = run(bad[name], "--speed", 0.3, "--detector", "baseline")
-    assert result.exit_code == 2 and said in result.stderr
+    assert result.exit_code == 2 and message in result.stderr
     assert "Traceback" not in result.output
 
 
@@ -113,14 +113,14 @@ def test_without_down_range_detections_are_listed_not_judged(generated, tmp_path
 def test_nothing_is_overwritten_without_force(generated, tmp_path):
     out = tmp_path / "out.json"
     out.write_text("mine")
-    one = generated / "f0.csv.gz"
-    result = run(one, "--detector", "baseline", "--json", out)
+    log = generated / "f0.csv.gz"
+    result = run(log, "--detector", "baseline", "--json", out)
     assert isinstance(result.exception, AirTouchError) and out.read_text() == "mine"
-    assert run(one, "--detector", "baseline", "--json", out, "--force").exit_code == 0
+    assert run(log, "--detector", "baseline", "--json", out, "--force").exit_code == 0
 
 
 @pytest.mark.parametrize("arguments", [("none.csv",), ("--detector", "oracle", "."), ()])
-def test_wrong_calls(arguments):
+def test_a_wrong_call_is_refused_in_one_line(arguments):
     result = run(*arguments)
     assert isinstance(result.exception, AirTouchError) or result.exit_code == 2
     assert "\n" not in str(result.exception)

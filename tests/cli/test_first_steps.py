@@ -26,12 +26,12 @@ def run(*arguments):
     return CliRunner().invoke(airtouch, [str(a) for a in arguments])
 
 
-@pytest.mark.parametrize(("typed", "meant"), [
+@pytest.mark.parametrize(("typed", "nearest"), [
     (("evalute",), "evaluate"), (("gap", "diagnos"), "diagnose"), (("gap", "blind", "scroe"), "score"),
     (("logs", "chek"), "check"), (("simulat",), "simulate")])
-def test_a_mistyped_command_gets_the_nearest(typed, meant):
-    shown = run(*typed)
-    assert shown.exit_code == 2 and f"No such command '{typed[-1]}'; did you mean {meant}" in shown.output
+def test_a_mistyped_command_gets_the_nearest(typed, nearest):
+    result = run(*typed)
+    assert result.exit_code == 2 and f"No such command '{typed[-1]}'; did you mean {nearest}" in result.output
 
 
 def test_a_mistyped_mission_gets_the_nearest():
@@ -39,17 +39,17 @@ def test_a_mistyped_mission_gets_the_nearest():
         mission.scene_of("swep")
 
 
-@pytest.mark.parametrize(("call", "typed", "said"), [
+@pytest.mark.parametrize(("call", "typed", "message"), [
     (scenario.load, "zig-zag", "no scenario 'zig-zag'; did you mean zigzag"),
     (vehicle.load, "crazyflie-21", "no vehicle 'crazyflie-21'; did you mean crazyflie-2.1"),
     (registry.get, "papr", "no detector 'papr'; did you mean paper"),
     (faults.parse, "los=0.3", "no fault 'los'; did you mean loss"),
     (lambda name: sensors.without(FlightLog({"t_s": np.zeros(3)}, {}), (name,)), "motor",
      "no sensor 'motor'; did you mean motors")])
-def test_a_mistyped_name_gets_the_nearest(call, typed, said):
+def test_a_mistyped_name_gets_the_nearest(call, typed, message):
     with pytest.raises(AirTouchError) as error:
         call(typed)
-    assert re.fullmatch(re.escape(said) + r".*\? \(known: .+\)", str(error.value))
+    assert re.fullmatch(re.escape(message) + r".*\? \(known: .+\)", str(error.value))
 
 
 def test_a_name_like_no_other_gets_all_of_them():
@@ -69,15 +69,15 @@ def test_an_output_that_cannot_be_written_is_told_before_the_work(generated, tmp
     (tmp_path / "file").write_text("")
     words = [w.replace("{log}", str(generated / "f0.csv.gz")) for w in line]
     for out in (tmp_path / "file" / "out.x", tmp_path):
-        shown = run(*words, out)
-        assert shown.exit_code != 0
-        said = f"{shown.exception} {shown.output}"
-        assert any(t in said for t in ("cannot be made", "is a folder", "is a directory")), said
+        result = run(*words, out)
+        assert result.exit_code != 0
+        message = f"{result.exception} {result.output}"
+        assert any(t in message for t in ("cannot be made", "is a folder", "is a directory")), message
 
 
 def test_a_folder_is_no_flight_to_map(generated, tmp_path):
-    shown = run("map", generated, "--out", tmp_path / "map.geojson")
-    assert isinstance(shown.exception, AirTouchError) and "a folder; a map is of one flight" in str(shown.exception)
+    result = run("map", generated, "--out", tmp_path / "map.geojson")
+    assert isinstance(result.exception, AirTouchError) and "a folder; a map is of one flight" in str(result.exception)
 
 
 def test_a_manifest_is_no_flight(generated):
@@ -93,8 +93,8 @@ def test_an_effect_that_is_off_cannot_be_switched_off(tmp_path):
     refuse_off(plan, ["gust"])
     with pytest.raises(AirTouchError, match="--without slung_load: this scenario does not switch it on; on are .*gust"):
         refuse_off(plan, ["slung_load"])
-    shown = run("simulate", "diagnosis", "--out", tmp_path / "o", "--without", "gust")
-    assert isinstance(shown.exception, AirTouchError) and "does not switch it on" in str(shown.exception)
+    result = run("simulate", "diagnosis", "--out", tmp_path / "o", "--without", "gust")
+    assert isinstance(result.exception, AirTouchError) and "does not switch it on" in str(result.exception)
     assert not (tmp_path / "o").exists()
 
 
@@ -102,10 +102,10 @@ def test_a_log_of_nothing_is_told_as_that(generated, tmp_path):
     log = logs.read(generated / "f0.csv.gz")
     nothing = {name: np.full(len(log), np.nan) for name in log.columns if name != "t_s"}
     logs.write(log.with_columns(nothing), tmp_path / "nan.csv")
-    shown = run("evaluate", tmp_path / "nan.csv", "--speed", "0.3", "--detector", "baseline")
-    assert "nan.csv: nothing was logged: every value of every channel is missing" in shown.output
-    shown = run("gap", "measure", tmp_path / "nan.csv")
-    assert "nothing was logged" in str(shown.exception)
+    result = run("evaluate", tmp_path / "nan.csv", "--speed", "0.3", "--detector", "baseline")
+    assert "nan.csv: nothing was logged: every value of every channel is missing" in result.output
+    result = run("gap", "measure", tmp_path / "nan.csv")
+    assert "nothing was logged" in str(result.exception)
     assert "nothing was logged" in run("logs", "check", tmp_path / "nan.csv").output
 
 
@@ -114,12 +114,12 @@ def test_a_score_passes_on_what_the_log_check_knows(generated, tmp_path):
     clock = log["t_s"].copy()
     clock[300:310] = clock[300:310][::-1]
     logs.write(log.with_columns({"t_s": clock}), tmp_path / "back.csv")
-    whole = (tmp_path / "back.csv").read_bytes()
-    (tmp_path / "cut.csv").write_bytes(whole[:-20])
-    shown = run("evaluate", tmp_path / "back.csv", tmp_path / "cut.csv", "--speed", "0.3", "--detector", "baseline",
-                "--json", tmp_path / "out.json")
-    assert "the clock runs backwards 9 times" in shown.output
-    assert "cut off" in shown.output, shown.output
+    contents = (tmp_path / "back.csv").read_bytes()
+    (tmp_path / "cut.csv").write_bytes(contents[:-20])
+    result = run("evaluate", tmp_path / "back.csv", tmp_path / "cut.csv", "--speed", "0.3", "--detector", "baseline",
+                 "--json", tmp_path / "out.json")
+    assert "the clock runs backwards 9 times" in result.output
+    assert "cut off" in result.output, result.output
     assert "runs backwards" in (tmp_path / "out.json").read_text()
 
 
@@ -128,8 +128,8 @@ def test_recovered_flights_are_listed(generated, tmp_path):
     log = log.with_columns({}, mission="sweep", flight=7, speed_mps=0.3, condition={"clearance": 0.04})
     logs.write(log, tmp_path / "sweep_0007.csv")
     (tmp_path / "sweep_0007.csv").rename(tmp_path / "sweep_0007.csv.gz.part")
-    found, _ = manifest.recover(tmp_path)
-    assert [p.name for p in found] == ["sweep_0007.csv.gz"]
+    recovered, _ = manifest.recover(tmp_path)
+    assert [p.name for p in recovered] == ["sweep_0007.csv.gz"]
     assert (tmp_path / "manifest.csv").read_text().splitlines()[1] == "sweep_0007.csv.gz,messy,2,40mm,,none,0.3"
 
 

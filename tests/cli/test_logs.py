@@ -43,7 +43,7 @@ def test_info_goes_on_past_bad_files_and_sums_up(folder):
     assert call("info", folder / "good.csv").exit_code == 0
 
 
-def test_check_as_json(folder):
+def test_a_check_as_json_holds_rate_edges_and_files_left_out(folder):
     result = call("check", folder, "--json")
     assert result.exit_code == 2
     report = json.loads(result.stdout)
@@ -59,8 +59,8 @@ def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):
     assert call("convert", folder / "good.csv", "--out", out).exit_code == 0
     back = logs.read(out / "good.csv.gz")
     np.testing.assert_array_equal(back["t_s"], np.arange(600) * 0.002)
-    again = call("convert", folder / "good.csv", "--out", out, "--rate", 100)
-    assert again.exit_code == 2 and "--force" in again.stderr
+    repeat = call("convert", folder / "good.csv", "--out", out, "--rate", 100)
+    assert repeat.exit_code == 2 and "--force" in repeat.stderr
     assert call("convert", folder / "good.csv", "--out", out, "--rate", 100, "--force").exit_code == 0
     assert len(logs.read(out / "good.csv.gz")) == 120
 

@@ -42,8 +42,8 @@ def test_a_zigzag_gives_the_platform_and_a_picture(tmp_path):
     outline = next(shapely.geometry.shape(f["geometry"]) for f in features if f["properties"]["role"] == "outline")
     assert outline.intersection(SQUARE).area / outline.union(SQUARE).area > 0.85
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
-    again = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")
-    assert again.exit_code != 0 and "--force" in str(again.exception)
+    repeat = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")
+    assert repeat.exit_code != 0 and "--force" in str(repeat.exception)
 
 
 def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path):
@@ -84,8 +84,8 @@ def test_the_picture_is_a_map_platform_scale_start_and_end():
     assert corners[:, 0].min() == 0.0 and corners[:, 0].max() == 1.0
     assert np.ptp(corners[:, 1]) == pytest.approx(map_figure.STRIP_M)
     bar = ax.lines[-1].get_xydata()
-    shown = ax.transAxes.inverted().transform(ax.transData.transform(bar))
-    assert (shown > 0.0).all() and (shown[:, 1] < 0.2).all() and shown[1, 0] < 0.5  # at the lower left
+    ends = ax.transAxes.inverted().transform(ax.transData.transform(bar))
+    assert (ends > 0.0).all() and (ends[:, 1] < 0.2).all() and ends[1, 0] < 0.5  # at the lower left
     assert [t.get_text() for t in ax.texts if t.get_text()] == [f"{bar[1, 0] - bar[0, 0]:g} m"]
 
 

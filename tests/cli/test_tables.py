@@ -46,7 +46,7 @@ def diagnosis():
 
 
 @pytest.mark.parametrize("width", [80, 100, 170])
-def test_a_diagnosis_fits(diagnosis, width):
+def test_a_diagnosis_fits_the_width_of_the_terminal(diagnosis, width):
     text = printed(width, lambda screen: show.diagnosis(screen, diagnosis))
     command, = (step.command for step in diagnosis.next if step.command)
     assert "\u2026" not in text and command in text
@@ -56,7 +56,7 @@ def test_a_diagnosis_fits(diagnosis, width):
 
 
 def test_the_bar_of_a_long_command_needs_nothing_slow():
-    asked = ("import sys, airtouch.cli.gap.progress\n"
-             "print(sorted({'scipy', 'numba', 'airtouch.gap'} & set(sys.modules)))")
-    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    code = ("import sys, airtouch.cli.gap.progress\n"
+            "print(sorted({'scipy', 'numba', 'airtouch.gap'} & set(sys.modules)))")
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert process.stdout.strip() == "[]", process.stderr

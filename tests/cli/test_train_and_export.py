@@ -33,9 +33,9 @@ def airtouch(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     def run(*arguments: object) -> Told:
         monkeypatch.setattr(sys, "argv", ["airtouch", *map(str, arguments)])
         capsys.readouterr()
-        with pytest.raises(SystemExit) as left:
+        with pytest.raises(SystemExit) as ending:
             main()
-        return Told(left.value.code or 0, *capsys.readouterr())
+        return Told(ending.value.code or 0, *capsys.readouterr())
 
     return run
 
@@ -47,33 +47,33 @@ def test_a_model_is_exported_and_checked(tmp_path: Path) -> None:
     assert runner.invoke(export_command.command, arguments).exit_code == 0
     assert "`airtouch export mine.npz`" in (tmp_path / "model" / "airtouch_model.c").read_text()
     assert "up to date" in runner.invoke(export_command.command, [*arguments, "--check"]).output
-    refused = runner.invoke(export_command.command, ["--out", str(tmp_path / "model"), "--check"])
-    assert isinstance(refused.exception, AirTouchError) and "stale or foreign" in str(refused.exception)
+    result = runner.invoke(export_command.command, ["--out", str(tmp_path / "model"), "--check"])
+    assert isinstance(result.exception, AirTouchError) and "stale or foreign" in str(result.exception)
 
 
 def test_check_refuses_sources_that_no_shipped_model_gives(tmp_path: Path, airtouch: Callable[..., Told]) -> None:
     folder = tmp_path / "model"
     assert airtouch("export", "--out", folder).returncode == 0
-    done = airtouch("export", "--check", "--out", folder)
-    assert done.returncode == 0 and done.stdout.count("up to date") == 3
+    check = airtouch("export", "--check", "--out", folder)
+    assert check.returncode == 0 and check.stdout.count("up to date") == 3
     (folder / "airtouch_old.c").write_text("int old;\n")
-    refused = airtouch("export", "--check", "--out", folder)
-    assert refused.returncode == 2 and "airtouch_old.c: foreign" in refused.stderr
+    foreign = airtouch("export", "--check", "--out", folder)
+    assert foreign.returncode == 2 and "airtouch_old.c: foreign" in foreign.stderr
     (folder / "airtouch_old.c").unlink()
     source = folder / "airtouch_rolling.c"
     source.write_text(source.read_text().replace("{", "{ ", 1))
-    edited = airtouch("export", "--check", "--out", folder)
-    assert edited.returncode == 2 and "edited since" in edited.stderr and edited.stderr.count("\n") == 1
+    after_edit = airtouch("export", "--check", "--out", folder)
+    assert after_edit.returncode == 2 and "edited since" in after_edit.stderr and after_edit.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("command", ["export", "evaluate"])
 def test_a_file_that_is_no_model_gives_one_line(tmp_path: Path, airtouch: Callable[..., Told], command: str) -> None:
-    wrong = tmp_path / "wrong.npz"
-    wrong.write_bytes(b"PK nothing")
-    arguments = [wrong] if command == "export" else [tmp_path, "--model", wrong]
-    done = airtouch(command, *arguments)
-    assert done.returncode == 2 and done.stdout == ""
-    assert done.stderr.count("\n") == 1 and "not a model file" in done.stderr
+    path = tmp_path / "wrong.npz"
+    path.write_bytes(b"PK nothing")
+    arguments = [path] if command == "export" else [tmp_path, "--model", path]
+    result = airtouch(command, *arguments)
+    assert result.returncode == 2 and result.stdout == ""
+    assert result.stderr.count("\n") == 1 and "not a model file" in result.stderr
 
 
 def test_training_names_what_it_cannot_use(tmp_path: Path) -> None:
@@ -107,25 +107,26 @@ def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, monke
                    "--seed", 3, "--out", out)
     assert result.exit_code == 0, result.output
     metadata = registry.get(detector).load(out).metadata
-    said = metadata["simulated"]
-    assert (said["scenario"], said["flights"], said["seed"], said["without"]) == ("paper-low", 4, 3, ["gust"])
-    assert "ground_effect" in said["effects"] and "gust" not in said["effects"]
+    provenance = metadata["simulated"]
+    expected = {"scenario": "paper-low", "flights": 4, "seed": 3, "without": ["gust"]}
+    assert {key: provenance[key] for key in expected} == expected
+    assert "ground_effect" in provenance["effects"] and "gust" not in provenance["effects"]
     assert len(metadata["flights"]) == 4 and all(name.startswith("paper-low_3_") for name in metadata["flights"])
     assert "simulated: paper-low, seed 3" in result.output
 
 
 def test_simulated_flights_are_the_same_for_the_same_seed() -> None:
-    told = []
-    first, what = simulated.training_flights(2, "paper-low", seed=5, progress=lambda *a: told.append(a))
-    again, _ = simulated.training_flights(2, "paper-low", seed=5)
+    counts = []
+    first, provenance = simulated.training_flights(2, "paper-low", seed=5, progress=lambda *a: counts.append(a))
+    repeat, _ = simulated.training_flights(2, "paper-low", seed=5)
     other, _ = simulated.training_flights(2, "paper-low", seed=5, without=("ground_effect",))
-    assert all((a["gyro_x_radps"] == b["gyro_x_radps"]).all() for a, b in zip(first, again, strict=True))
+    assert all((a["gyro_x_radps"] == b["gyro_x_radps"]).all() for a, b in zip(first, repeat, strict=True))
     assert first[0].meta["condition"] == other[0].meta["condition"]
     assert not any(name == "ground_effect" for log in other for name, _ in log.meta["effects"])
-    assert [a[1:3] for a in told] == [(1, 2), (2, 2)] and what["effects"]
+    assert [a[1:3] for a in counts] == [(1, 2), (2, 2)] and provenance["effects"]
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
+@pytest.mark.parametrize(("arguments", "message"), [
     (("--simulated", 2, "--scenario", "nowhere"), "nowhere"),
     (("--simulated", 2, "--without", "magic"), "magic"),
     (("--simulated", 2, "--without", "vibration"), "off in paper-mixed already"),
@@ -135,10 +136,10 @@ def test_simulated_flights_are_the_same_for_the_same_seed() -> None:
     (("--scenario", "paper-low"), "need --simulated"),
     (("--without", "gust", "."), "need --simulated"),
 ])
-def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple, said: str) -> None:
+def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple, message: str) -> None:
     result = train(*arguments, "--out", tmp_path / "m.npz")
     assert result.exit_code != 0 and not (tmp_path / "m.npz").exists()
-    assert said in (str(result.exception) + result.output)
+    assert message in (str(result.exception) + result.output)
 
 
 def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path) -> None:
@@ -156,5 +157,5 @@ def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path
     assert "trained on 2 flights" in result.output
     metadata = best.load(tmp_path / "new.npz").metadata
     assert len(metadata["flights"]) == 3 and metadata["free_air"] == 1
-    refused = train(tmp_path / "mine", "--detector", "paper", "--labelled", 2, "--out", tmp_path / "m.npz")
-    assert refused.exit_code == 2 and "for --detector best" in refused.output
+    refusal = train(tmp_path / "mine", "--detector", "paper", "--labelled", 2, "--out", tmp_path / "m.npz")
+    assert refusal.exit_code == 2 and "for --detector best" in refusal.output

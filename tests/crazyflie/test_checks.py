@@ -13,7 +13,7 @@ def test_a_good_drone_may_fly():
     assert checks.problems(GOOD) == [] and checks.notes(GOOD) == []
 
 
-@pytest.mark.parametrize("condition, says", [
+@pytest.mark.parametrize("condition, message", [
     (Condition(3.5, GOOD.decks), "battery at 3.50 V, less than 3.70 V; charge it"),
     (Condition(float("nan"), GOOD.decks), "battery at nan V"),
     (Condition(4.0, {"bcFlow2": False}), "no Flow deck found .*attach it and restart"),
@@ -24,17 +24,17 @@ def test_a_good_drone_may_fly():
     (Condition(4.0, GOOD.decks, None, 1.7), "reads 1.70 m on the ground"),
     (Condition(4.0, GOOD.decks, None, float("nan")), "reads nan m"),
 ])
-def test_each_fault_is_one_line(condition, says):
+def test_each_fault_is_one_line(condition, message):
     import re
 
     (line,) = checks.problems(condition)
-    assert re.search(says, line) and "\n" not in line
+    assert re.search(message, line) and "\n" not in line
 
 
 def test_optional_decks_are_only_noted():
-    bare = Condition(4.0, {"bcFlow2": True})
-    assert checks.problems(bare) == []
-    (note,) = checks.notes(bare)
+    no_options = Condition(4.0, {"bcFlow2": True})
+    assert checks.problems(no_options) == []
+    (note,) = checks.notes(no_options)
     assert "Multi-ranger" in note and checks.notes(GOOD) == []
 
 
@@ -45,12 +45,12 @@ def test_values_that_a_parameter_can_hold(text, ctype, value):
     assert checks.representable("g.n", text, ctype) == value
 
 
-@pytest.mark.parametrize("text, ctype, says", [
+@pytest.mark.parametrize("text, ctype, message", [
     ("256", "uint8_t", "out of range; the drone keeps it as uint8_t, 0 to 255"), ("-1", "uint16_t", "out of range"),
     ("1.5", "uint8_t", "give a whole number"), ("yes", "float", "give a number"), ("1e40", "float", "out of range"),
 ])
-def test_values_that_it_cannot(text, ctype, says):
-    with pytest.raises(AirTouchError, match=says):
+def test_values_that_it_cannot(text, ctype, message):
+    with pytest.raises(AirTouchError, match=message):
         checks.representable("g.n", text, ctype)
 
 

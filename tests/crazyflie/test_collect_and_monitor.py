@@ -47,15 +47,15 @@ def serve(hop, monkeypatch):
 @pytest.fixture(autouse=True)
 def guards(monkeypatch):
     """The guard of each flight; its process has tests of its own."""
-    made = []
+    started = []
 
     @contextmanager
     def guarding(uri, height_m, seconds):
-        made.append(Guard())
-        yield made[-1]
+        started.append(Guard())
+        yield started[-1]
 
     monkeypatch.setattr(collect, "guarding", guarding)
-    return made
+    return started
 
 
 def run(*arguments):
@@ -79,13 +79,13 @@ def comes_to_rest(virtual):
 def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards):
     with serve() as virtual:
         virtual.once_it_logs(lambda: virtual.order("late=50ms"))
-        shown = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
-        assert shown.exit_code == 0, shown.output
+        result = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
+        assert result.exit_code == 0, result.output
         assert comes_to_rest(virtual)
     assert [guard.landed for guard in guards] == [True, True]
     assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
     log = logs.read(tmp_path / "hop_0004.csv.gz")
-    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") >= 2
+    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and result.output.count("\ntrue ") >= 2
     assert set(np.round(np.diff(log["t_s"]), 3)) == {0.01}  # late packets are none lost
     assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop"
     assert log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
@@ -103,8 +103,8 @@ def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards)
 def test_a_second_collect_starts_where_the_first_did(serve, hop, cache, tmp_path):
     with serve() as virtual:
         for number in (1, 2):  # the first lands behind the platform
-            shown = fly(virtual, hop, cache, tmp_path, "--number", str(number))
-            assert shown.exit_code == 0, shown.output
+            result = fly(virtual, hop, cache, tmp_path, "--number", str(number))
+            assert result.exit_code == 0, result.output
             assert comes_to_rest(virtual) and virtual.drone.row[log_row.POSITION] > 1.5
     kinds = [[e.kind for e in logs.true_edges(logs.read(tmp_path / f"hop_000{n}.csv.gz"))] for n in (1, 2)]
     assert kinds == [["entry", "exit"]] * 2
@@ -116,20 +116,20 @@ def test_a_killed_flight_in_mid_air_is_followed_by_one_from_the_ground(serve, ho
         virtual.drone.commander.planner.command(bytes([7, 0]) + struct.pack("<ff?ff", 0.5, 0.0, True, 0.0, 1.0),
                                                 virtual.drone.now_s)
         virtual.clock.wait_for(lambda: virtual.drone.row[log_row.POSITION + 2] > 0.4, 5.0)
-        shown = fly(virtual, hop, cache, tmp_path)
-        assert shown.exit_code == 0, shown.output
+        result = fly(virtual, hop, cache, tmp_path)
+        assert result.exit_code == 0, result.output
     log = logs.read(tmp_path / "hop_0001.csv.gz")
     assert log["zrange_m"][0] < 0.1 and log.stack(("m1_pwm", "m2_pwm"))[0].max() == 0.0
 
 
 def test_a_flight_without_an_edge_is_free_air(serve, cache, tmp_path):
-    far = tmp_path / "far.toml"
-    far.write_text(HOP.replace('"hop"', '"far"').replace("distance_m = 2.0", "distance_m = 0.3"))
+    path = tmp_path / "far.toml"
+    path.write_text(HOP.replace('"hop"', '"far"').replace("distance_m = 2.0", "distance_m = 0.3"))
     with serve() as virtual:
-        shown = fly(virtual, far, cache, tmp_path)
-        assert shown.exit_code == 0, shown.output
+        result = fly(virtual, path, cache, tmp_path)
+        assert result.exit_code == 0, result.output
     assert (tmp_path / "manifest.csv").read_text().splitlines()[1].startswith("far_0001.csv.gz,free-air,")
-    assert "no edge" in shown.output
+    assert "no edge" in result.output
 
 
 def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):
@@ -151,8 +151,8 @@ def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):
 
 def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
     with serve("disconnect=4,5s") as virtual:
-        shown = fly(virtual, hop, cache, tmp_path)
-        assert shown.exit_code == 1 and "link lost" in shown.output, shown.output
+        result = fly(virtual, hop, cache, tmp_path)
+        assert result.exit_code == 1 and "link lost" in result.output, result.output
         assert comes_to_rest(virtual) and guards[0].landed
     log = logs.read(tmp_path / "hop_0001.csv.gz")
     assert log.meta["longest_gap_s"] >= 4.9 and "link lost" in log.meta["ended"]
@@ -162,21 +162,22 @@ def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
 
 def test_a_drop_after_which_the_drone_has_forgotten_its_log_blocks(serve, hop, cache, tmp_path):
     with serve("disconnect=4,6s") as virtual:
-        shown = fly(virtual, hop, cache, tmp_path, "--link-timeout", "15")
-        assert shown.exit_code == 0 and "heard again" in shown.output, shown.output
+        result = fly(virtual, hop, cache, tmp_path, "--link-timeout", "15")
+        assert result.exit_code == 0 and "heard again" in result.output, result.output
         assert comes_to_rest(virtual)
     assert logs.read(tmp_path / "hop_0001.csv.gz").meta["longest_gap_s"] > 4.0
 
 
-@pytest.mark.parametrize("setting, says", [
+@pytest.mark.parametrize("setting, message", [
     ("airtouch.pFa=2", "airtouch.pFa = 2: out of range; the drone kept 0.5"),
     ("airtouch.enable=300", "out of range; the drone keeps it as uint8_t, 0 to 255"),
     ("airtouch.nothing=1", "no such parameter"), ("deck.bcFlow2=0", "read-only"),
 ])
-def test_settings_that_the_drone_does_not_take(serve, hop, cache, tmp_path, setting, says):
+def test_settings_that_the_drone_does_not_take(serve, hop, cache, tmp_path, setting, message):
     with serve() as virtual:
-        shown = fly(virtual, hop, cache, tmp_path, "--param", setting)
-        assert shown.exit_code != 0 and isinstance(shown.exception, AirTouchError) and says in str(shown.exception)
+        result = fly(virtual, hop, cache, tmp_path, "--param", setting)
+        assert result.exit_code != 0 and isinstance(result.exception, AirTouchError)
+        assert message in str(result.exception)
         assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
 
 
@@ -194,37 +195,37 @@ def test_a_setting_that_is_never_answered_is_told(serve, hop, cache, tmp_path):
 
 def test_firmware_without_a_variable_is_told_which(serve, hop, cache, tmp_path, monkeypatch):
     def fewer(drone):
-        return {name: how for name, how in log_variables(drone).items() if name not in ("motor.m3", "pm.vbat")}
+        return {name: kind for name, kind in log_variables(drone).items() if name not in ("motor.m3", "pm.vbat")}
 
     monkeypatch.setattr("airtouch.sitl.firmware.variables.log_variables", fewer)
     with serve() as virtual:
-        shown = fly(virtual, hop, cache, tmp_path)
-        assert "the firmware has no log variable motor.m3, pm.vbat" in str(shown.exception)
+        result = fly(virtual, hop, cache, tmp_path)
+        assert "the firmware has no log variable motor.m3, pm.vbat" in str(result.exception)
         assert comes_to_rest(virtual)
 
 
 def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, cache, tmp_path):
     with serve("low-battery=start") as virtual:
-        shown = fly(virtual, hop, cache, tmp_path)
-        assert "not ready: battery at" in str(shown.exception) and "charge it" in str(shown.exception)
+        result = fly(virtual, hop, cache, tmp_path)
+        assert "not ready: battery at" in str(result.exception) and "charge it" in str(result.exception)
         assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
 
 
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):
     with serve("gap8-silent=start") as virtual:
-        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param",
-                    "airtouch.detector=2")
-    assert shown.exit_code == 0 and "the GAP8 does not answer" in shown.output, shown.output
-    assert "the drone says: " in shown.output and "another detector runs" in shown.output
-    assert re.search(r"\d Hz, 0.0 % lost.*round trip", shown.output)
+        result = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param",
+                     "airtouch.detector=2")
+    assert result.exit_code == 0 and "the GAP8 does not answer" in result.output, result.output
+    assert "the drone says: " in result.output and "another detector runs" in result.output
+    assert re.search(r"\d Hz, 0.0 % lost.*round trip", result.output)
 
 
 def test_monitor_counts_losses_and_runs_the_detector_here(serve, cache):
     with serve("loss=0.3") as virtual:
-        shown = run("monitor", "--uri", virtual.uri, "--duration", "6", "--cache", cache, "--host-detector")
-    assert shown.exit_code == 0 and "(best on the host)" in shown.output, shown.output
-    share = float(re.findall(r"([\d.]+) % lost", shown.output)[-1])
-    assert 20 < share < 40 and "P 0.00" in shown.output
+        result = run("monitor", "--uri", virtual.uri, "--duration", "6", "--cache", cache, "--host-detector")
+    assert result.exit_code == 0 and "(best on the host)" in result.output, result.output
+    share = float(re.findall(r"([\d.]+) % lost", result.output)[-1])
+    assert 20 < share < 40 and "P 0.00" in result.output
 
 
 def test_an_interrupted_link_object_is_opened_again(serve, cache):

@@ -12,27 +12,27 @@ def run(*arguments):
     return CliRunner().invoke(airtouch, [str(a) for a in arguments])
 
 
-def refused(*arguments):
-    shown = run(*arguments)
-    assert isinstance(shown.exception, AirTouchError), shown.output
-    assert "\n" not in str(shown.exception)
-    return str(shown.exception)
+def refusal(*arguments):
+    result = run(*arguments)
+    assert isinstance(result.exception, AirTouchError), result.output
+    assert "\n" not in str(result.exception)
+    return str(result.exception)
 
 
 def test_collect_wants_a_drone_and_a_mission(tmp_path):
-    assert "give --uri and --mission" in refused("collect", "--out", tmp_path)
-    assert "no mission 'loop'" in refused("collect", "--out", tmp_path, "--uri", "udp://127.0.0.1:1", "--mission",
+    assert "give --uri and --mission" in refusal("collect", "--out", tmp_path)
+    assert "no mission 'loop'" in refusal("collect", "--out", tmp_path, "--uri", "udp://127.0.0.1:1", "--mission",
                                           "loop")
-    assert "--flights must be" in refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "-n", "0")
-    assert "group.name=value" in refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--param",
+    assert "--flights must be" in refusal("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "-n", "0")
+    assert "group.name=value" in refusal("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--param",
                                          "a")
 
 
 def test_an_existing_flight_is_not_flown_over(tmp_path):
     path = recorder.flight_path(tmp_path, "sweep", 3)
     path.write_bytes(b"mine")
-    said = refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--number", "3")
-    assert said == f"{path}: exists already; use --force to replace it" and path.read_bytes() == b"mine"
+    message = refusal("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--number", "3")
+    assert message == f"{path}: exists already; use --force to replace it" and path.read_bytes() == b"mine"
 
 
 def test_a_folder_without_room_or_rights_is_told_before_flying(tmp_path, monkeypatch):
@@ -45,19 +45,19 @@ def test_a_folder_without_room_or_rights_is_told_before_flying(tmp_path, monkeyp
 
 
 def test_missions_are_listed(tmp_path):
-    shown = run("collect", "--list-missions", "--out", tmp_path)
-    assert shown.exit_code == 0
-    assert [line.split(":")[0] for line in shown.output.splitlines()] == ["sweep", "there-and-back", "zig-zag"]
+    result = run("collect", "--list-missions", "--out", tmp_path)
+    assert result.exit_code == 0
+    assert [line.split(":")[0] for line in result.output.splitlines()] == ["sweep", "there-and-back", "zig-zag"]
 
 
 def test_nothing_to_recover_is_no_fault(tmp_path):
     assert run("collect", "--recover", "--out", tmp_path).exit_code == 0
     (tmp_path / "a_0001.csv.gz.part").write_text("")
-    shown = run("collect", "--recover", "--out", tmp_path)
-    assert shown.exit_code == 2 and "a_0001.csv.gz.part" in shown.output
+    result = run("collect", "--recover", "--out", tmp_path)
+    assert result.exit_code == 2 and "a_0001.csv.gz.part" in result.output
 
 
 def test_replay_takes_one_flight(tmp_path):
-    assert "no such file" in refused("replay", tmp_path / "none.csv")
+    assert "no such file" in refusal("replay", tmp_path / "none.csv")
     (tmp_path / "a.csv").write_text("t_s,m1_pwm\n0,1\n")
-    assert "give one flight, not a folder" in refused("replay", tmp_path)
+    assert "give one flight, not a folder" in refusal("replay", tmp_path)

@@ -37,10 +37,10 @@ def image(tmp_path):
 
 
 def test_good_images_are_known_by_what_they_are(image):
-    found = flash.inspect(image(stm32()))
-    assert (found.target, found.size_bytes, found.entry) == ("stm32", 40_000, 0x0800_4100)
-    found = flash.inspect(image(gap8(), "any.name"))
-    assert (found.target, found.entry) == ("gap8", 0x1C00_0180)
+    kind = flash.inspect(image(stm32()))
+    assert (kind.target, kind.size_bytes, kind.entry) == ("stm32", 40_000, 0x0800_4100)
+    kind = flash.inspect(image(gap8(), "any.name"))
+    assert (kind.target, kind.entry) == ("gap8", 0x1C00_0180)
 
 
 @pytest.mark.parametrize("data, words", [
@@ -110,14 +110,14 @@ def test_where_cfloader_fails_its_exit_code_is_told(image, data, hint, monkeypat
 def test_cfloader_itself_understands_the_targets(image, monkeypatch):
     """The installed cfloader parses our command line down to the targets that it would flash."""
     cfloader = pytest.importorskip("cfloader")
-    wanted = []
+    links = []
 
     class Loader:
         def __init__(self, link):
-            wanted.append(link)
+            links.append(link)
 
         def flash_full(self, cf=None, filename=None, warm=None, targets=None, **_):
-            wanted.extend((filename, [(t.platform, t.target, t.type) for t in targets]))
+            links.extend((filename, [(t.platform, t.target, t.type) for t in targets]))
 
         def __getattr__(self, name):
             return lambda *_, **__: True
@@ -125,16 +125,16 @@ def test_cfloader_itself_understands_the_targets(image, monkeypatch):
     monkeypatch.setattr(cfloader, "Bootloader", Loader)
     monkeypatch.setattr(cfloader.cflib.crtp, "init_drivers", lambda: None)
     for data, target in ((stm32(), ("cf2", "stm32", "fw")), (gap8(), ("deck", "bcAI:gap8", "fw"))):
-        wanted.clear()
+        links.clear()
         path = image(data)
         monkeypatch.setattr(sys, "argv", flash.command(flash.inspect(path), URI)[2:])
         try:
             cfloader.main()
         except SystemExit as done:
             assert not done.code
-        assert wanted == [URI, str(path), [target]]
+        assert links == [URI, str(path), [target]]
 
 
 def test_the_command_looks_and_does_not_flash(image):
-    done = CliRunner().invoke(cli.command, [str(image(stm32())), "--check"])
-    assert done.exit_code == 0 and "stm32, 40000 bytes, entry 0x08004100" in done.output
+    result = CliRunner().invoke(cli.command, [str(image(stm32())), "--check"])
+    assert result.exit_code == 0 and "stm32, 40000 bytes, entry 0x08004100" in result.output

@@ -42,16 +42,16 @@ def test_a_mission_flies_as_planned_and_the_log_shows_its_edges(tmp_path):
     log = book.finish(ended=ended)
     assert ended == "as planned" and flight.landed and not craft.flying and not craft.crashed
     assert [k for k in dict.fromkeys(kinds(craft))] == ["take-off", "go", "land", "stop"]
-    read = logs.read(tmp_path / "f_0001.csv.gz")
+    flight_log = logs.read(tmp_path / "f_0001.csv.gz")
     assert not list(tmp_path.glob("*.part"))
-    assert [e.kind for e in logs.true_edges(read)] == ["entry", "exit"]
-    assert read.meta["lost_samples"] == 0 and read.meta["ended"] == "as planned"
-    assert np.allclose(np.diff(read["t_s"]), 0.01)
-    entry, leave = logs.true_edges(read)
+    assert [e.kind for e in logs.true_edges(flight_log)] == ["entry", "exit"]
+    assert flight_log.meta["lost_samples"] == 0 and flight_log.meta["ended"] == "as planned"
+    assert np.allclose(np.diff(flight_log["t_s"]), 0.01)
+    entry, leave = logs.true_edges(flight_log)
     distance = 0.3 * 0.01 * (leave.sample - entry.sample)
     assert distance == pytest.approx(1.0, abs=0.02)
-    assert read["x_m"][entry.sample] == pytest.approx(1.0, abs=0.03)
-    assert len(log) == len(read)
+    assert flight_log["x_m"][entry.sample] == pytest.approx(1.0, abs=0.03)
+    assert len(log) == len(flight_log)
 
 
 def test_thirty_percent_loss_is_counted_and_every_command_gets_through(tmp_path):
@@ -116,20 +116,20 @@ def test_a_request_to_stop_lands_whenever_it_comes(tmp_path, after_s):
 
 
 def test_a_full_disk_lands_and_keeps_what_was_written(tmp_path, monkeypatch):
-    craft, real, written = FakeCraft(), os.write, [0]
+    craft, real, bytes_written = FakeCraft(), os.write, [0]
 
     def write(handle, data):
-        written[0] += len(data)
-        if written[0] > 60_000:
+        bytes_written[0] += len(data)
+        if bytes_written[0] > 60_000:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return real(handle, data)
 
     monkeypatch.setattr("airtouch.crazyflie.recorder.os.write", write)
     flight, book, ended = fly(craft, tmp_path)
     assert "No space left" in ended and not craft.flying and not craft.crashed
-    kept = logs.read(tmp_path / "f_0001.csv.gz.part")
-    assert 100 < len(kept) < len(book.log())
-    assert not any("cut off" in w for w in kept.meta["warnings"])
+    partial = logs.read(tmp_path / "f_0001.csv.gz.part")
+    assert 100 < len(partial) < len(book.log())
+    assert not any("cut off" in w for w in partial.meta["warnings"])
     monkeypatch.undo()
     assert len(book.finish()) == len(book.log()) and not list(tmp_path.glob("*.part"))
 

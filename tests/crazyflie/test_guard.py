@@ -43,17 +43,17 @@ with guarding(sys.argv[1], 0.25, 4.0) as watch:
 """
 
 
-def flyer(drone, how):
-    process = subprocess.Popen([sys.executable, "-c", FLYER, uri(drone), how], stdout=subprocess.PIPE,
+def flyer(drone, ending):
+    process = subprocess.Popen([sys.executable, "-c", FLYER, uri(drone), ending], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "flying\n"
     return process
 
 
-@pytest.mark.parametrize("how", ["is killed", "raises"])
-def test_the_drone_is_landed_when_its_pilot_dies(drone, how):
-    process = flyer(drone, how)
-    if how == "is killed":
+@pytest.mark.parametrize("ending", ["is killed", "raises"])
+def test_the_drone_is_landed_when_its_pilot_dies(drone, ending):
+    process = flyer(drone, ending)
+    if ending == "is killed":
         os.kill(process.pid, signal.SIGKILL)
     process.wait()
     data, sender = drone.recvfrom(64)

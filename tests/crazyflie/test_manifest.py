@@ -24,7 +24,7 @@ def over_a_platform() -> np.ndarray:
     return np.where(np.arange(200) // 50 % 4 == 1, 0.4, 0.8)
 
 
-@pytest.mark.parametrize("lost, zrange, planned, use", [
+@pytest.mark.parametrize("lost_samples, zrange, planned, use", [
     (0, over_a_platform(), True, "clean"),
     (0, np.full(200, 0.8), True, "free-air"),
     (0, None, True, "clean"),  # nothing says that there was no edge
@@ -32,8 +32,8 @@ def over_a_platform() -> np.ndarray:
     (2, over_a_platform(), True, "clean"),  # 2 of 202
     (3, over_a_platform(), True, "messy"),  # 3 of 203: more than 1 %
 ])
-def test_use_of_a_flight(lost, zrange, planned, use):
-    assert manifest.use_of(flight(lost, zrange), planned) == use
+def test_use_of_a_flight(lost_samples, zrange, planned, use):
+    assert manifest.use_of(flight(lost_samples, zrange), planned) == use
 
 
 def test_a_row_has_the_values_of_its_mission_and_replaces_an_older_one(tmp_path):

@@ -29,10 +29,10 @@ def test_legs_are_the_path_that_the_simulator_flies(name):
     scene = scenario.load(path) if path.is_file() else scenario.load(name)
     rows = scenario.draw_flight(scene, 3, 2).setpoints
     legs = mission.load(name, 3, 2).legs
-    flown = retraced(legs)
-    assert abs(len(flown) - len(rows)) <= 2
+    path_rows = retraced(legs)
+    assert abs(len(path_rows) - len(rows)) <= 2
     upto = int(100 * sum(leg.seconds for leg in legs if leg.kind not in ("land", "wait") or leg is legs[0])) - 2
-    difference = flown[:upto] - rows[:upto, c.X:c.Z + 1] + rows[0, c.X:c.Z + 1]
+    difference = path_rows[:upto] - rows[:upto, c.X:c.Z + 1] + rows[0, c.X:c.Z + 1]
     assert np.abs(difference).max() < 0.02
 
 
@@ -53,11 +53,11 @@ step = [{ do = "wait", time_s = 1.0 }, { do = "take-off", height_m = 0.5 }, { do
 
 def test_ready_missions_cross_edges_low_enough_to_be_felt():
     for name in mission.names():
-        flown = mission.load(name)
-        assert flown.speed_mps and 0.1 <= flown.speed_mps <= 0.4
-        assert flown.values["clearance"] <= 0.05 and flown.values["top"] > 0.3
-        assert flown.legs[-1].kind == "wait" and flown.legs[-2].kind == "land"
-        assert math.isclose(flown.room_m[4], flown.values["top"] + flown.values["clearance"])
+        ready = mission.load(name)
+        assert ready.speed_mps and 0.1 <= ready.speed_mps <= 0.4
+        assert ready.values["clearance"] <= 0.05 and ready.values["top"] > 0.3
+        assert ready.legs[-1].kind == "wait" and ready.legs[-2].kind == "land"
+        assert math.isclose(ready.room_m[4], ready.values["top"] + ready.values["clearance"])
 
 
 def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
@@ -74,7 +74,7 @@ def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
 def test_the_shipped_detector_feels_the_edges_of_a_first_flight(name):
     """Six virtual flights, drawn anew: at most every fifth edge is missed (of 20 flights: results.md)."""
     path = mission.shipped_folder() / f"{name}.toml"
-    flown = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(path, 6, seed=7)]
-    score = at.evaluate(flown)
+    logs = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(path, 6, seed=7)]
+    score = at.evaluate(logs)
     assert score["edges"] == 6 * {"sweep": 2, "there-and-back": 4}[name]
     assert score["missed"] <= 0.2

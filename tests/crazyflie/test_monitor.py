@@ -69,9 +69,10 @@ def as_sent(log):
     half = {f"acc_{a}_mps2": np.float16(log[f"acc_{a}_mps2"] / G) * G for a in "xyz"}
     half |= {f"gyro_{a}_radps": np.radians(np.float16(np.degrees(log[f"gyro_{a}_radps"])).astype(float)) for a in "xyz"}
     attitude = [compressed(*row) for row in log.stack(ATTITUDE)]
-    held = np.array(attitude, dtype=float)[np.arange(len(log)) // 5 * 5]
-    kept = {n: np.floor(v) if n in PWM else v for n, v in log.columns.items() if n not in ACC_WORLD}
-    return FlightLog({**kept, **half, **dict(zip(ATTITUDE, euler(decompress(held)), strict=True))}, log.meta)
+    packets = np.array(attitude, dtype=float)[np.arange(len(log)) // 5 * 5]
+    columns = {n: np.floor(v) if n in PWM else v for n, v in log.columns.items() if n not in ACC_WORLD}
+    angles = dict(zip(ATTITUDE, euler(decompress(packets)), strict=True))
+    return FlightLog({**columns, **half, **angles}, log.meta)
 
 
 def test_edges_are_felt_where_the_log_feels_them(flight):
@@ -87,10 +88,10 @@ def test_edges_are_felt_where_the_log_feels_them(flight):
 
 def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
     monkeypatch.setattr("airtouch.crazyflie.monitor.time", SimpleNamespace(monotonic=lambda: 5.0))
-    whole, holed = watch(flight), watch(flight, loss=0.3)
+    complete, holed = watch(flight), watch(flight, loss=0.3)
     assert holed.detector.taken == pytest.approx(len(flight), abs=8)
-    assert [f.kind for f in holed.board.edges] == [f.kind for f in whole.board.edges]
-    for reported, expected in zip(holed.board.edges, whole.board.edges, strict=True):
+    assert [f.kind for f in holed.board.edges] == [f.kind for f in complete.board.edges]
+    for reported, expected in zip(holed.board.edges, complete.board.edges, strict=True):
         assert reported.at_s == pytest.approx(expected.at_s, abs=0.5)  # a slow entry moves with what is lost
     holed.intake.last_arrival_s = 5.0
     holed.refresh(0.004)
@@ -100,8 +101,8 @@ def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
 
 
 def test_the_apps_own_edges_are_shown_once_each_at_their_time():
-    said = []
-    monitor = Monitor(Board("test", "app"), Intake(None), None, said.append)
+    messages = []
+    monitor = Monitor(Board("test", "app"), Intake(None), None, messages.append)
     motion = dict.fromkeys(blocks.MOTION.names, 0.0)
     app = dict.fromkeys(app_log.WANTED.names, 0) | {"airtouch.prob": 0.9, "airtouch.detector": 2}
     for k in range(300):
@@ -111,5 +112,5 @@ def test_the_apps_own_edges_are_shown_once_each_at_their_time():
         monitor.take([Sample(blocks.MOTION.name, 10 * k, 0.01 * k, motion)])
         if k % 5 == 0:
             monitor.take([Sample(app_log.WANTED.name, 10 * k, 0.01 * k, dict(app))])
-    assert [(f.kind, pytest.approx(f.at_s, abs=0.011)) for f in said] == [("entry", 1.37)]
+    assert [(f.kind, pytest.approx(f.at_s, abs=0.011)) for f in messages] == [("entry", 1.37)]
     assert monitor.board.detector == "best on the GAP8" and monitor.board.status == ""

@@ -46,8 +46,8 @@ def test_firmware_that_says_nothing_is_unknown():
 def test_the_slow_block_has_what_the_drone_has():
     everything = blocks.STATE.names
     assert readiness.slow_block(Drone(variables=everything), {"bcMultiranger": True}).names == everything
-    without = readiness.slow_block(Drone(variables=everything), {"bcMultiranger": False}).names
-    assert set(everything) - set(without) == blocks.MULTIRANGER
+    no_multiranger = readiness.slow_block(Drone(variables=everything), {"bcMultiranger": False}).names
+    assert set(everything) - set(no_multiranger) == blocks.MULTIRANGER
     assert readiness.slow_block(Drone(variables=["acc.x"]), {}) is None
 
 

@@ -28,9 +28,10 @@ def test_rows_are_on_the_disk_at_once_and_sorted_at_the_end(tmp_path):
     part = logs.read(book.part)
     assert list(part["t_s"]) == [1.0, 1.01, 1.04, 1.03, 1.04] and part.meta["mission"] == "a"
     log = book.finish(ended="as planned")
-    read = logs.read(book.path)
-    assert list(read["t_s"]) == [1.0, 1.01, 1.03, 1.04] == list(log["t_s"])
-    assert read.meta["lost_samples"] == 1 and read.meta["doubled_samples"] == 1 and read.meta["ended"] == "as planned"
+    stored = logs.read(book.path)
+    assert list(stored["t_s"]) == [1.0, 1.01, 1.03, 1.04] == list(log["t_s"])
+    assert stored.meta["lost_samples"] == stored.meta["doubled_samples"] == 1
+    assert stored.meta["ended"] == "as planned"
     assert not book.part.exists()
 
 
@@ -47,7 +48,7 @@ def test_nothing_is_replaced_unasked(tmp_path):
     assert list(tmp_path.iterdir()) == []  # a flight without a row leaves nothing
 
 
-def test_numbers_go_on(tmp_path):
+def test_the_next_number_is_above_those_in_the_folder(tmp_path):
     assert recorder.next_number(tmp_path, "edge") == 1
     for name in ("edge_0003.csv.gz", "edge_0007.csv.gz.part", "edge_x_0009.csv.gz", "manifest.csv"):
         (tmp_path / name).write_text("x")
@@ -79,14 +80,14 @@ while True:
 """
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     for _ in range(40):
-        written = int(process.stdout.readline())
+        rows_written = int(process.stdout.readline())
     assert recorder.recover(tmp_path) == ([], [])  # it is still being written
     process.send_signal(signal.SIGKILL)
     process.wait()
     part = next(tmp_path.glob("*.part"))
     with part.open("ab") as file:
         file.write(b"9.99,0.1")  # cut off in the middle of a row
-    assert len(logs.read(part)) >= written // 6 * 5 - 5
+    assert len(logs.read(part)) >= rows_written // 6 * 5 - 5
     ((path,), _) = recorder.recover(tmp_path)
     log = logs.read(path)
     assert not part.exists() and log.meta["mission"] == "k" and "killed" in log.meta["ended"]
@@ -95,8 +96,8 @@ while True:
 
 def test_recovery_says_what_it_cannot_read_and_leaves_it(tmp_path):
     (tmp_path / "b_0001.csv.gz.part").write_text("")
-    found, unreadable = recorder.recover(tmp_path)
-    assert found == [] and "b_0001.csv.gz.part" in unreadable[0] and (tmp_path / "b_0001.csv.gz.part").exists()
+    recovered, unreadable = recorder.recover(tmp_path)
+    assert recovered == [] and "b_0001.csv.gz.part" in unreadable[0] and (tmp_path / "b_0001.csv.gz.part").exists()
 
 
 def test_a_log_that_cannot_be_finished_stays_as_it_is(tmp_path):

@@ -27,17 +27,17 @@ def flight(tmp_path_factory):
 def assert_equal(path, speed):
     (file,) = dataset.collect([path], speed)
     log = evaluate.read_flight(file)
-    whole = evaluate.evaluate_flight(file, log, best, best.load(None))
+    at_once = evaluate.evaluate_flight(file, log, best, best.load(None))
     detector, board, edges = HostDetector(), Board("f", "best"), []
     assert replay.run(log, board, detector, stop=threading.Event(), on_edge=edges.append) == len(log)
     stepwise = replay.result(file, log, detector)
-    np.testing.assert_array_equal(stepwise.trace.probability, whole.trace.probability)
-    assert stepwise.trace.edges == whole.trace.edges and len(edges) == len(board.edges) == len(whole.trace.edges)
-    assert [f.kind for f in edges] == [e.kind for e in whole.trace.edges]
-    np.testing.assert_allclose([f.probability for f in edges], [e.probability for e in whole.trace.edges])
-    np.testing.assert_allclose([f.at_s for f in edges], [e.sample / 100 for e in whole.trace.edges])
-    assert str(stepwise.score.as_dict()) == str(whole.score.as_dict())
-    return whole
+    np.testing.assert_array_equal(stepwise.trace.probability, at_once.trace.probability)
+    assert stepwise.trace.edges == at_once.trace.edges and len(edges) == len(board.edges) == len(at_once.trace.edges)
+    assert [f.kind for f in edges] == [e.kind for e in at_once.trace.edges]
+    np.testing.assert_allclose([f.probability for f in edges], [e.probability for e in at_once.trace.edges])
+    np.testing.assert_allclose([f.at_s for f in edges], [e.sample / 100 for e in at_once.trace.edges])
+    assert str(stepwise.score.as_dict()) == str(at_once.score.as_dict())
+    return at_once
 
 
 def test_on_a_simulated_flight(flight):
@@ -49,17 +49,17 @@ def test_on_a_recorded_flight(flights):
 
 
 def test_the_command_prints_what_evaluate_prints(flight):
-    shown = CliRunner().invoke(airtouch, ["replay", str(flight), "--flown-at", "0.3"])
+    result = CliRunner().invoke(airtouch, ["replay", str(flight), "--flown-at", "0.3"])
     scored = CliRunner().invoke(airtouch, ["evaluate", str(flight), "--speed", "0.3"])
-    assert shown.exit_code == scored.exit_code == 0
+    assert result.exit_code == scored.exit_code == 0
     row = next(line for line in scored.output.splitlines() if "│ best" in line)
-    assert row in shown.output and "felt at" in shown.output
+    assert row in result.output and "felt at" in result.output
 
 
 def test_pieces_of_one_row_give_the_same(flight):
-    log, one, all_at_once = logs.read(flight), HostDetector(), HostDetector()
+    log, row_by_row, all_at_once = logs.read(flight), HostDetector(), HostDetector()
     for i in range(0, 900):
-        one.next({name: values[i:i + 1] for name, values in log.columns.items()})
+        row_by_row.next({name: values[i:i + 1] for name, values in log.columns.items()})
     all_at_once.next({name: values[:900] for name, values in log.columns.items()})
-    cut = log.slice(0, 900)
-    assert one.trace(cut).edges == all_at_once.trace(cut).edges
+    beginning = log.slice(0, 900)
+    assert row_by_row.trace(beginning).edges == all_at_once.trace(beginning).edges

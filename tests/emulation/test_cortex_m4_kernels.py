@@ -105,10 +105,10 @@ def test_recorded_flights_equal_the_desktop_and_keep_the_budget(code, recorded):
         counts["stream_detector"].append(steps)
         edges += np.count_nonzero(steps.output["edge"])
     assert edges > 0
-    for name, flown in counts.items():
-        mean = np.concatenate([s.instructions[s.ready] for s in flown]).mean()
-        worst = max(s.instructions.max() for s in flown)
-        print(f"\n{name}, {len(flown)} flights: mean {mean:,.0f} instructions a step with an output, worst {worst:,}")
+    for name, flights in counts.items():
+        mean = np.concatenate([s.instructions[s.ready] for s in flights]).mean()
+        worst = max(s.instructions.max() for s in flights)
+        print(f"\n{name}, {len(flights)} flights: mean {mean:,.0f} instructions a step with an output, worst {worst:,}")
         assert mean <= STEP_LIMIT[name].instructions_mean and worst <= STEP_LIMIT[name].instructions_worst
 
 

@@ -39,7 +39,7 @@ int loop(int n) { volatile int s = 0; for (int i = 0; i < n; i++) s += i; return
 
 
 @pytest.fixture(scope="module", params=["cortex-m4", "rv32imc"])
-def loaded(request, tmp_path_factory):
+def loaded_machine(request, tmp_path_factory):
     source = tmp_path_factory.mktemp("probe") / "probe.c"
     source.write_text(SOURCE)
     program = build([source], request.param, optimise="-O1")
@@ -48,9 +48,9 @@ def loaded(request, tmp_path_factory):
 
 
 @pytest.fixture
-def machine(loaded):
-    loaded.reset()
-    return loaded
+def machine(loaded_machine):
+    loaded_machine.reset()
+    return loaded_machine
 
 
 def test_arguments_in_registers_and_on_the_stack(machine):
@@ -70,13 +70,13 @@ def test_memory_lives_until_reset(machine):
 
 def test_the_library_is_the_hosts(machine):
     """Square root and scaling are exact; the others are for start-up and near enough."""
-    where = machine.allocate(4)
+    address = machine.allocate(4)
     for x in (2.0, 0.7, 3.0e38, 1e-38, 1e-42):
         x32 = struct.unpack("<f", struct.pack("<f", x))[0]
         machine.call("root", x)
         assert machine.float_result() == pytest.approx(x32**0.5, rel=2.0**-24)
-        machine.call("mantissa", x, where)
-        exponent, = struct.unpack("<i", machine.read(where, 4))
+        machine.call("mantissa", x, address)
+        exponent, = struct.unpack("<i", machine.read(address, 4))
         assert 0.5 <= machine.float_result() < 1.0 and machine.float_result() * 2.0**exponent == x32
     for exponent in (-200, -140, -126, 3, 127):
         machine.call("scaled", 0.75, exponent)
@@ -100,30 +100,30 @@ def test_faults_say_what_and_where(machine, name, words):
     assert machine.call("bump").value == 7
 
 
-def test_stack_high_water(machine):
+def test_the_stack_used_is_that_of_the_deepest_call(machine):
     machine.call("bump")
     shallow = machine.stack_used()
     machine.call("fill", 1000)
     assert shallow < 64 and 1000 <= machine.stack_used() < 1064
 
 
-def test_instructions_are_counted(machine):
-    few, many = machine.call("loop", 10).instructions, machine.call("loop", 1010).instructions
-    per_round = (many - few) / 1000
+def test_each_round_of_a_loop_counts_the_same_instructions(machine):
+    ten_rounds, more_rounds = machine.call("loop", 10).instructions, machine.call("loop", 1010).instructions
+    per_round = (more_rounds - ten_rounds) / 1000
     assert 3 <= per_round <= 8 and (2 * per_round).is_integer()
-    assert machine.call("loop", 10).instructions == few
+    assert machine.call("loop", 10).instructions == ten_rounds
 
 
 def test_what_does_not_compile_says_why(tmp_path):
-    broken = tmp_path / "broken.c"
-    broken.write_text("int f(void) { return 1.0f * missing; }\n")
+    source = tmp_path / "broken.c"
+    source.write_text("int f(void) { return 1.0f * missing; }\n")
     with pytest.raises(AirTouchError, match="undeclared identifier 'missing'"):
-        build([broken], "cortex-m4")
+        build([source], "cortex-m4")
     with pytest.raises(AirTouchError, match="no core"):
-        build([broken], "z80")
+        build([source], "z80")
 
 
-def test_not_an_elf(tmp_path):
+def test_a_file_that_is_no_elf_is_refused(tmp_path):
     (tmp_path / "x").write_bytes(b"no")
     with pytest.raises(ValueError, match="not a 32-bit"):
         Elf(tmp_path / "x")

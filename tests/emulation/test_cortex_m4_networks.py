@@ -15,7 +15,7 @@ KERNELS = [GAP8 / f"{name}.c" for name in ("network_int8", "conv_int8", "dense_i
 
 
 @pytest.mark.parametrize("compiler, optimise", [("zig", "-O2"), ("gcc", "-Os")])
-def test_golden_windows(compiler, optimise):
+def test_golden_windows_have_their_golden_outputs(compiler, optimise):
     if compiler not in compilers("cortex-m4"):
         pytest.skip(f"no {compiler} for cortex-m4 on this machine")
     program = build([*KERNELS, MODEL / "airtouch_model.c", MODEL / "airtouch_golden.c"], "cortex-m4",
@@ -29,8 +29,8 @@ def test_golden_windows(compiler, optimise):
     outputs, counts = [], []
     for start in range(inputs, inputs + sizes["airtouchGoldenInputs"], 300):
         machine.write(source, machine.read(start, 300))
-        run = machine.call("networkInt8Run", network, source, arena)
-        outputs.append(np.frombuffer(machine.read(run.value, 2), np.int8))
-        counts.append(run.instructions)
+        inference = machine.call("networkInt8Run", network, source, arena)
+        outputs.append(np.frombuffer(machine.read(inference.value, 2), np.int8))
+        counts.append(inference.instructions)
     np.testing.assert_array_equal(np.concatenate(outputs), expected)
     print(f"\nthe paper's network on a Cortex-M4, {compiler} {optimise}: {max(counts):,} instructions a window")

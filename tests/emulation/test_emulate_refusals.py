@@ -23,18 +23,18 @@ def emulate(*arguments, **environment):
                           text=True, env=os.environ | environment)
 
 
-def one_line(run, words):
-    assert run.returncode == 1 and words in run.stderr and run.stderr.count("\n") == 1, run.stderr
+def one_line(process, words):
+    assert process.returncode == 1 and words in process.stderr and process.stderr.count("\n") == 1, process.stderr
 
 
 @pytest.fixture
-def refused(monkeypatch):
+def refusal(monkeypatch):
     """Whether a checkout is refused with these words, with this PATH; in this process, as imports take a second."""
     def check(base, path, words):
         monkeypatch.setenv("PATH", path)
-        with pytest.raises(AirTouchError) as found:
+        with pytest.raises(AirTouchError) as error:
             main([str(base)])
-        assert words in str(found.value) and "\n" not in str(found.value)
+        assert words in str(error.value) and "\n" not in str(error.value)
     return check
 
 
@@ -59,33 +59,33 @@ def test_without_a_checkout_it_says_where_to_get_one():
         main(["--fly"])
 
 
-@pytest.mark.parametrize("there, missing", [((), "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi"),
+@pytest.mark.parametrize("tools, message", [((), "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi"),
                                             (("arm-none-eabi-gcc",),
                                              "no qemu-system-arm: apt-get install qemu-system-arm")])
-def test_a_missing_tool_is_named(there, missing, path_with, tmp_path, refused):
-    refused(tmp_path, path_with(*there), missing)
+def test_a_missing_tool_is_named(tools, message, path_with, tmp_path, refusal):
+    refusal(tmp_path, path_with(*tools), message)
 
 
-def test_without_git_or_make_it_says_so(path_with, tmp_path, refused):
-    refused(tmp_path, path_with("arm-none-eabi-gcc", "qemu-system-arm", real=()), "no git: apt-get install git")
+def test_without_git_or_make_it_says_so(path_with, tmp_path, refusal):
+    refusal(tmp_path, path_with("arm-none-eabi-gcc", "qemu-system-arm", real=()), "no git: apt-get install git")
 
 
-def test_a_folder_that_is_no_checkout_is_refused(path_with, tmp_path, refused):
+def test_a_folder_that_is_no_checkout_is_refused(path_with, tmp_path, refusal):
     tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
-    refused(tmp_path, f"{tools}:{os.environ['PATH']}", "is no checkout of bitcraze/crazyflie-firmware (no tools/make/"
+    refusal(tmp_path, f"{tools}:{os.environ['PATH']}", "is no checkout of bitcraze/crazyflie-firmware (no tools/make/"
                                                        "oot.mk): git clone --recursive --branch 2026.08")
 
 
-def test_a_copy_without_its_history_is_refused(path_with, tmp_path, refused):
+def test_a_copy_without_its_history_is_refused(path_with, tmp_path, refusal):
     (tmp_path / "tools/make").mkdir(parents=True)
     (tmp_path / "tools/make/oot.mk").touch()
     tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
-    refused(tmp_path, f"{tools}:{os.environ['PATH']}", "does not say which release it is, and the board is written for "
+    refusal(tmp_path, f"{tools}:{os.environ['PATH']}", "does not say which release it is, and the board is written for "
                                                        "2026.08: git clone --recursive --branch 2026.08")
 
 
 @pytest.mark.parametrize("tag", ["2025.02", "2026.08-rc1"])
-def test_another_release_is_refused(tag, path_with, tmp_path, refused):
+def test_another_release_is_refused(tag, path_with, tmp_path, refusal):
     base = tmp_path / "base"
     (base / "tools/make").mkdir(parents=True)
     (base / "tools/make/oot.mk").touch()
@@ -93,13 +93,13 @@ def test_another_release_is_refused(tag, path_with, tmp_path, refused):
                     ["tag", tag]):
         subprocess.run(["git", "-C", base, *command], check=True)
     tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
-    refused(base, f"{tools}:{os.environ['PATH']}", f"is {tag}, the board is written for 2026.08: git -C")
+    refusal(base, f"{tools}:{os.environ['PATH']}", f"is {tag}, the board is written for 2026.08: git -C")
 
 
 def test_a_flight_without_motors_is_refused(log):
-    less = changed(log, columns={k: v for k, v in log.columns.items() if k != "m3_pwm"})
+    three_motors = changed(log, columns={k: v for k, v in log.columns.items() if k != "m3_pwm"})
     with pytest.raises(AirTouchError, match="has no m3_pwm: the app needs acceleration, rates and motors"):
-        rows(less)
+        rows(three_motors)
 
 
 @pytest.mark.parametrize("arguments, words", [
@@ -124,9 +124,9 @@ def test_a_flight_without_motors_is_refused(log):
 ])
 def test_what_cannot_be_run_is_refused_before_anything_is_built(monkeypatch, tmp_path, arguments, words):
     monkeypatch.setattr(build, "tools", lambda: pytest.fail("it went on"))
-    with pytest.raises(AirTouchError) as found:
+    with pytest.raises(AirTouchError) as error:
         main([str(tmp_path), *arguments])
-    assert words in str(found.value) and "\n" not in str(found.value)
+    assert words in str(error.value) and "\n" not in str(error.value)
 
 
 def test_a_flight_is_looked_at_before_anything_is_built(monkeypatch, tmp_path, log):
@@ -143,10 +143,10 @@ def test_a_compiler_that_refuses_is_one_line(monkeypatch, tmp_path):
     (tmp_path / "tools/make").mkdir(parents=True)
     (tmp_path / "tools/make/oot.mk").touch()
     (tmp_path / ".git").mkdir()
-    said = "In file included:\nsrc/a.c:3:1: fatal error: b.h: No such file\nmake: 1\n"
-    failed = subprocess.CompletedProcess([], 2, "", said)
+    output = "In file included:\nsrc/a.c:3:1: fatal error: b.h: No such file\nmake: 1\n"
+    process = subprocess.CompletedProcess([], 2, "", output)
     monkeypatch.setattr(build, "release", lambda base: build.RELEASE)
-    monkeypatch.setattr(build.subprocess, "run", lambda *_, **__: failed)
+    monkeypatch.setattr(build.subprocess, "run", lambda *_, **__: process)
     with pytest.raises(AirTouchError, match="^the firmware does not compile: src/a.c:3:1: fatal error: b.h: No such "
                                             "file; for all of it: make firmware CRAZYFLIE_BASE=.*PLATFORM=cf2$"):
         build.compile_firmware(tmp_path)

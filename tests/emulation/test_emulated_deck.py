@@ -57,16 +57,16 @@ def test_the_deck_frames_takes_turns_and_answers():
     core = AppCore({"detector": gap8.DETECTOR}, have_gap8=True)
     core.step([0.0, 0.0, 9.8], [0.0, 0.0, 0.0], [40_000.0] * 4)
     reset, = core.packets()
-    whole = bytes([0xFF, len(reset) + 2, 4 | 1 << 3 | 1 << 6, 5]) + reset
+    packet_bytes = bytes([0xFF, len(reset) + 2, 4 | 1 << 3 | 1 << 6, 5]) + reset
     xor = 0
-    for byte in whole:
+    for byte in packet_bytes:
         xor ^= byte
     wire = Wire()
     deck = Deck(wire)
     deck.turn(0)
-    wire.handlers["U"](whole[:5])
+    wire.handlers["U"](packet_bytes[:5])
     assert wire.said == []
-    wire.handlers["U"](whole[5:] + bytes([xor]))
+    wire.handlers["U"](packet_bytes[5:] + bytes([xor]))
     assert deck.sent == [reset] and wire.said == [CLEAR], "it may go on; the answer waits for its turn"
     wire.handlers["U"](CLEAR)
     reply, = deck.step_packets()

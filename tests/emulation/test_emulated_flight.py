@@ -59,41 +59,41 @@ def test_a_vehicle_at_rest_reads_gravity_and_stays(plant):
     assert plant.readings[at.ACC + 2] == pytest.approx(9.81, abs=1.0) and 0.0 <= plant.readings[at.RANGE] < 0.03
 
 
-def test_motors_lift_it(plant):
+def test_full_thrust_lifts_the_drone_and_the_range_sees_it(plant):
     for _ in range(500):
         plant.step(np.full(4, 60_000.0))
     assert plant.place[2] > 0.5 and plant.readings[at.RANGE] == pytest.approx(plant.place[2], abs=0.2)
 
 
 def test_sensors_get_the_chips_own_units():
-    readings, rest = np.zeros(at.READINGS), np.zeros(2)
+    readings, flow = np.zeros(at.READINGS), np.zeros(2)
     readings[at.ACC + 2], readings[at.ACC + 5] = 9.81, 1e4
     readings[at.GYRO] = np.deg2rad(100.0)
     readings[at.RANGE], readings[at.FLOW:at.FLOW + 2] = 0.8, (3.4, -2.0)
-    values = struct.unpack("<12hH2h", flight.sensor_block(readings, rest))
+    values = struct.unpack("<12hH2h", flight.sensor_block(readings, flow))
     assert values[0] == round(100.0 / (4000 / 65536)) and values[8] == round(65536 / 48) and values[11] == 32767
-    assert values[12] == 800 and values[13:] == (2, -3) and rest == pytest.approx([0.4, 0.0])
+    assert values[12] == 800 and values[13:] == (2, -3) and flow == pytest.approx([0.4, 0.0])
     readings[at.RANGE] = np.nan
-    assert struct.unpack("<12hH2h", flight.sensor_block(readings, rest))[12] == flight.NO_RANGE_MM
-    assert rest == pytest.approx([-0.2, 0.0]), "parts of counts are owed"
+    assert struct.unpack("<12hH2h", flight.sensor_block(readings, flow))[12] == flight.NO_RANGE_MM
+    assert flow == pytest.approx([-0.2, 0.0]), "parts of counts are owed"
 
 
 def test_set_points_are_packets_in_the_drones_own_axes():
     row = np.zeros(setpoint.SETPOINT_SIZE)
     row[setpoint.MOTORS], row[setpoint.VX], row[setpoint.Z], row[setpoint.YAW] = 1.0, 0.3, 0.8, np.pi / 2
-    kind, length, header, order, ahead, left, rate, height = struct.unpack("<BBBBffff", flight.set_point_packet(row))
+    kind, length, header, order, ahead, side, rate, height = struct.unpack("<BBBBffff", flight.set_point_packet(row))
     assert (kind, length, header >> 4, header & 3, order) == (0, 18, 7, 0, 5)
-    assert (ahead, left, rate, height) == pytest.approx((0.0, -0.3, 0.0, 0.8), abs=1e-6)
+    assert (ahead, side, rate, height) == pytest.approx((0.0, -0.3, 0.0, 0.8), abs=1e-6)
     row[setpoint.MOTORS] = 0.0
     assert flight.set_point_packet(row)[3:] == b"\0"
 
 
 def test_a_command_that_differs_is_counted():
-    one = flight.EmulatedFlight(pwm=np.full((100, 4), 40_000, np.uint16))
-    other = flight.EmulatedFlight(pwm=one.pwm.copy())
-    assert compare.differing(one, other)[0] == 0
-    other.pwm[60, 2] += 3
-    assert compare.differing(one, other) == (1, 100, 60, 3)
+    flight_a = flight.EmulatedFlight(pwm=np.full((100, 4), 40_000, np.uint16))
+    flight_b = flight.EmulatedFlight(pwm=flight_a.pwm.copy())
+    assert compare.differing(flight_a, flight_b)[0] == 0
+    flight_b.pwm[60, 2] += 3
+    assert compare.differing(flight_a, flight_b) == (1, 100, 60, 3)
 
 
 class Desk:
@@ -134,11 +134,11 @@ class Desk:
 @pytest.mark.parametrize("name, armed", [("crazyflie-2.1-flow", 0), ("crazyflie-2.1-brushless", 1)])
 def test_the_brushless_drone_alone_is_armed(monkeypatch, name, armed):
     monkeypatch.setattr(flight, "Board", Desk)
-    found = flight.fly(Path("any.elf"), scenario.parse(HOVER, "hover"), vehicles.load(name), 1)
+    result = flight.fly(Path("any.elf"), scenario.parse(HOVER, "hover"), vehicles.load(name), 1)
     arm = b"L" + struct.pack("<BBB", 0, 3, 9 << 4 | 3 << 2 | 1) + b"\x01\x01"
     assert Desk.said.count(arm) == armed
-    assert found.table.shape[1] == flight.COLUMNS and found.latency_us == 7
-    assert found.table[-1, flight.TRUE_X:flight.TRUE_X + 2] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert result.table.shape[1] == flight.COLUMNS and result.latency_us == 7
+    assert result.table[-1, flight.TRUE_X:flight.TRUE_X + 2] == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 def test_reports_belong_to_crossings_of_their_kind_one_to_one():
@@ -162,10 +162,10 @@ def test_a_summary_counts_flights_edges_and_false_reports():
 
 
 def test_flights_that_were_kept_are_not_flown_again(monkeypatch, tmp_path, capsys):
-    flown = []
+    seeds = []
 
     def fly(_elf, _scenario, _vehicle, seed, **_options):
-        flown.append(seed)
+        seeds.append(seed)
         table = np.zeros((3, flight.COLUMNS))
         table[:, flight.T] = 5.0
         return flight.EmulatedFlight(table=table, edges=[(5.0, "entry", 0.1)])
@@ -173,13 +173,13 @@ def test_flights_that_were_kept_are_not_flown_again(monkeypatch, tmp_path, capsy
     monkeypatch.setattr(height, "fly", fly)
     elf = tmp_path / "board.elf"
     elf.write_bytes(b"one")
-    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and flown == [1, 1, 2, 2]
+    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and seeds == [1, 1, 2, 2]
     first = capsys.readouterr().out
-    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and flown == [1, 1, 2, 2]
+    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and seeds == [1, 1, 2, 2]
     assert capsys.readouterr().out == first
     elf.write_bytes(b"another")
     height.report(elf, seeds=1, only="flat", folder=tmp_path / "flights")
-    assert flown == [1, 1, 2, 2, 1, 1], "another image flies anew"
+    assert seeds == [1, 1, 2, 2, 1, 1], "another image flies anew"
 
 
 def test_a_case_that_is_not_there_is_refused(tmp_path):
@@ -191,16 +191,16 @@ def test_a_ramp_is_not_why_the_drone_comes_back_beside_its_start():
     """The mission flies velocities, so what sensors and wind are off by adds up: as much over a flat floor."""
     missions = [height.mission(next(case for case in height.CASES if case.name.startswith(name)))
                 for name in ("flat floor", "ramp")]
-    flat, ramp = (np.array([side_by_side.own_loop(one, compare.vehicle(), seed)[-1, log_row.POSITION]
-                            for seed in range(1, 7)]) for one in missions)
+    flat, ramp = (np.array([side_by_side.own_loop(mission, compare.vehicle(), seed)[-1, log_row.POSITION]
+                            for seed in range(1, 7)]) for mission in missions)
     assert side_by_side.rms([flat]) > 0.2 and np.abs(ramp - flat).max() < 0.1
 
 
 def test_both_loops_draw_the_same_noise(plant):
     """After the seconds on the floor the IMU's random numbers stand where they do in the emulated flight."""
-    flown = scenario.parse(HOVER, "hover")
-    own = side_by_side.own_loop(flown, compare.vehicle(), 1)
-    assert own.shape == (len(draw_flight(flown, 1, 0).setpoints), log_row.COLUMNS)
+    hover = scenario.parse(HOVER, "hover")
+    own = side_by_side.own_loop(hover, compare.vehicle(), 1)
+    assert own.shape == (len(draw_flight(hover, 1, 0).setpoints), log_row.COLUMNS)
     assert own[0, log_row.T] == pytest.approx(flight.BOOT_S) and own[-1, log_row.POSITION + 2] > 0.4
 
 
@@ -235,14 +235,14 @@ def test_traces_are_written_side_by_side_and_not_over_others(tmp_path):
 
 @pytest.mark.slow
 def test_the_firmware_flies_and_the_app_changes_no_command(image):
-    flown = scenario.parse(HOVER, "hover")
-    on, off, again = (flight.fly(image, flown, compare.vehicle(), 1, app=app, whole_milliseconds=True)
-                      for app in (True, False, True))
+    scene = scenario.parse(HOVER, "hover")
+    on, off, repeat = (flight.fly(image, scene, compare.vehicle(), 1, app=app, whole_milliseconds=True)
+                       for app in (True, False, True))
     assert on.ending == off.ending == "ok"
     hover = on.table[-100:]
     assert np.abs(hover[:, 3] - 0.5).max() < 0.12 and np.abs(hover[:, 1:3]).max() < 0.3
     assert compare.differing(on, off)[:2] == (0, len(off.pwm)) and len(on.pwm) == len(off.pwm)
-    assert (on.pwm == again.pwm).all() and on.pwm.max() > 20_000
+    assert (on.pwm == repeat.pwm).all() and on.pwm.max() > 20_000
     assert on.late == 0 and min(on.free_words.values()) > 0
 
 

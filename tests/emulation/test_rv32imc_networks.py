@@ -49,8 +49,8 @@ def clusters(models):
 @pytest.fixture(scope="module")
 def fused(flights: Path) -> list[np.ndarray]:
     """Fused features (n, 3) of a few recorded flights."""
-    found = [flight_features(logs.read(file.path)).fused for file in collect([flights / "airtouch"])[::30]]
-    return [features[np.isfinite(features).all(axis=1)] for features in found]
+    per_flight = [flight_features(logs.read(file.path)).fused for file in collect([flights / "airtouch"])[::30]]
+    return [features[np.isfinite(features).all(axis=1)] for features in per_flight]
 
 
 def quantised_windows(model, fused: list[np.ndarray]) -> np.ndarray:
@@ -76,10 +76,10 @@ def tflite_micro(content: bytes, quantised: np.ndarray) -> np.ndarray:
 def test_real_windows_have_the_desktops_and_tflite_micros_bits(name, models, chips, fused):
     model, quantised = models[name], quantised_windows(models[name], fused)
     assert len(quantised) > 100
-    found = gap8_counts.windows(chips[name], quantised).outputs
-    np.testing.assert_array_equal(found, run_int8(model.int8, quantised))
-    np.testing.assert_array_equal(found, tflite_micro(model.tflite, quantised))
-    assert len(np.unique(found, axis=0)) > 20
+    outputs = gap8_counts.windows(chips[name], quantised).outputs
+    np.testing.assert_array_equal(outputs, run_int8(model.int8, quantised))
+    np.testing.assert_array_equal(outputs, tflite_micro(model.tflite, quantised))
+    assert len(np.unique(outputs, axis=0)) > 20
 
 
 @pytest.mark.parametrize("stride", [1, 4])
@@ -89,12 +89,12 @@ def test_a_real_flight_as_a_stream_has_the_bits_of_its_windows(stride, models, c
     inputs = fixed_scale(model.scale.mean, model.scale.deviation, fused[0][:700])
     quantised = quantise(inputs, first.input_scale, first.input_zero_point)
     expected, valid = run_rolling(model.int8, quantised, stride)
-    found = gap8_counts.rolling(chips["paper-stream"], quantised, stride).outputs
-    np.testing.assert_array_equal(found, expected[valid])
+    outputs = gap8_counts.rolling(chips["paper-stream"], quantised, stride).outputs
+    np.testing.assert_array_equal(outputs, expected[valid])
     ends = np.flatnonzero(valid) + rolling_size(model.int8, stride).ahead
     ends = ends[ends < len(quantised)]
     windows = np.stack([quantised[end - 99:end + 1] for end in ends])
-    np.testing.assert_array_equal(found[:len(ends)], tflite_micro(model.tflite, windows))
+    np.testing.assert_array_equal(outputs[:len(ends)], tflite_micro(model.tflite, windows))
 
 
 def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
@@ -120,31 +120,31 @@ def test_xpulp_cores_have_the_desktops_bits(name, cores, models, clusters):
 
 def test_eight_cores_are_at_least_six_times_as_fast_as_one(models, clusters):
     window = golden_vectors(models["paper"].int8)[0][0]
-    one, eight = (gap8_counts.team_cycles(clusters["paper"], window, cores)[0].looped for cores in (1, 8))
-    assert one / eight > 6
+    single, team = (gap8_counts.team_cycles(clusters["paper"], window, cores)[0].looped for cores in (1, 8))
+    assert single / team > 6
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-stream"])
 def test_windows_stay_in_the_budget(name, models, chips):
-    run = gap8_counts.windows(chips[name], golden_vectors(models[name].int8)[0])
-    assert run.instructions.max() <= BUDGET[name]["window_instructions"]
-    assert run.stack <= BUDGET[name]["stack_bytes"]
+    counts = gap8_counts.windows(chips[name], golden_vectors(models[name].int8)[0])
+    assert counts.instructions.max() <= BUDGET[name]["window_instructions"]
+    assert counts.stack <= BUDGET[name]["stack_bytes"]
 
 
 def test_streams_stay_in_the_budget(models, chips):
     rolled = gap8_counts.rolling(chips["paper-stream"], golden_vectors(models["paper"].int8)[0][0].reshape(-1, 3)[:100],
                                  4)
     streamed = gap8_counts.stream(chips["best"], golden_flight(models["best"].int8)[0][:100])
-    for name, run in (("paper-stream", rolled), ("best", streamed)):
-        assert run.instructions.mean() <= BUDGET[name]["step_instructions"]
-        assert run.instructions.max() <= BUDGET[name]["step_instructions_worst"]
-        assert run.stack <= BUDGET[name]["stack_bytes"]
+    for name, counts in (("paper-stream", rolled), ("best", streamed)):
+        assert counts.instructions.mean() <= BUDGET[name]["step_instructions"]
+        assert counts.instructions.max() <= BUDGET[name]["step_instructions_worst"]
+        assert counts.stack <= BUDGET[name]["stack_bytes"]
 
 
 def test_bytes_stay_in_the_budget(models, chips):
     arenas = {"paper": arena_bytes(models["paper"].int8), "best": stream_arena_bytes(models["best"].int8),
               "paper-stream": rolling_size(models["paper-stream"].int8, 4).arena_bytes}
     for name, chip in chips.items():
-        found = {"parameter_bytes": parameter_bytes(models[name].int8), "constant_bytes": chip.constant_bytes,
+        sizes = {"parameter_bytes": parameter_bytes(models[name].int8), "constant_bytes": chip.constant_bytes,
                  "flash_bytes": chip.flash_bytes, "arena_bytes": arenas[name]}
-        assert {what: size for what, size in found.items() if size > BUDGET[name][what]} == {}
+        assert {kind: size for kind, size in sizes.items() if size > BUDGET[name][kind]} == {}

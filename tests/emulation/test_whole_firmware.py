@@ -46,8 +46,9 @@ def test_the_network_on_the_gap8_and_what_may_go_wrong(image, log):
     elf = build.link()
     for faults, link in ((Faults(late=3, lost=0.1, damaged=0.1), "up"), (Faults(dead=(0, 1 << 30)), "starting"),
                          (Faults(there=False), "starting")):
-        found = gap8.replay(elf, log, 400, faults)
-        assert (found.steps, found.different, found.other_packets, found.link) == (400, 0, 0, link), found.first
+        comparison = gap8.replay(elf, log, 400, faults)
+        assert (comparison.steps, comparison.different) == (400, 0), comparison.first
+        assert (comparison.other_packets, comparison.link) == (0, link)
     with pytest.raises(AirTouchError, match="cpx_uart_transport.c"):
         gap8.replay(elf, log, 200, Faults(wrong_byte=50))
 
@@ -56,30 +57,31 @@ def test_the_network_on_the_gap8_and_what_may_go_wrong(image, log):
 def test_the_firmware_computes_what_the_desktop_does(image, log):
     steps = best.run(log).edges[0].sample + 100
     changes = {100: {"pFa": 1e-3}, 200: {"scoreIn": 99.0}, 300: {"detector": 0}, 400: {"detector": 1, "scoreIn": 2.3}}
-    found = replay(image, log, steps, changes)
-    assert (found.steps, found.different, found.late) == (steps, 0, 0), found.first
-    assert found.prob_off < 1e-6 and len(found.edges) == 1 and 0 < found.stack_bytes < 1200 and found.longest_us < 2000
-    assert "Self test passed!" in found.console
+    comparison = replay(image, log, steps, changes)
+    assert (comparison.steps, comparison.different, comparison.late) == (steps, 0, 0), comparison.first
+    assert comparison.prob_off < 1e-6 and len(comparison.edges) == 1
+    assert 0 < comparison.stack_bytes < 1200 and comparison.longest_us < 2000
+    assert "Self test passed!" in comparison.console
 
 
 @pytest.mark.slow
 def test_the_comparison_notices_another_input(image, log):
-    found = replay(image, log, 50, {10: {"pFa": 1e-3}})
-    assert found.different == 0
+    comparison = replay(image, log, 50, {10: {"pFa": 1e-3}})
+    assert comparison.different == 0
     core = AppCore(vehicle=vehicles.load("crazyflie-2.1-flow"))
     with Board(image, REPLAY, ["airtouch.fwz", "airtouch.steps"]) as board:
         board.ask("W", FED)
         board.go()
         table = rows(log)
         table[:, 2] += np.float32(1e-6)
-        seen = []
+        differences = []
         for row, true in zip(table[1000:1010], rows(log)[1000:1010], strict=True):
             board.say("V", row.tobytes())
             board.go()
             acc, gyro, pwm, volts, attitude = sample(true)
             core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
-            seen.append(differs("fwz", board.values(board.hear("S"))["airtouch.fwz"], core.log.force[2]))
-    assert any(seen)
+            differences.append(differs("fwz", board.values(board.hear("S"))["airtouch.fwz"], core.log.force[2]))
+    assert any(differences)
 
 
 @pytest.mark.slow

@@ -41,15 +41,15 @@ class Drone:
     def fly(self, flight, stop=None):
         """Edges (sample, kind) of a flight."""
         _, acc, gyro, pwm = flight
-        found = [(i, self.step(acc[i], gyro[i], pwm[i])) for i in range(len(acc))[:stop]]
-        return [(i, kind) for i, kind in found if kind != "none"]
+        kinds = [(i, self.step(acc[i], gyro[i], pwm[i])) for i in range(len(acc))[:stop]]
+        return [(i, kind) for i, kind in kinds if kind != "none"]
 
     @property
     def health(self):
         return {name for name, bit in HEALTH.items() if self.app.log.health & bit}
 
 
-def said(drone, flight, changes):
+def edges_and_rows(drone, flight, changes):
     """Edges, logits, thresholds and alerts of a flight with changes of parameters, step by step."""
     _, acc, gyro, pwm = flight
     rows, edges = [], []

@@ -24,8 +24,8 @@ def checkout(tmp_path):
 def test_make_firmware_says_what_is_missing(missing, words, checkout):
     if missing:
         (checkout / missing).unlink()
-    run = make("firmware", *([f"CRAZYFLIE_BASE={checkout}"] if missing else []))
-    assert run.returncode != 0 and words in run.stderr
+    process = make("firmware", *([f"CRAZYFLIE_BASE={checkout}"] if missing else []))
+    assert process.returncode != 0 and words in process.stderr
 
 
 @pytest.mark.parametrize("arguments, words", [
@@ -39,8 +39,8 @@ def test_make_firmware_says_what_is_missing(missing, words, checkout):
     (["VEHICLE=mine"], "no firmware/app/vehicles/mine.h; VEHICLE is one of crazyflie-2.1"),
 ])
 def test_make_firmware_refuses_what_does_not_fit(arguments, words, checkout):
-    run = make("firmware", f"CRAZYFLIE_BASE={checkout}", *arguments)
-    assert run.returncode != 0 and words in run.stderr
+    process = make("firmware", f"CRAZYFLIE_BASE={checkout}", *arguments)
+    assert process.returncode != 0 and words in process.stderr
 
 
 @pytest.mark.parametrize("config, platform, vehicle, networks", [
@@ -49,9 +49,9 @@ def test_make_firmware_refuses_what_does_not_fit(arguments, words, checkout):
 def test_what_fits_comes_as_far_as_the_compiler(config, platform, vehicle, networks, checkout):
     for tool in ("sed", "basename", "paste"):
         (checkout / tool).symlink_to(shutil.which(tool))
-    run = subprocess.run([shutil.which("sh"), "firmware/app/build.sh", checkout, config, platform, vehicle, networks],
-                         cwd=ROOT, capture_output=True, text=True, env={"PATH": str(checkout)})
-    assert run.returncode != 0 and run.stderr.startswith("make firmware: no arm-none-eabi-gcc")
+    command = [shutil.which("sh"), "firmware/app/build.sh", checkout, config, platform, vehicle, networks]
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env={"PATH": str(checkout)})
+    assert process.returncode != 0 and process.stderr.startswith("make firmware: no arm-none-eabi-gcc")
 
 
 @pytest.mark.parametrize("arguments, flashed", [
@@ -66,8 +66,8 @@ def test_make_flash_takes_the_image_last_built(arguments, flashed, tmp_path):
     (tmp_path / ".venv/bin/airtouch").chmod(0o755)
     command = ["-C", tmp_path, "-f", ROOT / "Makefile", "-o", ".venv/.kernels", "--no-print-directory", "flash"]
     if not arguments:
-        run = make(*command)
-        assert run.returncode != 0 and "make flash: no image" in run.stderr
+        process = make(*command)
+        assert process.returncode != 0 and "make flash: no image" in process.stderr
     (tmp_path / "build/firmware/image").write_text("build/firmware/cf21bl.bin\n")
-    run = make(*command, *arguments)
-    assert run.returncode == 0 and run.stdout.split() == f"flash {flashed}".split(), run.stderr
+    process = make(*command, *arguments)
+    assert process.returncode == 0 and process.stdout.split() == f"flash {flashed}".split(), process.stderr

@@ -25,10 +25,10 @@ PLANTED = {
 
 @pytest.fixture(scope="module")
 def engine():
-    found = fuzz_build.engine()
-    if found is None:
+    fuzzing_engine = fuzz_build.engine()
+    if fuzzing_engine is None:
         pytest.skip("no C compiler with sanitizers on this machine")
-    return found
+    return fuzzing_engine
 
 
 #: Without the chip's path of the int8 kernels, which tests/gap8 holds equal to the other one.
@@ -41,7 +41,7 @@ def programs(engine):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_found(programs, name, tmp_path):
+def test_fuzzing_finds_no_defect(programs, name, tmp_path):
     result = fuzz.run(name, programs[name], MUTATIONS, folder=tmp_path)
     assert result.finding is None, result.log.read_text(errors="replace")[-3000:]
     assert result.inputs >= MUTATIONS
@@ -49,12 +49,12 @@ def test_nothing_is_found(programs, name, tmp_path):
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_defect_is_found(engine, name, tmp_path):
-    path, right, wrong = PLANTED[name]
+    path, correct, defect = PLANTED[name]
     source = fuzz_build.ROOT / path
     text = source.read_text()
-    assert text.count(right) == 1, f"{path} has changed: plant another defect"
+    assert text.count(correct) == 1, f"{path} has changed: plant another defect"
     planted = tmp_path / source.name
-    planted.write_text(text.replace(right, wrong))
+    planted.write_text(text.replace(correct, defect))
     program = fuzz_build.build([name], engine, {source: planted}, tmp_path)[name]
     assert fuzz.run(name, program, 20_000, folder=tmp_path).finding is not None
 
@@ -63,9 +63,9 @@ def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
     engine = fuzz_build.engine("standalone")
     if engine is None:
         pytest.skip("no C compiler with sanitizers on this machine")
-    path, right, wrong = PLANTED["parser"]
+    path, correct, defect = PLANTED["parser"]
     source, planted = fuzz_build.ROOT / path, tmp_path / "edge_link.c"
-    planted.write_text(source.read_text().replace(right, wrong))
+    planted.write_text(source.read_text().replace(correct, defect))
     program = fuzz_build.build(["parser"], engine, {source: planted}, tmp_path, only=[source])["parser"]
     result = fuzz.run("parser", program, 20_000, folder=tmp_path)
     assert result.finding is not None
@@ -78,9 +78,9 @@ def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
 def test_a_run_that_was_ended_goes_on(programs, tmp_path, monkeypatch):
     monkeypatch.setattr(fuzz, "BATCH", 400)
     first = fuzz.run_batches("parser", programs["parser"], 900, 1, True, tmp_path)
-    again = fuzz.run_batches("parser", programs["parser"], 2000, 1, True, tmp_path)
+    resumed = fuzz.run_batches("parser", programs["parser"], 2000, 1, True, tmp_path)
     lines = [line.split(",") for line in (tmp_path / "inputs.csv").read_text().splitlines()]
-    assert 900 <= first.inputs < 2000 <= again.inputs == sum(int(line[3]) for line in lines)
+    assert 900 <= first.inputs < 2000 <= resumed.inputs == sum(int(line[3]) for line in lines)
     assert [int(line[2]) for line in lines] == [1 + i for i in range(len(lines))], "every batch has its own seed"
     assert sum(int(line[3]) for line in lines[:3]) == first.inputs, "what the first run did is not run again"
     anew = fuzz.run_batches("parser", programs["parser"], 400, 1, False, tmp_path)

@@ -3,11 +3,11 @@
 import pytest
 
 from airtouch.gap.nominal import calibrate
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 from shared_fixture import once
 
 
 @pytest.fixture(scope="session")
 def study(tmp_path_factory):
     """A vehicle calibrated on five nominal flights."""
-    return once(tmp_path_factory, "study", lambda: calibrate.calibrated(VEHICLE, flown(5, 41))[0])
+    return once(tmp_path_factory, "study", lambda: calibrate.calibrated(VEHICLE, fly(5, 41))[0])

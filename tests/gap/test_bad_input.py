@@ -19,7 +19,7 @@ VEHICLE = vehicles.load("crazyflie-2.1-flow")
 
 
 @pytest.fixture(scope="module")
-def flown():
+def sweeps():
     return short_flights.fly(2)
 
 
@@ -27,7 +27,7 @@ def without(log, *names):
     return FlightLog({k: v for k, v in log.columns.items() if k not in names}, dict(log.meta))
 
 
-def changed(log, **columns):
+def with_columns(log, **columns):
     return log.with_columns(columns)
 
 
@@ -38,35 +38,35 @@ def changed(log, **columns):
     (lambda log: without(log, "m3_pwm"), "no motor commands"),
     (lambda log: without(log, *ACC, *ACC_WORLD), "no accelerations (acc_x_mps2"),
     (lambda log: log.with_columns({c: np.zeros(len(log)) for c in PWM}), "no flight in it (0.0 s in the air)"),
-    (lambda log: changed(log, t_s=np.where(np.arange(len(log)) < 700, log["t_s"], log["t_s"] - 3.0)),
+    (lambda log: with_columns(log, t_s=np.where(np.arange(len(log)) < 700, log["t_s"], log["t_s"] - 3.0)),
      "sample 700: the clock runs backwards by 2.99"),
     (lambda log: log.with_columns({c: np.full(len(log), np.nan) for c in PWM}), ""),
     (lambda log: log.with_columns({c: np.full(len(log), np.nan) for c in ACC + ACC_WORLD if log.has(c)}), ""),
 ])
-def test_what_cannot_be_used_is_said_in_one_line(flown, change, words):
+def test_what_cannot_be_used_is_said_in_one_line(sweeps, change, words):
     with pytest.raises(AirTouchError) as error:
-        measure([change(flown[0])], VEHICLE)
+        measure([change(sweeps[0])], VEHICLE)
     text = str(error.value)
-    assert words in text and "\n" not in text and flown[0].source in text
+    assert words in text and "\n" not in text and sweeps[0].source in text
 
 
-@pytest.mark.parametrize(("missing", "words", "still"), [
+@pytest.mark.parametrize(("missing", "words", "remaining"), [
     (GYRO, "no gyro", "force_x"), (("zrange_m",), "no down range", "torque_x"),
     (VELOCITY, "no velocity", "force_z"), (("vbat_V", "t_s", *POSITION), None, "torque_z")])
-def test_a_missing_channel_leaves_the_others(flown, missing, words, still):
-    found = measure([without(flown[0], *missing)], VEHICLE)
-    assert any(c.channel == still for c in found.map.cells)
-    assert words is None or any(words in line for line in found.cannot)
+def test_a_missing_channel_leaves_the_others(sweeps, missing, words, remaining):
+    gap = measure([without(sweeps[0], *missing)], VEHICLE)
+    assert any(c.channel == remaining for c in gap.map.cells)
+    assert words is None or any(words in line for line in gap.cannot)
 
 
-def test_one_bad_flight_does_not_stop_the_others(flown):
-    found = measure([flown[0].slice(0, 100), flown[1]], VEHICLE)
-    assert len(found.flights) == 1 and len(found.left_out) == 1 and flown[0].source in found.left_out[0]
+def test_one_bad_flight_does_not_stop_the_others(sweeps):
+    gap = measure([sweeps[0].slice(0, 100), sweeps[1]], VEHICLE)
+    assert len(gap.flights) == 1 and len(gap.left_out) == 1 and sweeps[0].source in gap.left_out[0]
     with pytest.raises(AirTouchError, match="no flight that can be used of 2; the first: "):
-        measure([flown[0].slice(0, 100), flown[1].slice(0, 100)], VEHICLE)
+        measure([sweeps[0].slice(0, 100), sweeps[1].slice(0, 100)], VEHICLE)
 
 
-def test_nothing_at_all():
+def test_a_measurement_of_no_flight_is_refused():
     with pytest.raises(AirTouchError, match="no flight that can be used"):
         measure([], VEHICLE)
 
@@ -78,19 +78,19 @@ def test_a_vehicle_file_without_a_parameter_names_it(tmp_path):
         vehicles.load(path)
 
 
-def test_inconsistent_baseline_is_said_and_the_measurement_goes_on(flown):
+def test_inconsistent_baseline_is_said_and_the_measurement_goes_on(sweeps):
     """One of two nominal flights carries a bias that the other does not."""
-    other = flown[1].with_columns({a: flown[1][a] + 1.5 for a in ("acc_x_mps2",)})
-    found = measure([flown[0]], VEHICLE, [flown[0], other], calibrated=False)
-    note = next(n for n in found.notes if "not consistent" in n)
-    assert "1.5 m/s^2 in forward force" in note and found.map.cells
-    lowest = [c for c in found.map.cells if c.channel == "force_x" and c.band_hz[0] == 0.0 and c.phase == "cruise"]
+    other = sweeps[1].with_columns({a: sweeps[1][a] + 1.5 for a in ("acc_x_mps2",)})
+    gap = measure([sweeps[0]], VEHICLE, [sweeps[0], other], calibrated=False)
+    note = next(n for n in gap.notes if "not consistent" in n)
+    assert "1.5 m/s^2 in forward force" in note and gap.map.cells
+    lowest = [c for c in gap.map.cells if c.channel == "force_x" and c.band_hz[0] == 0.0 and c.phase == "cruise"]
     assert all(c.floor > 0.5 for c in lowest)
 
 
-def test_a_baseline_that_cannot_be_used_is_left_out(flown):
-    found = measure([flown[0]], VEHICLE, [flown[1].slice(0, 50)])
-    assert found.baseline == () and len(found.left_out) == 1
+def test_a_baseline_that_cannot_be_used_is_left_out(sweeps):
+    gap = measure([sweeps[0]], VEHICLE, [sweeps[1].slice(0, 50)])
+    assert gap.baseline == () and len(gap.left_out) == 1
 
 
 VALUES = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([np.nan, np.inf, -np.inf, 0.0, 1e300, -1e5, 65535.0, 9.81]))
@@ -123,7 +123,7 @@ def damages(draw):
     return columns, draw(st.integers(350, 1900)), draw(st.integers(0, 2 ** 32 - 1))
 
 
-def damaged(log, damage):
+def damaged_log(log, damage):
     columns, stop, seed = damage
     rng, log = np.random.default_rng(seed), log.slice(0, stop)
     out = dict(log.columns)
@@ -141,11 +141,11 @@ def damaged(log, damage):
 
 def answers_or_one_line(log, baseline):
     try:
-        found = measure([log], VEHICLE, baseline, calibrated=False)
+        gap = measure([log], VEHICLE, baseline, calibrated=False)
     except AirTouchError as error:
         assert "\n" not in str(error) and str(error)
         return
-    json.dumps(found.plain(), allow_nan=False)
+    json.dumps(gap.plain(), allow_nan=False)
 
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
@@ -158,15 +158,15 @@ def test_random_tables_give_an_answer_or_one_line(log):
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(damages())
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_damaged_flights_give_an_answer_or_one_line(flown, damage):
-    answers_or_one_line(damaged(flown[0], damage), [])
+def test_damaged_flights_give_an_answer_or_one_line(sweeps, damage):
+    answers_or_one_line(damaged_log(sweeps[0], damage), [])
 
 
 @settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(damages())
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_a_damaged_baseline_does_no_harm(flown, damage):
-    answers_or_one_line(flown[1], [damaged(flown[0], damage)])
+def test_a_damaged_baseline_does_no_harm(sweeps, damage):
+    answers_or_one_line(sweeps[1], [damaged_log(sweeps[0], damage)])
 
 
 OTHERS = tuple(name for name in EFFECTS if name not in ("mass", "imu_bias", "imu_noise", "time_jitter"))
@@ -175,28 +175,28 @@ OTHERS = tuple(name for name in EFFECTS if name not in ("mass", "imu_bias", "imu
 @settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(damages())
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_a_damaged_flight_is_diagnosed_or_refused_in_one_line(flown, damage):
+def test_a_damaged_flight_is_diagnosed_or_refused_in_one_line(sweeps, damage):
     try:
-        found = diagnose([damaged(flown[0], damage)], VEHICLE, without=OTHERS)
+        diagnosis = diagnose([damaged_log(sweeps[0], damage)], VEHICLE, without=OTHERS)
     except AirTouchError as error:
         assert "\n" not in str(error) and str(error)
         return
-    table = json.loads(json.dumps(found.plain(), allow_nan=False))
+    table = json.loads(json.dumps(diagnosis.plain(), allow_nan=False))
     first = table["effects"][0]["name"] if table["verdict"] == "effect" else table["verdict"]
     assert first == table["ranking"][0]["name"] in {"mass", "imu_bias", "imu_noise", "time_jitter", "none", "unknown"}
     assert sum(r["probability"] for r in table["ranking"]) == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("samples", [470, 520, 600, 700])
-def test_a_short_nominal_flight_has_no_gap(flown, samples):
-    assert diagnose([flown[0].slice(0, samples)], VEHICLE, without=OTHERS).verdict == "none"
+def test_a_short_nominal_flight_has_no_gap(sweeps, samples):
+    assert diagnose([sweeps[0].slice(0, samples)], VEHICLE, without=OTHERS).verdict == "none"
 
 
-def test_a_flight_that_is_too_short_is_refused(flown):
+def test_a_flight_that_is_too_short_is_refused(sweeps):
     with pytest.raises(AirTouchError, match="too short|no flight in it"):
-        diagnose([flown[0].slice(0, 420)], VEHICLE, without=OTHERS)
+        diagnose([sweeps[0].slice(0, 420)], VEHICLE, without=OTHERS)
 
 
-def test_nothing_to_diagnose():
+def test_a_diagnosis_of_no_flight_is_refused():
     with pytest.raises(AirTouchError, match="no flight to diagnose"):
         diagnose([], VEHICLE)

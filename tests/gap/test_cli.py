@@ -19,14 +19,14 @@ KEPT = ("wind", "mass", "imu_bias")  #: candidates; the others take time
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Two simulated flights with a forward push that no baseline flight has, and two without."""
-    made = tmp_path_factory.mktemp("gap")
+    folder = tmp_path_factory.mktemp("gap")
     for i, log in enumerate(short_flights.fly(4)):
         if i < 2:
             log = log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + 0.8})
-        logs.write(log, made / f"{'real' if i < 2 else 'nominal'}_{i}.csv.gz")
-    (made / "manifest.csv").write_text("file,effect\n")
-    (made / "notes.md").write_text("not a log")
-    return made
+        logs.write(log, folder / f"{'real' if i < 2 else 'nominal'}_{i}.csv.gz")
+    (folder / "manifest.csv").write_text("file,effect\n")
+    (folder / "notes.md").write_text("not a log")
+    return folder
 
 
 def run(*arguments):
@@ -45,8 +45,8 @@ def test_measure_writes_json_and_report(folder, tmp_path):
     assert len(table["flights"]) == 2 and len(table["where"]) >= 10 and "2 flights against crazyflie" in result.output
     assert all({"channel", "band_hz", "phase", "gap", "floor", "unit"} <= set(c) for c in table["where"])
     assert page.read_text().startswith("<!DOCTYPE html>")
-    again = run("measure", f"{folder}/real_*", "--json", out)
-    assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+    repeat = run("measure", f"{folder}/real_*", "--json", out)
+    assert isinstance(repeat.exception, AirTouchError) and "--force" in str(repeat.exception)
     assert run("measure", f"{folder}/real_0*", "--json", out, "--force").exit_code == 0
 
 
@@ -117,17 +117,18 @@ def test_a_log_that_cannot_be_read_is_left_out(folder, tmp_path):
     (tmp_path / "bad.csv").write_text("")
     result = run("measure", folder / "real_0.csv.gz", tmp_path / "bad.csv")
     assert result.exit_code == 0 and "bad.csv: the file is empty" in result.output
-    alone = run("measure", tmp_path / "bad.csv")
-    assert isinstance(alone.exception, AirTouchError) and "the file is empty" in str(alone.exception)
+    only_bad = run("measure", tmp_path / "bad.csv")
+    assert isinstance(only_bad.exception, AirTouchError) and "the file is empty" in str(only_bad.exception)
 
 
 def test_the_log_names_the_vehicle(folder, tmp_path, capsys):
     log = logs.read(folder / "real_0.csv.gz")
-    for said, name in (("crazyflie-2.1", "crazyflie-2.1"), ("mine", "crazyflie-2.1-flow"), ("", "crazyflie-2.1-flow")):
-        path = tmp_path / f"{said or 'none'}.csv"
-        logs.write(log.with_columns({}, vehicle=said), path)
+    flow = "crazyflie-2.1-flow"
+    for in_log, name in (("crazyflie-2.1", "crazyflie-2.1"), ("mine", flow), ("", flow)):
+        path = tmp_path / f"{in_log or 'none'}.csv"
+        logs.write(log.with_columns({}, vehicle=in_log), path)
         assert vehicle_of(None, Flights([str(path)])).name == name
-        assert ("'mine'" in capsys.readouterr().err) == (said == "mine")
+        assert ("'mine'" in capsys.readouterr().err) == (in_log == "mine")
     assert vehicle_of("crazyflie-2.1", Flights([str(path)])).name == "crazyflie-2.1"
 
 

@@ -26,14 +26,14 @@ def test_the_flights_come_with_the_package_and_do_not_name_their_effect():
 
 @pytest.mark.slow
 def test_the_withheld_effect_is_found_and_the_report_written(tmp_path, monkeypatch):
-    few = functools.partial(module.diagnose, without=[n for n in EFFECTS if n not in KEPT])
-    monkeypatch.setattr(module, "diagnose", few)
-    shown = CliRunner().invoke(command, ["demo", "--out", str(tmp_path)])
-    assert shown.exit_code == 0, shown.output
-    found = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert found["effects"][0]["name"] == found["ranking"][0]["name"] == "weak_motor"
-    assert found["effects"][0]["parameters"]["thrust_loss"]["value"] == pytest.approx(0.12, abs=0.02)
-    assert found["effects"][0]["parameters"]["rotor"]["value"] == 2
-    assert "found: weak_motor." in shown.output and (tmp_path / "report.html").read_text().startswith("<!DOCTYPE html>")
-    again = CliRunner().invoke(command, ["demo", "--out", str(tmp_path)])
-    assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+    diagnose_few = functools.partial(module.diagnose, without=[n for n in EFFECTS if n not in KEPT])
+    monkeypatch.setattr(module, "diagnose", diagnose_few)
+    demo = CliRunner().invoke(command, ["demo", "--out", str(tmp_path)])
+    assert demo.exit_code == 0, demo.output
+    diagnosis = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert diagnosis["effects"][0]["name"] == diagnosis["ranking"][0]["name"] == "weak_motor"
+    assert diagnosis["effects"][0]["parameters"]["thrust_loss"]["value"] == pytest.approx(0.12, abs=0.02)
+    assert diagnosis["effects"][0]["parameters"]["rotor"]["value"] == 2
+    assert "found: weak_motor." in demo.output and (tmp_path / "report.html").read_text().startswith("<!DOCTYPE html>")
+    repeat = CliRunner().invoke(command, ["demo", "--out", str(tmp_path)])
+    assert isinstance(repeat.exception, AirTouchError) and "--force" in str(repeat.exception)

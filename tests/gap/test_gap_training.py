@@ -28,16 +28,16 @@ import gap_training  # noqa: E402
 def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):
     own = scenario.load("paper-mixed")
     off = batch.simulate(replace(own, table={**own.table, "effects": {}}), seeds=2, seed=3)
-    made = gap_training.training_flights(gap_training.scene_text([]), 2, 3, tmp_path)
-    for one, two in zip(off, made, strict=True):
-        assert two.meta["effects"] == []
-        assert all(np.array_equal(one[c], two[c], equal_nan=True) for c in one.columns)
+    without_effects = gap_training.training_flights(gap_training.scene_text([]), 2, 3, tmp_path)
+    for plain, log in zip(off, without_effects, strict=True):
+        assert log.meta["effects"] == []
+        assert all(np.array_equal(plain[c], log[c], equal_nan=True) for c in plain.columns)
 
 
 def test_effects_are_flown_as_found():
-    given = [("weak_motor", {"rotor": 2, "thrust_loss": 0.07}), ("gust", {"rms": 0.2}),
-             ("weak_motor", {"rotor": 3, "thrust_loss": -0.02})]
-    scene = scenario.parse(gap_training.scene_text(given), "made")
+    effects = [("weak_motor", {"rotor": 2, "thrust_loss": 0.07}), ("gust", {"rms": 0.2}),
+               ("weak_motor", {"rotor": 3, "thrust_loss": -0.02})]
+    scene = scenario.parse(gap_training.scene_text(effects), "made")
     on = scenario.draw_flight(scene, 0, 5).effects
     assert sorted(name for name, _ in on) == ["gust", "weak_motor", "weak_motor"]
     assert {v["rotor"]: v["thrust_loss"] for n, v in on if n == "weak_motor"} == {2: 0.07, 3: -0.02}
@@ -47,10 +47,10 @@ def test_effects_are_added_one_after_another_and_once():
     def effect(name, **values):
         return {"name": name, "parameters": {k: {"value": v} for k, v in values.items()}}
 
-    found = {"all": {"effects": [effect("gust", rms=0.1), effect("weak_motor", rotor=1, thrust_loss=0.1)]},
-             "close": {"effects": [effect("gust", rms=0.9), effect("weak_motor", rotor=4, thrust_loss=0.2)]},
-             "calibration": [["weak_motor", {"rotor": 1, "thrust_loss": 0.5}], ["inertia", {"fraction": 0.1}]]}
-    rows = gap_training.chain(found)
+    diagnoses = {"all": {"effects": [effect("gust", rms=0.1), effect("weak_motor", rotor=1, thrust_loss=0.1)]},
+                 "close": {"effects": [effect("gust", rms=0.9), effect("weak_motor", rotor=4, thrust_loss=0.2)]},
+                 "calibration": [["weak_motor", {"rotor": 1, "thrust_loss": 0.5}], ["inertia", {"fraction": 0.1}]]}
+    rows = gap_training.chain(diagnoses)
     assert [len(on) for _, on in rows] == [0, 1, 2, 3, 4]
     assert rows[-1][1] == [("gust", {"rms": 0.1}), ("weak_motor", {"rotor": 1, "thrust_loss": 0.1}),
                            ("weak_motor", {"rotor": 4, "thrust_loss": 0.2}), ("inertia", {"fraction": 0.1})]
@@ -58,12 +58,12 @@ def test_effects_are_added_one_after_another_and_once():
 
 def test_no_flight_is_in_two_groups():
     flights = {FlightFile(Path(f"{i}.csv"), Condition(fold=i % 5)): None for i in range(20)}
-    one, two = gap_training.cut(flights, ["013", "24"])
-    assert not set(one) & set(two) and len(one) + len(two) == 20
-    assert {f.condition.fold for f in one} == {0, 1, 3}
-    for wrong in (["01", "123", "4"], ["01", "23"]):
+    group, other_group = gap_training.cut(flights, ["013", "24"])
+    assert not set(group) & set(other_group) and len(group) + len(other_group) == 20
+    assert {f.condition.fold for f in group} == {0, 1, 3}
+    for day_groups in (["01", "123", "4"], ["01", "23"]):
         with pytest.raises(AirTouchError, match="fold"):
-            gap_training.cut(flights, wrong)
+            gap_training.cut(flights, day_groups)
 
 
 def _scores(seed):
@@ -84,18 +84,18 @@ def test_two_equal_trainings_say_no_more_than_one():
 
 
 def test_trainings_are_averaged_by_edge():
-    one, two = _scores(1), _scores(2)
-    every = [abs(e.error_m) for s in (*one, *two) for e in s.edges if e.error_m is not None]
-    assert summarise(gap_training.together([one, two]))["mean_abs_error_m"] == pytest.approx(np.mean(every))
+    first, second = _scores(1), _scores(2)
+    distances = [abs(e.error_m) for s in (*first, *second) for e in s.edges if e.error_m is not None]
+    assert summarise(gap_training.together([first, second]))["mean_abs_error_m"] == pytest.approx(np.mean(distances))
 
 
 def test_half_the_swing_is_six_decibels_apart(tmp_path):
     text = gap_training.scene_text([("motor_noise", {"rms": 0.02})])
-    made = gap_training.training_flights(text, 3, 0, tmp_path)
+    flights = gap_training.training_flights(text, 3, 0, tmp_path)
     half = [log.with_columns({c: 0.5 * log[c] for c in log.columns if c.startswith(("acc", "gyro")) or c in PWM})
-            for log in made]
-    assert gap_passes.apart_db(half, made) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
-    assert gap_passes.apart_db(made, made) == pytest.approx([0.0, 0.0])
+            for log in flights]
+    assert gap_passes.apart_db(half, flights) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
+    assert gap_passes.apart_db(flights, flights) == pytest.approx([0.0, 0.0])
 
 
 def test_the_pieces_of_a_pass_share_no_sample(tmp_path):
@@ -122,10 +122,10 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
 
     part = random_part_of("ground_effect")
     part = replace(part, values={**part.values, "turbulence": 0.25})
-    named = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
-                                                                          "turbulence": 0.0}.items()})
-    made = {k: q.value for k, q in with_random_part(named, part).parameters.items()}
-    fitted = force(part.values) - force({**part.values, "turbulence": 0.0})
-    assert np.abs(fitted).max() > 1e-4
-    assert force(made) - force({**made, "turbulence": 0.0}) == pytest.approx(fitted, abs=1e-9)
-    assert made["strength"] == max(mean, 0.25 / 3.0)
+    effect = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
+                                                                           "turbulence": 0.0}.items()})
+    reported = {k: q.value for k, q in with_random_part(effect, part).parameters.items()}
+    swing = force(part.values) - force({**part.values, "turbulence": 0.0})
+    assert np.abs(swing).max() > 1e-4
+    assert force(reported) - force({**reported, "turbulence": 0.0}) == pytest.approx(swing, abs=1e-9)
+    assert reported["strength"] == max(mean, 0.25 / 3.0)

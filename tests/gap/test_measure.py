@@ -17,7 +17,7 @@ VEHICLE = vehicle.load("crazyflie-2.1-flow")
 
 
 @pytest.fixture(scope="module")
-def flown():
+def sweeps():
     return short_flights.fly(3)
 
 
@@ -33,9 +33,9 @@ def pushed(log, size, kind):
     return log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + pad})
 
 
-def test_json_holds_the_largest_cells_and_the_whole_map(flown):
-    found = measure(flown, VEHICLE)
-    table = json.loads(json.dumps(found.plain(), allow_nan=False), parse_constant=no_constant)
+def test_json_holds_the_largest_cells_and_the_whole_map(sweeps):
+    gap = measure(sweeps, VEHICLE)
+    table = json.loads(json.dumps(gap.plain(), allow_nan=False), parse_constant=no_constant)
     assert {"where", "map", "gap", "floor_from", "cannot", "notes"} <= set(table)
     assert {"flights", "vehicle", "spectra", "left_out"} <= set(table)
     assert len(table["where"]) >= 10 and len(table["flights"]) == 3
@@ -45,61 +45,61 @@ def test_json_holds_the_largest_cells_and_the_whole_map(flown):
     assert table["gap"]["before"] > 1.0
 
 
-def test_a_push_over_the_platform_is_found_there(flown):
-    before = measure(flown, VEHICLE)
-    after = measure([pushed(log, 3.0, "over platform") for log in flown], VEHICLE)
+def test_a_push_over_the_platform_is_found_there(sweeps):
+    before = measure(sweeps, VEHICLE)
+    after = measure([pushed(log, 3.0, "over platform") for log in sweeps], VEHICLE)
     key = ("force_x", (0.0, 0.5), "over platform", "all")
-    one, two = (next(c for c in m.map.cells if (c.channel, c.band_hz, c.phase, c.regime) == key)
-                for m in (before, after))
-    assert not significant(one) or one.gap < 0.5
-    assert significant(two) and two.gap == pytest.approx(3.0, rel=0.2)
+    cell_before, cell_after = (next(c for c in m.map.cells if (c.channel, c.band_hz, c.phase, c.regime) == key)
+                               for m in (before, after))
+    assert not significant(cell_before) or cell_before.gap < 0.5
+    assert significant(cell_after) and cell_after.gap == pytest.approx(3.0, rel=0.2)
     assert any((c.channel, c.phase, c.band_hz[0]) == ("force_x", "over platform", 0.0) for c in after.where)
 
 
-def test_imu_and_motors_are_enough(flown):
-    full, bare = measure(flown, VEHICLE), measure(
-        [FlightLog({k: log[k] for k in (*ACC, *GYRO, *PWM)}, {"source": log.source}) for log in flown], VEHICLE)
-    channels = {c.channel for c in bare.map.cells}
+def test_imu_and_motors_are_enough(sweeps):
+    full, imu_only = measure(sweeps, VEHICLE), measure(
+        [FlightLog({k: log[k] for k in (*ACC, *GYRO, *PWM)}, {"source": log.source}) for log in sweeps], VEHICLE)
+    channels = {c.channel for c in imu_only.map.cells}
     assert {"force_z", "torque_x", "torque_z"} <= channels == {c.channel for c in full.map.cells}
-    assert {"no down range", "no velocity"} <= {line.split(":")[0] for line in bare.cannot}
+    assert {"no down range", "no velocity"} <= {line.split(":")[0] for line in imu_only.cannot}
     assert full.cannot == ()
 
 
-def test_without_a_gyro_torque_is_known_at_low_frequency_alone(flown):
-    found = measure([FlightLog({k: v for k, v in log.columns.items() if k not in GYRO}, dict(log.meta))
-                     for log in flown], VEHICLE)
-    assert {c.band_hz for c in found.map.cells if c.channel.startswith("torque")} == {(0.0, 0.5)}
-    assert any("no gyro" in line for line in found.cannot)
+def test_without_a_gyro_torque_is_known_at_low_frequency_alone(sweeps):
+    gap = measure([FlightLog({k: v for k, v in log.columns.items() if k not in GYRO}, dict(log.meta))
+                   for log in sweeps], VEHICLE)
+    assert {c.band_hz for c in gap.map.cells if c.channel.startswith("torque")} == {(0.0, 0.5)}
+    assert any("no gyro" in line for line in gap.cannot)
 
 
-def test_logged_rotor_speeds_are_held_against_the_model(flown):
+def test_logged_rotor_speeds_are_held_against_the_model(sweeps):
     """The simulator logs what its rotors did; 5 % slower ones are seen as such."""
-    assert all(log.has(*RPM) for log in flown)
-    slow = [log.with_columns({"rpm_3": 0.95 * log["rpm_3"]}) for log in flown]
-    plain, changed = measure(flown, VEHICLE), measure(slow, VEHICLE)
-    for r, s in zip(plain.rotors, changed.rotors, strict=True):
+    assert all(log.has(*RPM) for log in sweeps)
+    slow = [log.with_columns({"rpm_3": 0.95 * log["rpm_3"]}) for log in sweeps]
+    as_flown, with_slow_rotors = measure(sweeps, VEHICLE), measure(slow, VEHICLE)
+    for r, s in zip(as_flown.rotors, with_slow_rotors.rotors, strict=True):
         assert r["ratio"] == pytest.approx(1.0, abs=0.05) and r["low"] <= r["ratio"] <= r["high"]
         assert s["ratio"] / r["ratio"] == pytest.approx(0.95 if r["rotor"] == 3 else 1.0, abs=1e-6)
 
 
-def test_any_map_may_spread_the_work_and_progress_is_told(flown):
-    seen, asked = [], []
+def test_any_map_may_spread_the_work_and_progress_is_told(sweeps):
+    messages, counts = [], []
 
     def backwards(function, items):
         items = list(items)
-        asked.append(len(items))
+        counts.append(len(items))
         return reversed([function(i) for i in reversed(items)])
 
-    one = measure(flown, VEHICLE, progress=seen.append)
-    assert measure(flown, VEHICLE, run=backwards).plain() == one.plain()
-    assert asked == [3] and seen == list(one.flights)
+    gap = measure(sweeps, VEHICLE, progress=messages.append)
+    assert measure(sweeps, VEHICLE, run=backwards).plain() == gap.plain()
+    assert counts == [3] and messages == list(gap.flights)
 
 
-def test_nominal_flights_have_little_gap_to_one_another(flown):
-    found = measure(flown[:1], VEHICLE, flown[1:], calibrated=False)
-    assert found.gap["before"] < 2.5
-    assert np.mean([significant(c) for c in found.map.cells if c.regime == "all"]) < 0.1
-    assert set(found.spectra["roll"]) == {"flown", "nominal"}
+def test_nominal_flights_have_little_gap_to_one_another(sweeps):
+    measured = measure(sweeps[:1], VEHICLE, sweeps[1:], calibrated=False)
+    assert measured.gap["before"] < 2.5
+    assert np.mean([significant(c) for c in measured.map.cells if c.regime == "all"]) < 0.1
+    assert set(measured.spectra["roll"]) == {"flown", "nominal"}
 
 
 @pytest.mark.parametrize("name", ["crazypad/pad_cut_propeller_M3_3mm_3mm_41mm_E8_log00.csv.gz",
@@ -109,17 +109,17 @@ def test_recorded_flights_of_every_kind(flights, name):
     if not path.is_file():
         pytest.skip(f"{name} is not there")
     log = logs.read(path)
-    found = measure([log], vehicle.load("crazyflie-2.1"))
-    assert found.where and found.map.cells
-    assert (any("no gyro" in line for line in found.cannot)) == (not log.has(*GYRO))
+    measured = measure([log], vehicle.load("crazyflie-2.1"))
+    assert measured.where and measured.map.cells
+    assert (any("no gyro" in line for line in measured.cannot)) == (not log.has(*GYRO))
     assert log.has(*ACC) or log.has(*ACC_WORLD)
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_the_same(flown):
+def test_a_cluster_gives_the_same(sweeps):
     distributed = pytest.importorskip("dask.distributed")
     from airtouch.gap.sealed.on_cluster import mapper
 
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        found = measure(flown, VEHICLE, run=mapper(cluster.scheduler_address))
-    assert found.plain() == measure(flown, VEHICLE).plain()
+        on_cluster = measure(sweeps, VEHICLE, run=mapper(cluster.scheduler_address))
+    assert on_cluster.plain() == measure(sweeps, VEHICLE).plain()

@@ -35,17 +35,17 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     vehicle = load("crazyflie-2.1-flow")
     nominal, real = fly(4, 1), fly(1, 2, [("magnet", {"force": FORCE_N})])
     assert len(Path(PAGE).read_text().split("```python")[1].split("```")[0].splitlines()) < 60
-    found = diagnose(real, vehicle, nominal)
-    assert found.verdict == "effect" and found.effects[0].name == "magnet"
-    force = found.effects[0].parameters["force"]
+    diagnosis = diagnose(real, vehicle, nominal)
+    assert diagnosis.verdict == "effect" and diagnosis.effects[0].name == "magnet"
+    force = diagnosis.effects[0].parameters["force"]
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
-    assert found.shrink.value > 0.8
-    assert abs(found.control["shrink"]["value"]) < 0.2
-    (switch_on,) = [step.command for step in found.next if "magnet" in step.text]
+    assert diagnosis.shrink.value > 0.8
+    assert abs(diagnosis.control["shrink"]["value"]) < 0.2
+    (switch_on,) = [step.command for step in diagnosis.next if "magnet" in step.text]
     assert "magnet.py --effect magnet:force=" in switch_on  # without its file the command would be refused
-    left_out = brief(found.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
+    left_out = brief(diagnosis.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
     assert "magnet" not in [r.name for r in left_out.ranking]
-    assert left_out.gap["after"] > found.gap["after"]
+    assert left_out.gap["after"] > diagnosis.gap["after"]
     unknown, nearest, *_ = left_out.ranking
     assert left_out.verdict == unknown.name == "unknown" and unknown.shrink.value == 0.0  # as nothing is named
     assert re.match(r"a model without names gains \d+ nats beside it, up to \d+ may be left", nearest.why)
@@ -57,8 +57,9 @@ def test_a_users_effect_that_only_the_commands_show_is_fitted(tmp_path):
     effects.load_file(file)
     try:
         vehicle = load("crazyflie-2.1-flow")
-        found = diagnose(fly(1, 4, [("stiff_climb", {"factor": 2.5})]), vehicle, fly(4, 3), without=["controller_gain"])
+        stiff = fly(1, 4, [("stiff_climb", {"factor": 2.5})])
+        diagnosis = diagnose(stiff, vehicle, fly(4, 3), without=["controller_gain"])
     finally:
         effects.unregister("stiff_climb")
-    assert found.ranking[0].name == "stiff_climb"
-    np.testing.assert_allclose(found.effects[0].parameters["factor"].value, 2.5, rtol=0.35)
+    assert diagnosis.ranking[0].name == "stiff_climb"
+    np.testing.assert_allclose(diagnosis.effects[0].parameters["factor"].value, 2.5, rtol=0.35)

@@ -6,31 +6,31 @@ from airtouch.gap.workspace import Workspace
 
 
 def counting():
-    made = []
+    values = []
 
     def make(value):
-        return lambda: made.append(value) or value
-    return made, make
+        return lambda: values.append(value) or value
+    return values, make
 
 
 def test_a_value_is_made_once_for_a_kind_and_a_key():
-    space, (made, make) = Workspace(), counting()
-    assert [space.once("a", 1, make("x")), space.once("a", 1, make("y"))] == ["x", "x"]
-    assert space.once("b", 1, make("z")) == "z"
-    assert made == ["x", "z"]
+    space, (values, make_value) = Workspace(), counting()
+    assert [space.once("a", 1, make_value("x")), space.once("a", 1, make_value("y"))] == ["x", "x"]
+    assert space.once("b", 1, make_value("z")) == "z"
+    assert values == ["x", "z"]
 
 
 def test_nothing_is_a_value_as_well():
-    space, (made, make) = Workspace(), counting()
-    assert space.once("a", 1, make(None)) is None and space.once("a", 1, make(None)) is None
-    assert made == [None]
+    space, (values, make_value) = Workspace(), counting()
+    assert space.once("a", 1, make_value(None)) is None and space.once("a", 1, make_value(None)) is None
+    assert values == [None]
 
 
 def test_the_least_recently_used_goes_first():
-    space, (made, make) = Workspace(), counting()
+    space, (values, make_value) = Workspace(), counting()
     for key in (1, 2, 1, 3, 1, 2):
-        space.once("a", key, make(key), most=2)
-    assert made == [1, 2, 3, 2]
+        space.once("a", key, make_value(key), most=2)
+    assert values == [1, 2, 3, 2]
 
 
 def test_a_changed_copy_of_its_owner_begins_with_nothing():
@@ -39,7 +39,7 @@ def test_a_changed_copy_of_its_owner_begins_with_nothing():
         size: int
         workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
-    one = Owner(1)
-    one.workspace.once("a", 1, lambda: "x")
-    assert replace(one, size=2).workspace.once("a", 1, lambda: "y") == "y"
-    assert one == Owner(1)
+    owner = Owner(1)
+    owner.workspace.once("a", 1, lambda: "x")
+    assert replace(owner, size=2).workspace.once("a", 1, lambda: "y") == "y"
+    assert owner == Owner(1)

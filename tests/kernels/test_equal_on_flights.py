@@ -19,7 +19,7 @@ from airtouch.vehicle import load
 VEHICLE = load("crazyflie-2.1-flow")
 
 
-def test_band_power(real_signals):
+def test_band_power_equals_the_reference(real_signals):
     relative, excess, rows = [], 0.0, []
     for flight in real_signals:
         ours = kernels.band_power(flight.channels)[199:].astype(np.float64)
@@ -39,7 +39,7 @@ def test_band_power(real_signals):
     assert excess <= 2.0
 
 
-def test_cascaded_cross_spectrum(real_signals):
+def test_cascaded_cross_spectrum_equals_the_reference(real_signals):
     error = 0.0
     for flight in real_signals:
         power = kernels.band_power(flight.channels)[199:]
@@ -49,7 +49,7 @@ def test_cascaded_cross_spectrum(real_signals):
     assert error <= RELATIVE
 
 
-def test_disturbance_force(real_signals):
+def test_disturbance_force_equals_the_reference(real_signals):
     error = relative = 0.0
     for flight in real_signals:
         truth = reference.disturbance_force(flight.acc, flight.pwm, VEHICLE, thrust_axis=flight.thrust_axis)
@@ -63,7 +63,7 @@ def test_disturbance_force(real_signals):
     assert error <= 4 * EPS < RELATIVE
 
 
-def test_fr_cfar(real_signals):
+def test_fr_cfar_equals_the_reference(real_signals):
     error = 0.0
     for flight in real_signals:
         power = np.square(kernels.disturbance_force(flight.acc, flight.pwm, VEHICLE)[:, 2])
@@ -74,7 +74,7 @@ def test_fr_cfar(real_signals):
     assert error <= RELATIVE
 
 
-def test_normalisation(real_signals):
+def test_normalisation_equals_the_reference(real_signals):
     per_window = streaming = 0.0
     for flight in real_signals:
         features = kernels.cascaded_cross_spectrum(kernels.band_power(flight.channels))
@@ -88,11 +88,11 @@ def test_normalisation(real_signals):
     assert per_window <= RELATIVE and streaming <= RELATIVE
 
 
-@pytest.mark.parametrize("cfar_input, every", [("deviation", 1), ("norm", 8)])
-def test_edge_pipeline(real_signals, cfar_input, every):
+@pytest.mark.parametrize("cfar_input, step", [("deviation", 1), ("norm", 8)])
+def test_edge_pipeline_equals_the_reference(real_signals, cfar_input, step):
     config = reference.EdgePipelineConfig(cfar_input=cfar_input)
     edges = alerts = 0
-    for flight in real_signals[::every]:
+    for flight in real_signals[::step]:
         probability = np.float32(np.sin(np.arange(len(flight.acc)) / 80.0) / 2 + 0.5)
         ours, truth = (
             pipeline(flight.acc, flight.gyro, flight.pwm, VEHICLE, thrust_axis=flight.thrust_axis,
@@ -107,7 +107,7 @@ def test_edge_pipeline(real_signals, cfar_input, every):
         for name in ("ready", "edge", "filtered", "armed", "non_finite", "alert_recent"):
             np.testing.assert_array_equal(getattr(ours, name), getattr(truth, name), err_msg=f"{flight.name}: {name}")
         edges, alerts = edges + np.count_nonzero(ours.edge), alerts + ours.alert.sum()
-    print(f"\npipeline, {cfar_input}: {edges} edges and {alerts} alerts agree on {len(real_signals[::every])} flights")
+    print(f"\npipeline, {cfar_input}: {edges} edges and {alerts} alerts agree on {len(real_signals[::step])} flights")
 
 
 def _terms(flight):

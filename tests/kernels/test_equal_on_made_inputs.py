@@ -45,24 +45,24 @@ def signals(draw, columns, rows=ROWS):
 @checks
 @given(signals(3), st.sampled_from([(200, (6.0, 8.0)), (32, (10.0, 30.0)), (31, (40.0, 50.0)), (4, (25.0, 50.0))]),
        st.sampled_from([1, 3, 250]))
-def test_band_power(x, setting, hop):
+def test_band_power_equals_the_reference(x, setting, hop):
     window, band = setting
     ours = kernels.band_power(x, window=window, band_hz=band, hop=hop)
     truth = reference.band_power(x, window=window, band_hz=band, hop=hop)
     assert ours.shape == truth.shape
-    every = reference.band_power(x, window=window, band_hz=band)
+    each_sample = reference.band_power(x, window=window, band_hz=band)
     full = kernels.band_power(x, window=window, band_hz=band)
-    assert (np.isnan(full) == np.isnan(every)).all()
+    assert (np.isnan(full) == np.isnan(each_sample)).all()
     if len(x) >= window:
         np.testing.assert_array_equal(full[reference.window_ends(len(x), window, hop)],
                                       ours[np.isfinite(ours).all(axis=1)])
         clean, _ = reference.hold_finite(x)
-        assert band_power_excess(full[window - 1:], every[window - 1:], clean, window).max() <= 16.0
+        assert band_power_excess(full[window - 1:], each_sample[window - 1:], clean, window).max() <= 16.0
 
 
 @checks
 @given(signals(6, st.integers(0, 60)), st.sampled_from([(3, 3), (1, 2, 3), (6,), (1,) * 6]))
-def test_cascaded_cross_spectrum(power, groups):
+def test_cascaded_cross_spectrum_equals_the_reference(power, groups):
     truth = reference.cascaded_cross_spectrum(power, groups)
     ours = kernels.cascaded_cross_spectrum(power, groups)
     assert worst(ours, truth, np.where(np.isnan(truth), 1.0, truth + 1e-38)) <= RELATIVE
@@ -70,15 +70,15 @@ def test_cascaded_cross_spectrum(power, groups):
 
 @checks
 @given(signals(10), signals(4), st.booleans())
-def test_disturbance_force(sensors, others, bare):
+def test_disturbance_force_equals_the_reference(sensors, others, plain):
     n = min(len(sensors), len(others))
     acc, pwm = sensors[:n, :3], sensors[:n, 3:7]
-    options = {} if bare else {"vbat_v": others[:n, 3], "thrust_axis": others[:n, :3]}
+    options = {} if plain else {"vbat_v": others[:n, 3], "thrust_axis": others[:n, :3]}
     truth = reference.disturbance_force(acc, pwm, VEHICLE, **options)
     ours = kernels.disturbance_force(acc, pwm, VEHICLE, **options)
     held_acc, _ = reference.hold_finite(acc)
     axis, _ = reference.hold_finite(others[:n, :3], initial=[0.0, 0.0, 1.0])
-    thrust = reference.total_thrust(pwm, VEHICLE, options.get("vbat_v"))[:, None] * (1.0 if bare else np.abs(axis))
+    thrust = reference.total_thrust(pwm, VEHICLE, options.get("vbat_v"))[:, None] * (1.0 if plain else np.abs(axis))
     scale = VEHICLE.mass_kg * np.abs(held_acc) + thrust + 1e-30  # products of denormals round coarsely
     with np.errstate(over="ignore"):
         representable = np.isfinite(np.float32(scale)) & np.isfinite(ours)
@@ -87,7 +87,7 @@ def test_disturbance_force(sensors, others, bare):
 
 @checks
 @given(signals(1), st.integers(0, 30), st.integers(1, 80), st.sampled_from([1e-6, 1e-2, 0.5, 1e-30]))
-def test_fr_cfar(power, guard, leading, p_fa):
+def test_fr_cfar_equals_the_reference(power, guard, leading, p_fa):
     cells = power[:, 0]
     setting = {"guard_cells": guard, "leading_window": leading, "p_fa": p_fa}
     (t_ours, a_ours), (t_truth, a_truth) = kernels.fr_cfar(cells, **setting), reference.fr_cfar(cells, **setting)
@@ -97,14 +97,14 @@ def test_fr_cfar(power, guard, leading, p_fa):
 
 @checks
 @given(signals(3, st.integers(1, 150)))
-def test_z_score_window(window):
+def test_z_score_window_equals_the_reference(window):
     truth = reference.z_score_window(window)
     assert worst(kernels.z_score_window(window), truth, np.maximum(1.0, np.abs(truth))) <= RELATIVE
 
 
 @checks
 @given(signals(3, st.integers(0, 400)), st.sampled_from([5.0, 100.0, 1000.0]))
-def test_streaming_z_score(x, tau):
+def test_streaming_z_score_equals_the_reference(x, tau):
     truth = reference.streaming_z_score(x, tau)
     ours = kernels.streaming_z_score(x, tau)
     floor = (truth == 0) != (ours == 0)  # a deviation at the floor may count as zero in one of them
@@ -114,7 +114,7 @@ def test_streaming_z_score(x, tau):
 
 @checks
 @given(signals(10), st.sampled_from([1, 4]))
-def test_edge_pipeline(sensors, hop):
+def test_edge_pipeline_equals_the_reference(sensors, hop):
     acc, gyro, pwm = sensors[:, :3], sensors[:, 3:6], sensors[:, 6:]
     config = reference.EdgePipelineConfig(replace(DEFAULT, band_hop=hop))
     probability = np.float32(np.sin(np.arange(len(sensors)) / 30.0) / 2 + 0.5)

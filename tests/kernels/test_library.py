@@ -29,12 +29,12 @@ def test_a_function_that_an_older_build_lacks_is_one_line_with_its_remedy():
 
 
 def test_names_mirror_the_reference():
-    shared = {"band_power", "cascaded_cross_spectrum", "disturbance_force", "edge_pipeline", "force_norm", "fr_cfar",
-              "streaming_z_score", "threshold_factor", "total_thrust", "z_score_window"}
-    assert shared <= set(kernels.__all__) and shared <= set(reference.__all__)
+    names = {"band_power", "cascaded_cross_spectrum", "disturbance_force", "edge_pipeline", "force_norm", "fr_cfar",
+             "streaming_z_score", "threshold_factor", "total_thrust", "z_score_window"}
+    assert names <= set(kernels.__all__) and names <= set(reference.__all__)
 
 
-def test_threshold_factor():
+def test_the_threshold_factor_is_the_references():
     for p_fa in (1e-6, 1e-2, 0.9, 0.999999):
         assert kernels.threshold_factor(50, p_fa) == pytest.approx(reference.threshold_factor(50, np.float32(p_fa)),
                                                                    rel=1e-6)

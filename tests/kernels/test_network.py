@@ -25,14 +25,14 @@ WINDOWS = 5200
 @pytest.fixture(scope="module")
 def real_windows(flights: Path) -> np.ndarray:
     """(n, 100, 3), every eighth window of clean flights until there are enough, of every height."""
-    found: list[np.ndarray] = []
+    windows: list[np.ndarray] = []
     for file in collect([flights / "airtouch"])[::3]:
         fused = flight_features(logs.read(file.path)).fused
         ends = [i for i in range(99, len(fused), 8) if np.isfinite(fused[i - 99:i + 1]).all()]
-        found.append(kernels.z_score_window(np.stack([fused[i - 99:i + 1] for i in ends])))
-        if sum(map(len, found)) >= WINDOWS:
+        windows.append(kernels.z_score_window(np.stack([fused[i - 99:i + 1] for i in ends])))
+        if sum(map(len, windows)) >= WINDOWS:
             break
-    return np.concatenate(found)[:WINDOWS]
+    return np.concatenate(windows)[:WINDOWS]
 
 
 def tflite_micro(content: bytes, quantised: np.ndarray) -> np.ndarray:
@@ -81,8 +81,8 @@ def test_float_c_is_within_1e_5_of_keras() -> None:
     model = network.build_keras()
     network.set_weights_of_keras(model, weights)
     expected = keras.ops.convert_to_numpy(model(windows[..., None]))
-    found = c_network.infer_float(network.float_layers(weights), windows)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
+    logits = c_network.infer_float(network.float_layers(weights), windows)
+    np.testing.assert_allclose(logits, expected, rtol=0, atol=1e-5)
     assert np.abs(expected).max() > 0.5
 
 
@@ -92,12 +92,12 @@ def test_a_flight_in_one_call_is_every_window_by_itself() -> None:
     features[:50] = np.nan
     features[250, 1] = np.inf
     probability = c_network.probability_of_flight(model, features)
-    known = np.zeros(400, bool)
-    known[149:250] = known[350:] = True
-    np.testing.assert_array_equal(np.isfinite(probability), known)
-    windows = np.stack([features[i - 99:i + 1] for i in np.flatnonzero(known)])
+    answered = np.zeros(400, bool)
+    answered[149:250] = answered[350:] = True
+    np.testing.assert_array_equal(np.isfinite(probability), answered)
+    windows = np.stack([features[i - 99:i + 1] for i in np.flatnonzero(answered)])
     expected = c_network.probability(model, kernels.z_score_window(windows))
-    np.testing.assert_array_equal(probability[known], expected)
+    np.testing.assert_array_equal(probability[answered], expected)
 
 
 def test_probability_is_the_softmax_of_the_logits() -> None:
@@ -135,8 +135,8 @@ def test_requantise_rounds_twice(accumulator: int, mantissa: int, exponent: int)
     away = math.floor(abs(Fraction(product, 2**exponent)) + Fraction(1, 2))
     high = int8_network.rounding_doubling_high_multiply(
         np.array(accumulator, np.int32), np.array(mantissa, np.int32))
-    found = int8_network.rounding_shift_right(high, np.array(exponent))
-    assert int(found) == (-away if product < 0 else away)
+    rounded = int8_network.rounding_shift_right(high, np.array(exponent))
+    assert int(rounded) == (-away if product < 0 else away)
 
 
 @settings(max_examples=100, deadline=None)

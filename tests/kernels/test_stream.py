@@ -44,7 +44,7 @@ def network(seed, *, width=8, channels=4, taps=3, dilations=(1, 2, 4), stride=2,
        stride=st.integers(1, 3), first_skip=st.integers(0, 2), sparsity=st.sampled_from([0.0, 0.7, 1.0]),
        outputs=st.integers(1, 6), dilations=st.lists(st.integers(1, 9), min_size=1, max_size=4),
        samples=st.integers(0, 120))
-def test_c_equals_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples, outputs):
+def test_c_has_the_bits_of_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples, outputs):
     first_skip = min(first_skip, len(dilations))
     net = network(seed, width=width, taps=taps, dilations=tuple(dilations), stride=stride,
                   first_skip=first_skip, sparsity=sparsity, outputs=outputs)
@@ -58,18 +58,18 @@ def test_an_output_depends_on_the_receptive_field_and_nothing_else():
     x = rng.integers(-128, 128, (200, net.channels)).astype(np.int8)
     last = run_stream(net, x)[-1]
     at = (len(x) - 1) // net.stride * net.stride  # the last sample that is computed
-    changed = x.copy()
-    changed[:at - net.receptive_samples + 1] = rng.integers(-128, 128, (at - net.receptive_samples + 1, 4))
-    assert np.array_equal(run_stream(net, changed)[-1], last)
-    moved = [not np.array_equal(run_stream(net, _bump(x, at - net.receptive_samples + 1, s))[-1], last)
-             for s in range(1, 40)]
-    assert any(moved), "the oldest sample of the receptive field has no influence at all"
+    perturbed = x.copy()
+    perturbed[:at - net.receptive_samples + 1] = rng.integers(-128, 128, (at - net.receptive_samples + 1, 4))
+    assert np.array_equal(run_stream(net, perturbed)[-1], last)
+    influence = [not np.array_equal(run_stream(net, _bump(x, at - net.receptive_samples + 1, s))[-1], last)
+                 for s in range(1, 40)]
+    assert any(influence), "the oldest sample of the receptive field has no influence at all"
 
 
 def _bump(x, row, step):
-    changed = x.copy()
-    changed[row] = (changed[row].astype(int) + 6 * step + 128) % 256 - 128
-    return changed
+    perturbed = x.copy()
+    perturbed[row] = (perturbed[row].astype(int) + 6 * step + 128) % 256 - 128
+    return perturbed
 
 
 def test_the_windowed_form_gives_the_same_bits():
@@ -82,16 +82,16 @@ def test_the_windowed_form_gives_the_same_bits():
 
 
 def test_bad_networks_are_refused():
-    good = network(5)
+    valid = network(5)
     with pytest.raises(AirTouchError, match="needs samples"):
-        run_c(good, np.zeros((10, 5), np.int8))
-    wider = StreamNetwork(good.graph, good.layers[:1] + network(6, width=12).layers[1:-1] + good.layers[-1:])
+        run_c(valid, np.zeros((10, 5), np.int8))
+    wider = StreamNetwork(valid.graph, valid.layers[:1] + network(6, width=12).layers[1:-1] + valid.layers[-1:])
     with pytest.raises(AirTouchError, match="layer 1 does not fit"):
         arena_bytes(wider)
-    *convs, head = good.graph
+    *convs, head = valid.graph
     with pytest.raises(AirTouchError, match="layer 4 does not fit"):
-        arena_bytes(StreamNetwork((*convs, replace(head, reads=(2, 3))), good.layers))
+        arena_bytes(StreamNetwork((*convs, replace(head, reads=(2, 3))), valid.layers))
     for graph in ((*convs, replace(head, reads=(1, 3))), (*convs, replace(head, reads=())),
-                  (convs[0], replace(convs[1], stride=2), *good.graph[2:]), good.graph[:1]):
+                  (convs[0], replace(convs[1], stride=2), *valid.graph[2:]), valid.graph[:1]):
         with pytest.raises(AirTouchError, match="convolutions in a row and a head"):
-            arena_bytes(StreamNetwork(graph, good.layers))
+            arena_bytes(StreamNetwork(graph, valid.layers))

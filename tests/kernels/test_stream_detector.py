@@ -98,8 +98,8 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
     at = np.flatnonzero(edges)
     assert not edges[~airborne].any()
     for a, b in pairwise(at):
-        flown = airborne[a:b + 1].all()
-        assert not flown or ((hold or b - a >= dwell) and edges[a] != edges[b])
+        in_the_air = airborne[a:b + 1].all()
+        assert not in_the_air or ((hold or b - a >= dwell) and edges[a] != edges[b])
 
 
 def test_an_edge_is_reported_a_fixed_time_after_the_peak_of_its_logit():

@@ -23,17 +23,17 @@ ACC[50:60], PWM[300:303] = np.nan, np.inf
 @settings(max_examples=25)
 @given(st.lists(st.integers(0, SAMPLES), max_size=8))
 def test_pieces_of_any_size_give_the_events_of_the_whole(cuts):
-    whole = kernels.stream_detector(ACC, GYRO, PWM, MODEL.int8, MODEL.recipe.motion, KEEN)
+    at_once = kernels.stream_detector(ACC, GYRO, PWM, MODEL.int8, MODEL.recipe.motion, KEEN)
     session = StreamSession(MODEL.int8, MODEL.recipe.motion, KEEN)
     bounds = [0, *sorted(cuts), SAMPLES]
     pieces = [session.next(ACC[a:b], GYRO[a:b], PWM[a:b]) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-    assert whole.edge.any()
+    assert at_once.edge.any()
     for name in ("logits", "ready", "edge", "airborne"):
-        np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in pieces]), getattr(whole, name))
+        np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in pieces]), getattr(at_once, name))
 
 
 def test_two_sessions_do_not_share_anything():
-    one, other = (StreamSession(MODEL.int8, MODEL.recipe.motion, KEEN) for _ in range(2))
-    first = one.next(ACC, GYRO, PWM)
-    second = other.next(ACC, GYRO, PWM)
+    session, second_session = (StreamSession(MODEL.int8, MODEL.recipe.motion, KEEN) for _ in range(2))
+    first = session.next(ACC, GYRO, PWM)
+    second = second_session.next(ACC, GYRO, PWM)
     np.testing.assert_array_equal(first.logits, second.logits)

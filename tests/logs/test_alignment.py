@@ -21,8 +21,8 @@ def test_a_fast_imu_is_averaged_over_each_ten_milliseconds():
 def test_a_slow_signal_repeats_its_last_value_and_no_longer_than_the_limit():
     times = np.arange(0.0, 1.0, 0.01)
     log = aligned_log({"acc_x_mps2": (times, times), "vbat_V": (np.array([0.2]), np.array([4.0]))}, META)
-    known = (log["t_s"] >= 0.2 - 1e-6) & (log["t_s"] <= 0.2 + HOLD_S + 1e-6)
-    assert (log["vbat_V"][known] == 4.0).all() and np.isnan(log["vbat_V"][~known]).all()
+    held_value = (log["t_s"] >= 0.2 - 1e-6) & (log["t_s"] <= 0.2 + HOLD_S + 1e-6)
+    assert (log["vbat_V"][held_value] == 4.0).all() and np.isnan(log["vbat_V"][~held_value]).all()
     np.testing.assert_array_equal(log["acc_x_mps2"], times)  # 100 Hz stays as it is
 
 

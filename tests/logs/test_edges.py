@@ -48,12 +48,12 @@ def test_glitch_overshoot_and_invalid_readings_are_no_edges():
     assert logs.true_edges(flight(glitch)) == []
     overshoot = np.r_[np.full(100, 0.05), np.full(4, 1.15), np.full(100, 0.77)]
     assert [(e.sample, e.kind) for e in logs.true_edges(flight(overshoot))] == [(100, "exit")]
-    lost = np.full(300, 0.8)
-    lost[100:180] = np.nan
-    assert logs.true_edges(flight(lost)) == []
+    invalid = np.full(300, 0.8)
+    invalid[100:180] = np.nan
+    assert logs.true_edges(flight(invalid)) == []
 
 
-def test_only_in_flight():
+def test_a_step_on_the_ground_is_no_edge_and_edges_need_a_range():
     height = np.r_[np.full(100, 0.8), np.full(100, 0.05)]
     assert logs.true_edges(flight(height, pwm=10000.0)) == []
     with pytest.raises(AirTouchError, match="zrange_m"):

@@ -45,7 +45,7 @@ def test_a_damaged_file_in_the_target_is_replaced(two_flights, tmp_path):
     assert "b.csv.gz" in public.fetch(out, source=source)["new"]
 
 
-def test_over_http(two_flights, tmp_path, monkeypatch):
+def test_flights_come_over_http_and_failures_are_listed(two_flights, tmp_path, monkeypatch):
     pooch = pytest.importorskip("pooch")
     monkeypatch.setattr(pooch, "os_cache", lambda name: tmp_path / "cache")
     served = tmp_path / "served"
@@ -62,7 +62,7 @@ def test_over_http(two_flights, tmp_path, monkeypatch):
     assert states["new"] == ["a_+10d.csv.gz"] and states["failed"] == ["b.csv.gz"]
 
 
-def test_no_such_folder(tmp_path):
+def test_a_missing_source_folder_is_refused(tmp_path):
     with pytest.raises(AirTouchError, match="no such folder"):
         public.fetch(tmp_path / "out", source=tmp_path / "missing")
 

@@ -21,14 +21,14 @@ def compress(q):
 
 def test_decompress_inverts_the_format():
     rotations = Rotation.random(2000, random_state=1)
-    q = decompress(np.array([compress(one) for one in rotations.as_quat()], dtype=float))
+    q = decompress(np.array([compress(quaternion) for quaternion in rotations.as_quat()], dtype=float))
     error = (Rotation.from_quat(q) * rotations.inv()).magnitude()
     assert error.max() < 0.005  # nine bits: half a step of 1/723 in three components, doubled
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1)
 
 
 @given(st.lists(st.floats(allow_nan=True), min_size=1, max_size=20))
-def test_decompress_takes_anything(values):
+def test_what_is_no_32_bit_number_decompresses_to_nan(values):
     q = decompress(np.array(values))
     valid = [0 <= v < 2**32 and v == int(v) for v in np.nan_to_num(values, nan=-1, posinf=-1, neginf=-1)]
     assert np.isfinite(q).all(axis=1).tolist() == valid

@@ -45,41 +45,41 @@ def test_a_cut_table_loses_its_last_line_at_most(rows, data):
     """Whatever is missing at the end of the file: the whole lines are read as they stand."""
     body = "".join(",".join(row) + "\n" for row in rows)
     last = len(",".join(rows[-1])) + 1
-    cut = body[:len(body) - data.draw(st.integers(0, last))]
+    beginning = body[:len(body) - data.draw(st.integers(0, last))]
     warnings = []
-    got = parse_table(cut.encode(), "a.csv", 3, 7, warnings)
-    whole = np.array(rows[:-1], float)
-    np.testing.assert_array_equal(got[:len(whole)], whole)
-    assert len(got) in (len(whole), len(whole) + 1)
+    values = parse_table(beginning.encode(), "a.csv", 3, 7, warnings)
+    whole_rows = np.array(rows[:-1], float)
+    np.testing.assert_array_equal(values[:len(whole_rows)], whole_rows)
+    assert len(values) in (len(whole_rows), len(whole_rows) + 1)
     assert warnings in ([], [f"line {6 + len(rows)} is cut off and was dropped"])
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.sampled_from(["# vehicle: x", "#", "", "  ", "   # deep"]), max_size=5),
        st.sampled_from(["a,b", "1,2", ""]), st.lists(st.sampled_from(["3,4", "", "# late"]), max_size=3))
-def test_the_parts_of_a_sheet_are_its_lines(head, first, rest):
-    text = "\n".join([*head, first, *rest])
+def test_the_parts_of_a_sheet_are_its_lines(head, first, other_lines):
+    text = "\n".join([*head, first, *other_lines])
     lines = text.split("\n")
     begin = next((k for k, line in enumerate(lines) if line.strip() and not line.strip().startswith("#")), None)
-    found = sheet(text.encode())
+    parts = sheet(text.encode())
     if begin is None:
-        assert found.first == b"" and not found.rest.strip(b"\n# late")
+        assert parts.first == b"" and not parts.rest.strip(b"\n# late")
         return
-    assert found.first.decode() == lines[begin] and found.line == begin + 1
-    assert found.rest.decode() == "\n".join(lines[begin + 1:])
-    assert [c.decode() for c in found.comments] == [s.strip() for s in lines[:begin] if s.strip().startswith("#")]
+    assert parts.first.decode() == lines[begin] and parts.line == begin + 1
+    assert parts.rest.decode() == "\n".join(lines[begin + 1:])
+    assert [c.decode() for c in parts.comments] == [s.strip() for s in lines[:begin] if s.strip().startswith("#")]
 
 
-@pytest.mark.parametrize(("header", "said"), [
+@pytest.mark.parametrize(("header", "message"), [
     (b"a,,c", "column 2 has no name"), (b"a,b,a", "column 3 has another one's name"),
     (b"a,b\x07", "column 2 is not printable"), (b"a," + b"x" * 101, "column 2 has too long a name"),
     (b",".join([b"n"] * 400), "more than 256 columns")])
-def test_bad_names_are_refused(header, said):
-    with pytest.raises(AirTouchError, match=said):
+def test_bad_names_are_refused(header, message):
+    with pytest.raises(AirTouchError, match=message):
         check_names(names_of(header), "a.csv:1")
 
 
-def test_named_columns():
+def test_columns_have_the_headers_names_and_empty_cells_are_nan():
     table = named_table(sheet(b"# c\nx, y\n1,2\n3,\n"), "a.csv", [])
     assert list(table) == ["x", "y"]
     np.testing.assert_array_equal(table["x"], [1, 3])

@@ -23,7 +23,7 @@ def attitude(seed=0, n=40):
                     "stateEstimate__yaw": degrees[:, 2]}
 
 
-def test_units():
+def test_log_variables_are_converted_to_si_units():
     columns, meta = converted(acc__x=[1], acc__y=[0], acc__z=[-1], gyro__x=[180], gyro__y=[0], gyro__z=[-90],
                               stateEstimateZ__vx=[300], stateEstimateZ__vy=[0], stateEstimateZ__vz=[-20],
                               pm__vbatMV=[3700], range__zrange=[400], motor__m1=[1], motor__m2=[2], motor__m3=[3],

@@ -19,11 +19,11 @@ from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 @pytest.fixture
 def figures(monkeypatch):
     """Three figures in place of the real ones: one that works, one that lacks flights, one whose input is bad."""
-    made = []
+    calls = []
 
     def works(job):
-        made.append(job.quick)
-        verdicts = {name: Verdict(REPRODUCED, f"n = {len(made)} <of 3>") for name in ("height-4cm", "height-9cm")}
+        calls.append(job.quick)
+        verdicts = {name: Verdict(REPRODUCED, f"n = {len(calls)} <of 3>") for name in ("height-4cm", "height-9cm")}
         return Figure("Works", [{"what": "a", "value": 1.5}, {"what": "b", "n": 2}], "Simulated.", verdicts,
                       lambda canvas: canvas.subplots().plot([1, 2]))
 
@@ -38,18 +38,18 @@ def figures(monkeypatch):
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(run, "FIGURES", {"fig8d": ("made_up", "works"), "fig8e": ("made_up", "lacks"),
                                          "table1": ("made_up", "bad")})
-    return made
+    return calls
 
 
 def test_what_is_missing_is_said_and_the_others_are_made(figures, tmp_path):
     out = tmp_path / "paper"
-    found = run.run(run.names(()), out, Job(None, out / "work"))
+    verdicts = run.run(run.names(()), out, Job(None, out / "work"))
     assert list(csv.DictReader((out / "fig8d.csv").open())) == [{"what": "a", "value": "1.5", "n": ""},
                                                                 {"what": "b", "value": "", "n": "2"}]
     assert (out / "fig8d.png").read_bytes()[:4] == b"\x89PNG" and b"<svg" in (out / "fig8d.svg").read_bytes()
     assert not (out / "fig8e.csv").exists()
-    assert "no recorded flights" in found["fig8e"]["missing"] and "log.csv:7" in found["table1"]["missing"]
-    assert {c["verdict"] for name in ("fig8e", "table1") for c in found[name]["claims"].values()} == {UNTESTABLE}
+    assert "no recorded flights" in verdicts["fig8e"]["missing"] and "log.csv:7" in verdicts["table1"]["missing"]
+    assert {c["verdict"] for name in ("fig8e", "table1") for c in verdicts[name]["claims"].values()} == {UNTESTABLE}
     page = (out / "index.html").read_text()
     assert "n = 1 &lt;of 3&gt;" in page and "Not made: no recorded flights" in page and "0.364" not in page
 
@@ -87,15 +87,15 @@ def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tm
 
 
 def test_processes_make_the_same_figures(tmp_path):
-    chosen, told = ["table1", "range"], tmp_path / "told"
+    chosen, messages = ["table1", "range"], tmp_path / "told"
     for out, workers in (("one", 1), ("two", 2)):
-        job = Job(None, tmp_path / out / "work", tell=partial(note, told))
+        job = Job(None, tmp_path / out / "work", tell=partial(note, messages))
         run.run(chosen, tmp_path / out, job, workers=workers)
     for name in chosen:
         for ending in ("csv", "svg", "png"):
             file = f"{name}.{ending}"
             assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
-    assert "range" in (tmp_path / "two" / "index.html").read_text() and told.read_text().count("written") == 4
+    assert "range" in (tmp_path / "two" / "index.html").read_text() and messages.read_text().count("written") == 4
 
 
 def note(path, line):

@@ -21,8 +21,8 @@ def test_the_measured_curve_is_what_neural_swarm_flew():
 
 def test_reach_inverts_a_curve():
     """1 / (1 - (R / 4 h)^2) - 1 = t at h = R / (4 sqrt(t / (1 + t)))."""
-    found = sensing_range.reach(lambda h: sensing_range.cheeseman_bennett(h, 0.1), 0.01)
-    assert found == pytest.approx(0.1 / (4 * np.sqrt(0.01 / 1.01)), rel=0.02)
+    height_m = sensing_range.reach(lambda h: sensing_range.cheeseman_bennett(h, 0.1), 0.01)
+    assert height_m == pytest.approx(0.1 / (4 * np.sqrt(0.01 / 1.01)), rel=0.02)
     assert sensing_range.reach(lambda h: 0 * h, 0.01) == 0.0
 
 

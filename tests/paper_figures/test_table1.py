@@ -16,7 +16,7 @@ def test_a_log_of_a_meter_is_judged_by_its_total(tmp_path):
             lines.append(f"{t:.1f},3.8,{mw / 3.8:.4f},{stage}")
             t += 10.0
     path.write_text("\n".join(lines) + "\n")
-    made = table1.power(Job(None, tmp_path, power_log=path))
-    assert [r["mw"] for r in made.rows] == pytest.approx([78.0, 2.0, 1.0, 1.0, 8.0], abs=0.05)
-    assert made.verdicts["power"].verdict == REPRODUCED and "90.0 mW" in made.verdicts["power"].evidence
+    table = table1.power(Job(None, tmp_path, power_log=path))
+    assert [r["mw"] for r in table.rows] == pytest.approx([78.0, 2.0, 1.0, 1.0, 8.0], abs=0.05)
+    assert table.verdicts["power"].verdict == REPRODUCED and "90.0 mW" in table.verdicts["power"].evidence
     assert table1.power(Job(None, tmp_path)).verdicts["power"].verdict == UNTESTABLE

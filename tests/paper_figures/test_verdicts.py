@@ -18,17 +18,17 @@ def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
     """Scores of flights with two edges each: errors around +-error_m, a share of the edges missed."""
     rng = np.random.default_rng(seed)
     speed = condition.setdefault("speed_mps", 0.3)
-    found = []
+    scores = []
     for number in range(count):
         edges = []
         for kind in ("entry", "exit"):
             error = error_m * rng.choice([-1, 1]) * rng.uniform(0.9, 1.1)
             edges.append(EdgeScore(kind, 100) if rng.uniform() < missed else
                          EdgeScore(kind, 100, 110, kind, error / speed, error))
-        right = round(1000 * balanced)
-        found.append(FlightScore(f"f{number}", Condition(**condition), tuple(edges), (), 2, 30.0,
-                                 (right, 1000, right, 1000)))
-    return found
+        hits = round(1000 * balanced)
+        scores.append(FlightScore(f"f{number}", Condition(**condition), tuple(edges), (), 2, 30.0,
+                                  (hits, 1000, hits, 1000)))
+    return scores
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def folds(**parameters):
 
 @pytest.mark.parametrize(("paper_m", "missed", "answer"), [(0.028, 0.0, REPRODUCED), (0.028, 0.5, NOT_REPRODUCED),
                                                            (0.06, 0.0, NOT_REPRODUCED)])
-def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
+def test_overall_errors_are_judged_by_height_and_against_the_baseline(job, monkeypatch, paper_m, missed, answer):
     scores = {"best": flights(0.018), "paper": flights(paper_m, missed), "baseline": flights(0.364)}
     monkeypatch.setattr(recorded, "scores", lambda _, name: (scores[name], folds()))
     assert verdict(overall.heights(job), "height-error") == answer
@@ -61,7 +61,7 @@ def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
     assert gains == (REPRODUCED if missed == 0.0 and paper_m < 0.051 else NOT_REPRODUCED)
 
 
-def test_errors_by_height(job, monkeypatch):
+def test_an_edge_at_9_cm_must_be_harder_than_at_4_cm(job, monkeypatch):
     near, far = flights(0.03), flights(0.03, missed=0.9)
     monkeypatch.setattr(simulated, "flights", lambda scene, count: scene)
     monkeypatch.setattr(simulated, "scores", lambda scene, name: near if scene == "paper-4cm" else far)
@@ -73,11 +73,11 @@ def test_errors_by_height(job, monkeypatch):
     assert verdict(figure, "height-4cm") == verdict(figure, "height-9cm") == NOT_REPRODUCED
 
 
-@pytest.mark.parametrize(("at_20", "left", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
-                                                               (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
-                                                               (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
-def test_errors_by_angle(job, monkeypatch, at_20, left, trend, sides):
-    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, left))
+@pytest.mark.parametrize(("at_20", "at_minus_20", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
+                                                                      (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
+                                                                      (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
+def test_errors_by_angle_are_judged_by_their_trend_and_by_side(job, monkeypatch, at_20, at_minus_20, trend, sides):
+    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, at_minus_20))
             for s in flights(error, height="low", angle_deg=angle)]
     monkeypatch.setattr(recorded, "scores", lambda _, name: (some, folds()))
     figure = conditions.by_angle(job)
@@ -87,27 +87,27 @@ def test_errors_by_angle(job, monkeypatch, at_20, left, trend, sides):
 @pytest.mark.parametrize(("calm", "windy", "answer"), [((0.03, 0.0), (0.03, 0.0), REPRODUCED),
                                                        ((0.03, 0.0), (0.09, 0.0), NOT_REPRODUCED),
                                                        ((0.03, 0.0), (0.03, 0.5), NOT_REPRODUCED)])
-def test_wind(job, monkeypatch, calm, windy, answer):
+def test_wind_must_change_neither_errors_nor_misses(job, monkeypatch, calm, windy, answer):
     monkeypatch.setattr(simulated, "flights", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
     monkeypatch.setattr(simulated, "scores", lambda some, name: flights(*(windy if some[0] == "windy" else calm)))
     assert verdict(conditions.wind(job), "wind") == answer
 
 
 def test_materials_are_shown_and_never_judged(job, monkeypatch):
-    found = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
-    monkeypatch.setattr(materials, "pair_scores", lambda _: found)
+    scores = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
+    monkeypatch.setattr(materials, "pair_scores", lambda _: scores)
     assert verdict(materials.overall(job), "material-error") == UNTESTABLE
     figure = materials.by_pair(job)
     assert {verdict(figure, claim) for claim in of_figure("fig8f")} == {UNTESTABLE}
     assert figure.rows[0]["median_error_m"] == pytest.approx(0.05, rel=0.1)
 
 
-@pytest.mark.parametrize(("without", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
+@pytest.mark.parametrize(("without_error_m", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
                                                                   (0.10, 3, NOT_REPRODUCED, NOT_REPRODUCED)])
-def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
+def test_the_force_loss_is_judged_by_error_and_by_epochs(job, monkeypatch, without_error_m, epochs, loss, sooner):
     def variant_scores(_, name, *__):
-        bare = "no-df" in name
-        return flights(without if bare else 0.10), folds(converged_after_epochs=epochs if bare else 3)
+        no_loss = "no-df" in name
+        return flights(without_error_m if no_loss else 0.10), folds(converged_after_epochs=epochs if no_loss else 3)
 
     monkeypatch.setattr(recorded, "files", lambda _: [])
     monkeypatch.setattr(recorded, "variant_scores", variant_scores)
@@ -129,15 +129,15 @@ def test_a_caption_names_the_flights_that_are_missing(tmp_path):
     names = [f"f{i}.csv" for i in range(5)]
     (tmp_path / "manifest.csv").write_text("file,fold,speed_mps\n" + "".join(f"{n},{i},0.3\n" for i, n in
                                                                            enumerate(names)))
-    told = recorded.sample_sentence(Job(tmp_path, tmp_path / "work"), 87, 174)
-    assert "in 5 folds. Left out: " in told and all(str(tmp_path / n) in told for n in names[:3])
-    assert told.endswith("; and 2 more.") and "f3.csv" not in told
+    sentence = recorded.sample_sentence(Job(tmp_path, tmp_path / "work"), 87, 174)
+    assert "in 5 folds. Left out: " in sentence and all(str(tmp_path / n) in sentence for n in names[:3])
+    assert sentence.endswith("; and 2 more.") and "f3.csv" not in sentence
 
 
 def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
-    every = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
-    monkeypatch.setattr(recorded.dataset, "collect", lambda _: every)
-    assert recorded.files(Job(tmp_path, tmp_path)) == every
+    collection = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
+    monkeypatch.setattr(recorded.dataset, "collect", lambda _: collection)
+    assert recorded.files(Job(tmp_path, tmp_path)) == collection
     some = recorded.files(Job(tmp_path, tmp_path, quick=True))
     count = [sum(f.condition.fold == fold for f in some) for fold in range(5)]
     assert count == [9, 6, 6, 6, 6] and len({f.path for f in some}) == 33
@@ -145,7 +145,7 @@ def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("shortest", "resolution"),
                          [(0.05, REPRODUCED), (0.10, NOT_REPRODUCED), (0.2, NOT_REPRODUCED)])
-def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
+def test_windows_are_judged_by_error_and_inputs_by_misses(job, monkeypatch, shortest, resolution):
     monkeypatch.setattr(recorded, "files", lambda _: [])
     monkeypatch.setattr(recorded, "variant_scores", lambda _, name, *__: (
         flights(shortest if name == "stft-50" else 0.10, missed=0.5 if name in ("input-50", "input-250") else 0.2),
@@ -155,7 +155,7 @@ def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
 
 
 @pytest.mark.parametrize(("exact", "int8", "answer"), [(0.97, 0.86, REPRODUCED), (0.71, 0.70, NOT_REPRODUCED)])
-def test_sizes(job, monkeypatch, exact, int8, answer):
+def test_sizes_are_judged_by_the_accuracy_that_int8_keeps(job, monkeypatch, exact, int8, answer):
     monkeypatch.setattr(recorded, "variant_scores", lambda *_: (flights(0.05, balanced=int8), folds()))
     monkeypatch.setattr(recorded, "in_float", lambda *_: flights(0.05, balanced=exact))
     figure = sizes.sizes(job)
@@ -163,7 +163,7 @@ def test_sizes(job, monkeypatch, exact, int8, answer):
     assert figure.rows[0]["bytes"] == 4 * (36944 + 66)  # weights and biases of the paper's network
 
 
-def test_resources(job, monkeypatch):
+def test_multiplications_are_those_counted_by_hand(job, monkeypatch):
     monkeypatch.setattr(recorded, "scores", lambda _, name: (flights(0.05), folds()))
     figure = resources.resources(job)
     assert verdict(figure, "flops") == NOT_REPRODUCED and verdict(figure, "parameters") == REPRODUCED
@@ -189,11 +189,11 @@ def crossings(monkeypatch, camera_m, airtouch_m):
     there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in films.LUX}
     monkeypatch.setattr(vision, "crossings", lambda _: films.Crossings(
         shots, there, {n: crossed(airtouch_m) for n in ("best", "paper")}))
-    monkeypatch.setattr(vision, "film_scores", lambda shots, found: [
+    monkeypatch.setattr(vision, "film_scores", lambda shots, detections: [
         FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
             e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
             for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,
-                                                                         some in zip(shots, found, strict=True)])
+                                                                         some in zip(shots, detections, strict=True)])
 
 
 def test_light_as_in_the_paper(job, monkeypatch):
@@ -220,7 +220,7 @@ def test_size_of_the_networks(job, monkeypatch, small_m, answer):
 
 
 @pytest.mark.parametrize(("joined_m", "answer"), [(0.012, REPRODUCED), (0.2, NOT_REPRODUCED)])
-def test_both_together(job, monkeypatch, joined_m, answer):
+def test_fusion_is_a_backup_where_it_is_no_worse_than_the_better_one(job, monkeypatch, joined_m, answer):
     crossings(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
     figure = vision.fusion(job)
     assert verdict(figure, "backup") == answer

@@ -44,18 +44,18 @@ def test_sines_outside_leave_nothing():
     assert band_power(np.sin(2 * np.pi * 3.0 * t) + np.sin(2 * np.pi * 12.0 * t))[199:].max() < 1e-20
 
 
-def test_is_causal():
+def test_power_does_not_depend_on_later_samples():
     x = np.random.default_rng(1).normal(size=600)
-    changed = x.copy()
-    changed[400:] = 1e3
-    np.testing.assert_array_equal(band_power(x)[:400], band_power(changed)[:400])
+    another_future = x.copy()
+    another_future[400:] = 1e3
+    np.testing.assert_array_equal(band_power(x)[:400], band_power(another_future)[:400])
 
 
 def test_hops_are_rows_of_the_full_rate():
     x = np.random.default_rng(2).normal(size=(777, 3))
-    every = band_power(x, hop=1)
+    each_sample = band_power(x, hop=1)
     for hop in (2, 7, 200):
-        np.testing.assert_allclose(band_power(x, hop=hop), every[window_ends(777, 200, hop)], rtol=1e-12)
+        np.testing.assert_allclose(band_power(x, hop=hop), each_sample[window_ends(777, 200, hop)], rtol=1e-12)
 
 
 def test_short_and_empty_flights_have_no_powers():
@@ -68,7 +68,7 @@ def test_bins_of_the_band():
     assert band_bins(100.0, 200, (6.0, 8.0)) == (12, 16)
 
 
-@pytest.mark.parametrize(("settings", "said"), [
+@pytest.mark.parametrize(("settings", "message"), [
     (dict(window=3), "window"), (dict(window=2.5), "window"), (dict(hop=0), "hop .* not 0"),
     (dict(band_hz=(8.0, 6.0)), "8 to 6 Hz"), (dict(band_hz=(0.0, 8.0)), "band"),
     (dict(band_hz=(6.0, 60.0)), "6 to 60 Hz holds no bin of a 200-sample .* 100 Hz; bins are 0.5 Hz .* to 50 Hz"),
@@ -76,8 +76,8 @@ def test_bins_of_the_band():
     (dict(band_hz=(np.nan, 8.0)), "band must be .* not .nan"),
     (dict(window=201, band_hz=(49.9, 50.1)), "49.9 to 50.1 Hz"),
 ])
-def test_settings_out_of_range_are_one_line_that_says_which(settings, said):
-    with pytest.raises(AirTouchError, match=f"band power: .*{said}") as error:
+def test_settings_out_of_range_are_one_line_that_says_which(settings, message):
+    with pytest.raises(AirTouchError, match=f"band power: .*{message}") as error:
         band_power(np.zeros(300), **settings)
     assert "\n" not in str(error.value)
 

@@ -31,7 +31,7 @@ def test_equals_exact_arithmetic_for_any_number_of_axes(axes):
             assert abs(Fraction(float(value)) / expected - 1) < 1e-13
 
 
-def test_extremes():
+def test_products_stay_within_float32_and_what_is_no_power_is_none():
     top = float(np.finfo(np.float32).max)
     rows = np.array([[1e300, 1e300, 1e300], [1e-300, 1e-300, 1e-300], [0, np.inf, 1], [4, 9, -1], [np.nan, 0, 1]])
     np.testing.assert_array_equal(cascaded_cross_spectrum(rows, (3,))[:, 0], [top, 0.0, 0.0, 0.0, np.nan])

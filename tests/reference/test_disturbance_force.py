@@ -23,8 +23,8 @@ def test_recovers_the_force_that_moved_the_vehicle():
 
 
 def test_at_rest_on_the_ground_it_is_the_weight():
-    rest = np.tile([0.0, 0.0, 9.81], (5, 1))
-    force = disturbance_force(rest, np.zeros((5, 4)), VEHICLE)
+    gravity = np.tile([0.0, 0.0, 9.81], (5, 1))
+    force = disturbance_force(gravity, np.zeros((5, 4)), VEHICLE)
     np.testing.assert_allclose(force, np.tile([0, 0, VEHICLE.mass_kg * 9.81], (5, 1)))
     np.testing.assert_allclose(force_norm(force), VEHICLE.mass_kg * 9.81)
 

@@ -11,43 +11,43 @@ OFF = (-4.0, -9.0, -9.0)  #: over, entry, exit: neither over a platform nor at a
 
 def logits(n, events=(), base=OFF):
     """(n, 3) of `base` with rows replaced: (step, row)."""
-    made = np.tile(np.array(base, float), (n, 1))
+    values = np.tile(np.array(base, float), (n, 1))
     for step, row in events:
-        made[step] = row
-    return made
+        values[step] = row
+    return values
 
 
-def edges(made, config=QUIET, airborne=None):
+def edges(values, config=QUIET, airborne=None):
     """(step, edge) of what is decoded."""
-    told = edge_decoder(made, np.ones(len(made), bool) if airborne is None else airborne, config)
-    assert told.dtype == np.uint8 and told.shape == (len(made),)
-    return [(int(i), int(told[i])) for i in np.flatnonzero(told)]
+    codes = edge_decoder(values, np.ones(len(values), bool) if airborne is None else airborne, config)
+    assert codes.dtype == np.uint8 and codes.shape == (len(values),)
+    return [(int(i), int(codes[i])) for i in np.flatnonzero(codes)]
 
 
 def test_an_entry_then_an_exit():
-    made = logits(40, [(10, (0.0, 1.0, -9.0)), (20, (0.0, -9.0, 1.0))])
-    assert edges(made) == [(10, 1), (20, 2)]
+    values = logits(40, [(10, (0.0, 1.0, -9.0)), (20, (0.0, -9.0, 1.0))])
+    assert edges(values) == [(10, 1), (20, 2)]
     assert edges(logits(40)) == []
     assert edges(logits(40, [(10, (0.0, -9.0, 5.0))])) == [], "no exit where nothing was entered"
     assert edges(logits(40, [(10, (0.0, 1.0, -9.0)), (20, (0.0, 5.0, -9.0))])) == [(10, 1)], "no second entry"
 
 
-@pytest.mark.parametrize(("row", "share", "score", "found"), [
+@pytest.mark.parametrize(("row", "share", "score", "fires"), [
     ((-1.0, 0.6, -9.0), 0.5, 0.0, True), ((-1.0, 0.4, -9.0), 0.5, 0.0, False), ((1.0, -0.4, -9.0), 0.5, 0.0, True),
     ((1.0, -0.4, -9.0), 0.0, 0.0, False), ((0.0, 1.0, -9.0), 0.5, 1.0, False), ((0.0, 1.1, -9.0), 0.5, 1.0, True),
     ((0.0, 0.0, -9.0), 0.5, 0.0, False)])
-def test_an_entry_fires_by_its_logit_beside_the_over_logit(row, share, score, found):
+def test_an_entry_fires_by_its_logit_beside_the_over_logit(row, share, score, fires):
     config = DecoderConfig(share, score, 9.0, 99.0, -99.0, arm_steps=5)
-    assert bool(edges(logits(20, [(10, row)]), config)) == found
+    assert bool(edges(logits(20, [(10, row)]), config)) == fires
 
 
-@pytest.mark.parametrize(("row", "share", "score", "found"), [
+@pytest.mark.parametrize(("row", "share", "score", "fires"), [
     ((1.0, -9.0, 0.6), 0.5, 0.0, True), ((1.0, -9.0, 0.4), 0.5, 0.0, False), ((-1.0, -9.0, -0.4), 0.5, 0.0, True),
     ((0.0, -9.0, 1.0), 0.5, 1.0, False), ((0.0, -9.0, 1.1), 0.5, 1.0, True)])
-def test_an_exit_fires_by_its_logit_less_the_over_logit(row, share, score, found):
+def test_an_exit_fires_by_its_logit_less_the_over_logit(row, share, score, fires):
     config = DecoderConfig(share, 0.0, score, 99.0, -99.0, arm_steps=5, dwell_steps=3)
-    made = logits(30, [(10, (8.0, 8.0, -9.0)), (20, row)], (0.0, -9.0, -9.0))
-    assert edges(made, config) == [(10, 1)] + [(20, 2)] * found
+    values = logits(30, [(10, (8.0, 8.0, -9.0)), (20, row)], (0.0, -9.0, -9.0))
+    assert edges(values, config) == [(10, 1)] + [(20, 2)] * fires
 
 
 def test_nothing_fires_before_it_is_armed_nor_soon_after_an_edge():
@@ -75,45 +75,45 @@ def test_the_smoothed_over_logit_fires_late():
 
 def test_an_edge_is_reported_so_many_steps_after_its_logit_peaked():
     """It fires at step 10; the peak lies two steps before, which its reporting counts from."""
-    held = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, dwell_steps=3, look_back=4, hold_steps=5)
+    long_hold = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, dwell_steps=3, look_back=4, hold_steps=5)
     peak = [(8, (-8.0, 3.0, -9.0)), (9, (-8.0, 2.0, -9.0)), (10, (0.0, 1.0, -9.0))]
-    assert edges(logits(30, peak), held) == [(13, 1)]
-    assert edges(logits(30, [(10, (0.0, 1.0, -9.0))]), held) == [(15, 1)]
+    assert edges(logits(30, peak), long_hold) == [(13, 1)]
+    assert edges(logits(30, [(10, (0.0, 1.0, -9.0))]), long_hold) == [(15, 1)]
     rising = [*peak, (11, (0.0, 4.0, -9.0)), (12, (0.0, 3.5, -9.0))]
-    assert edges(logits(30, rising), held) == [(16, 1)], "a later, higher peak begins the wait anew"
+    assert edges(logits(30, rising), long_hold) == [(16, 1)], "a later, higher peak begins the wait anew"
     same = [*peak, (11, (0.0, 3.0, -9.0))]
-    assert edges(logits(30, same), held) == [(13, 1)], "one as high does not"
+    assert edges(logits(30, same), long_hold) == [(13, 1)], "one as high does not"
     equal = [(8, (-8.0, 3.0, -9.0)), (10, (0.0, 3.0, -9.0))]
-    assert edges(logits(30, equal), held) == [(15, 1)], "of two as high the later one"
+    assert edges(logits(30, equal), long_hold) == [(15, 1)], "of two as high the later one"
     early = [(5, (-8.0, 3.0, -9.0)), (10, (0.0, 1.0, -9.0))]
-    assert edges(logits(30, early), held) == [(15, 1)], "five steps before is further than it looks back"
+    assert edges(logits(30, early), long_hold) == [(15, 1)], "five steps before is further than it looks back"
     within = [(6, (-8.0, 3.0, -9.0)), (10, (0.0, 1.0, -9.0))]
-    assert edges(logits(30, within), held) == [(11, 1)]
-    passed = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, look_back=4, hold_steps=2)
-    assert edges(logits(30, within), passed) == [(10, 1)], "at once where that has passed"
+    assert edges(logits(30, within), long_hold) == [(11, 1)]
+    short_hold = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, look_back=4, hold_steps=2)
+    assert edges(logits(30, within), short_hold) == [(10, 1)], "at once where that has passed"
 
 
 def test_an_exit_waits_for_its_own_logit_and_a_waiting_edge_is_reported_before_the_next():
-    held = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, dwell_steps=3, look_back=0, hold_steps=6)
+    config = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, dwell_steps=3, look_back=0, hold_steps=6)
     entry, leave = (0.0, 1.0, -9.0), (0.0, -9.0, 1.0)
-    assert edges(logits(40, [(10, entry), (20, leave)]), held) == [(16, 1), (26, 2)]
-    assert edges(logits(40, [(10, entry), (13, leave)]), held) == [(13, 1), (19, 2)]
+    assert edges(logits(40, [(10, entry), (20, leave)]), config) == [(16, 1), (26, 2)]
+    assert edges(logits(40, [(10, entry), (13, leave)]), config) == [(13, 1), (19, 2)]
     higher = [(10, entry), (20, leave), (22, (0.0, -9.0, 2.0))]
-    assert edges(logits(40, higher), held) == [(16, 1), (28, 2)]
+    assert edges(logits(40, higher), config) == [(16, 1), (28, 2)]
 
 
 def test_on_the_ground_all_is_forgotten():
     airborne = np.ones(40, bool)
     airborne[15] = False
     entry, leave = (0.0, 1.0, -9.0), (0.0, -9.0, 1.0)
-    made = logits(40, [(10, entry), (18, entry), (25, leave), (30, entry)])
-    assert edges(made, airborne=airborne) == [(10, 1), (30, 1)], "armed five steps after it took off again"
-    made = logits(40, [(10, entry), (20, entry)])
-    assert edges(made, airborne=airborne) == [(10, 1), (20, 1)]
-    held = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, look_back=9, hold_steps=8)
-    assert edges(logits(40, [(10, entry)]), held, airborne) == [], "what waits is not reported"
+    values = logits(40, [(10, entry), (18, entry), (25, leave), (30, entry)])
+    assert edges(values, airborne=airborne) == [(10, 1), (30, 1)], "armed five steps after it took off again"
+    values = logits(40, [(10, entry), (20, entry)])
+    assert edges(values, airborne=airborne) == [(10, 1), (20, 1)]
+    config = DecoderConfig(0.5, 0.0, 0.0, 99.0, -99.0, arm_steps=5, look_back=9, hold_steps=8)
+    assert edges(logits(40, [(10, entry)]), config, airborne) == [], "what waits is not reported"
     before = [(14, (-8.0, 5.0, -9.0)), (20, entry)]
-    assert edges(logits(40, before), held, airborne) == [(28, 1)], "it looks back no further than the take-off"
+    assert edges(logits(40, before), config, airborne) == [(28, 1)], "it looks back no further than the take-off"
     assert edges(logits(40, [(10, entry)]), airborne=np.zeros(40, bool)) == []
     late = DecoderConfig(0.0, 99.0, 99.0, arm_steps=1, look_back=0)
     up = logits(40, base=(8.0, -9.0, -9.0))
@@ -123,8 +123,8 @@ def test_on_the_ground_all_is_forgotten():
 
 
 def test_logits_that_are_no_number_say_no():
-    made = logits(30, [(10, (np.nan, np.nan, np.nan)), (12, (0.0, 1.0, np.nan)), (20, (np.nan, -9.0, -7.0))])
-    assert edges(made) == [(12, 1)], "-7 + 4 is no exit"
+    values = logits(30, [(10, (np.nan, np.nan, np.nan)), (12, (0.0, 1.0, np.nan)), (20, (np.nan, -9.0, -7.0))])
+    assert edges(values) == [(12, 1)], "-7 + 4 is no exit"
     with_exit = logits(30, [(12, (0.0, 1.0, -9.0)), (20, (np.nan, -9.0, -3.9))])
     assert edges(with_exit) == [(12, 1), (20, 2)], "over logit of -8, and -3.9 + 4 is more than 0"
     with_exit[20, 2] = -4.1

@@ -41,7 +41,7 @@ def over(n, start, stop):
     return p
 
 
-def test_hysteresis_and_dwell():
+def test_an_edge_needs_its_threshold_and_the_dwell_since_the_last():
     p = np.array([0.1, 0.59, 0.6, 0.5, 0.41, 0.4, 0.9, 0.1, 0.7, 0.0])
     armed = np.ones(10, dtype=bool)
     edges = decode(p, armed, replace(DEFAULT, dwell_samples=0))
@@ -67,16 +67,16 @@ def test_the_physical_filter_keeps_edges_with_an_alert_and_drops_the_others():
     events = edge_pipeline(acc, gyro, pwm, VEHICLE, probability=over(1500, 805, 1105))
     assert {int(i): int(events.edge[i]) for i in np.flatnonzero(events.edge)} == {805: ENTRY, 1105: EXIT}
     assert not events.filtered.any() and events.alert[800]
-    quiet = edge_pipeline(*flight(), VEHICLE, probability=over(1500, 805, 1105))
-    assert not quiet.edge.any() and np.flatnonzero(quiet.filtered).tolist() == [805, 1105]
+    without_alert = edge_pipeline(*flight(), VEHICLE, probability=over(1500, 805, 1105))
+    assert not without_alert.edge.any() and np.flatnonzero(without_alert.filtered).tolist() == [805, 1105]
 
 
 def test_an_offset_of_the_force_does_not_reach_the_default_cfar_input():
     force = np.random.default_rng(0).normal(0, 0.002, (500, 3))
-    shifted = force + [0.0, 0.0, 0.05]
-    np.testing.assert_allclose(cfar_input(shifted), cfar_input(force), atol=1e-15)
+    biased = force + [0.0, 0.0, 0.05]
+    np.testing.assert_allclose(cfar_input(biased), cfar_input(force), atol=1e-15)
     norm = EdgePipelineConfig(cfar_input="norm")
-    assert cfar_input(shifted, norm).mean() > 5 * cfar_input(force, norm).mean()
+    assert cfar_input(biased, norm).mean() > 5 * cfar_input(force, norm).mean()
 
 
 def test_bad_input_is_refused():

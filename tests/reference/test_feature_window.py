@@ -40,12 +40,12 @@ def test_streaming_starts_at_the_first_finite_sample():
 
 
 def test_bad_input_is_refused():
-    for call, said in ((lambda: streaming_z_score(np.zeros((3, 1)), 0.0), "time constant must be positive, not 0.0"),
-                       (lambda: z_score_window(np.zeros(4)), r"not \(4,\)"),
-                       (lambda: streaming_z_score(np.zeros(3), 5.0), r"not \(3,\)"),
-                       (lambda: z_score_window(np.zeros((0, 3))), r"not \(0, 3\)"),
-                       (lambda: deviation_from_mean(np.zeros(3), 0.0), "time constant must be positive, not 0.0")):
-        with pytest.raises(AirTouchError, match=said):
+    for call, message in ((lambda: streaming_z_score(np.zeros((3, 1)), 0.0), "time constant must be positive, not 0.0"),
+                          (lambda: z_score_window(np.zeros(4)), r"not \(4,\)"),
+                          (lambda: streaming_z_score(np.zeros(3), 5.0), r"not \(3,\)"),
+                          (lambda: z_score_window(np.zeros((0, 3))), r"not \(0, 3\)"),
+                          (lambda: deviation_from_mean(np.zeros(3), 0.0), "time constant must be positive, not 0.0")):
+        with pytest.raises(AirTouchError, match=message):
             call()
 
 

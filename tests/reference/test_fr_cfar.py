@@ -26,10 +26,10 @@ def test_counted_false_alarms_on_exponential_noise(p_fa):
     cells = 66
     power = np.random.default_rng(1).exponential(3.0, size=cells * 40_000)
     _, alert = fr_cfar(power, p_fa=p_fa)
-    tested = alert[cells - 1::cells]
-    interval = binomtest(int(tested.sum()), len(tested)).proportion_ci(0.999)
-    print(f"P_FA {p_fa:g}: counted {tested.mean():.3g}, 99.9 % [{interval.low:.3g}, {interval.high:.3g}], n "
-          f"{len(tested)}")
+    independent = alert[cells - 1::cells]
+    interval = binomtest(int(independent.sum()), len(independent)).proportion_ci(0.999)
+    print(f"P_FA {p_fa:g}: counted {independent.mean():.3g}, 99.9 % [{interval.low:.3g}, {interval.high:.3g}], n "
+          f"{len(independent)}")
     assert interval.low <= p_fa <= interval.high
 
 

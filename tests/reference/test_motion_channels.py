@@ -40,8 +40,8 @@ def test_each_signal_has_its_channel_and_its_swing():
         np.testing.assert_allclose(column(channels, name), value / scale, rtol=1e-9)
     np.testing.assert_allclose(column(channels, "unexplained az"), 0.3 / config.scale[10])
     assert (column(channels, "zero") == 0.0).all()
-    loud, _ = motion_channels(acc + 100.0, rate - 100.0, pwm)
-    assert (column(loud, "ax") == config.limit).all() and (column(loud, "gyro y") == -config.limit).all()
+    clipped, _ = motion_channels(acc + 100.0, rate - 100.0, pwm)
+    assert (column(clipped, "ax") == config.limit).all() and (column(clipped, "gyro y") == -config.limit).all()
 
 
 @pytest.mark.parametrize(("motor", "signs"), [(0, (-1, 1, 1)), (1, (-1, -1, -1)), (2, (1, -1, 1)), (3, (1, 1, -1))])
@@ -50,11 +50,11 @@ def test_motors_are_mixed_as_the_firmware_does(motor, signs):
     acc, rate, pwm = still(100)
     pwm[60, motor] += 1000.0
     channels, _ = motion_channels(acc, rate, pwm, UNIT)
-    left = 1.0 - 1.0 / UNIT.slow_samples
+    remaining = 1.0 - 1.0 / UNIT.slow_samples
     for name, sign in zip(("motor roll", "motor pitch", "motor yaw"), signs, strict=True):
-        assert column(channels, name)[60] == pytest.approx(1000.0 * sign * left)
-        assert column(channels, name)[61] == pytest.approx(-1000.0 * sign / UNIT.slow_samples * left)
-    assert column(channels, "motor mean")[60] == pytest.approx(250.0 * left)
+        assert column(channels, name)[60] == pytest.approx(1000.0 * sign * remaining)
+        assert column(channels, name)[61] == pytest.approx(-1000.0 * sign / UNIT.slow_samples * remaining)
+    assert column(channels, "motor mean")[60] == pytest.approx(250.0 * remaining)
 
 
 def test_slow_means_follow_at_once_until_settled_and_then_slowly():
@@ -92,14 +92,14 @@ def test_unexplained_acceleration_is_that_of_the_lagged_thrust_over_its_slow_mea
     acc, rate, pwm = still(400)
     acc[:, 2] += rng.normal(0.0, 0.3, 400)
     pwm += rng.normal(0.0, 1500.0, (400, 4))
-    got = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
+    unexplained = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
     thrust = CRAFT.thrust(pwm).sum(axis=1)
     lagged, slow = thrust[0], thrust[0]
     for t in range(400):
         lagged = lagged * (1.0 - 1.0 / 6.0) + thrust[max(t - 2, 0)] / 6.0
         gain = 1.0 if t + 1 <= UNIT.settle_samples else 1.0 / UNIT.slow_samples
         slow = slow + gain * (lagged - slow)
-        assert got[t] == pytest.approx(acc[t, 2] - G * lagged / slow, abs=1e-9)
+        assert unexplained[t] == pytest.approx(acc[t, 2] - G * lagged / slow, abs=1e-9)
     first = np.repeat(CRAFT.thrust(np.array([[30000.0] * 4, [50000.0] * 4])).sum(axis=1), (30, 30))
     assert first[0] < first[-1]
 
@@ -107,25 +107,25 @@ def test_unexplained_acceleration_is_that_of_the_lagged_thrust_over_its_slow_mea
 def test_thrust_comes_two_samples_after_its_command():
     acc, rate, pwm = still(100)
     pwm[50:] += 5000.0
-    got = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
-    np.testing.assert_allclose(got[:52], 0.0, atol=1e-9)
-    assert got[52] < -0.05 and (np.diff(got[51:58]) < 0.0).all()
+    unexplained = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
+    np.testing.assert_allclose(unexplained[:52], 0.0, atol=1e-9)
+    assert unexplained[52] < -0.05 and (np.diff(unexplained[51:58]) < 0.0).all()
 
 
 def test_motors_that_stand_still_divide_by_the_least_thrust():
     acc, rate, pwm = still(10, 0.0, up=0.5)
     thrust = float(CRAFT.thrust(np.zeros((1, 4))).sum())
     assert thrust < UNIT.least_thrust_n
-    got = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
-    np.testing.assert_allclose(got, 0.5 - G * thrust / UNIT.least_thrust_n, atol=1e-12)
+    unexplained = column(motion_channels(acc, rate, pwm, UNIT)[0], "unexplained az")
+    np.testing.assert_allclose(unexplained, 0.5 - G * thrust / UNIT.least_thrust_n, atol=1e-12)
 
 
 def test_values_that_are_no_numbers_hold_the_last_and_commands_stay_in_their_range():
     acc, rate, pwm = still(60)
     acc[:, 0], rate[:, 1] = 0.25, 0.125
-    spoiled = [x.copy() for x in (acc, rate, pwm)]
-    spoiled[0][30], spoiled[1][31], spoiled[2][32] = np.nan, np.inf, np.nan
-    np.testing.assert_array_equal(motion_channels(*spoiled, UNIT)[0], motion_channels(acc, rate, pwm, UNIT)[0])
+    with_gaps = [x.copy() for x in (acc, rate, pwm)]
+    with_gaps[0][30], with_gaps[1][31], with_gaps[2][32] = np.nan, np.inf, np.nan
+    np.testing.assert_array_equal(motion_channels(*with_gaps, UNIT)[0], motion_channels(acc, rate, pwm, UNIT)[0])
     high = still(60, 70000.0)
     np.testing.assert_array_equal(motion_channels(*high, UNIT)[0], motion_channels(*still(60, 65535.0), UNIT)[0])
     pwm[40, 0] = -5000.0
@@ -135,8 +135,8 @@ def test_values_that_are_no_numbers_hold_the_last_and_commands_stay_in_their_ran
 
 def test_shapes_are_checked_and_nothing_is_nothing():
     acc, rate, pwm = still(5)
-    for bad in ((acc[:4], rate, pwm), (acc, rate[:, :2], pwm), (acc, rate, pwm[:, :3])):
+    for signals in ((acc[:4], rate, pwm), (acc, rate[:, :2], pwm), (acc, rate, pwm[:, :3])):
         with pytest.raises(AirTouchError, match="needs \\(n, 3\\), \\(n, 3\\) and \\(n, 4\\), not \\("):
-            motion_channels(*bad)
+            motion_channels(*signals)
     channels, airborne = motion_channels(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 4)))
     assert channels.shape == (0, 12) and airborne.shape == (0,)

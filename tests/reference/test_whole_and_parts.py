@@ -43,8 +43,8 @@ def test_every_field_is_that_of_its_part(signals, config):
     np.testing.assert_array_equal(events.threshold, threshold)
     np.testing.assert_array_equal(events.alert, alert)
     # motors count by their differences to the first
-    apart = np.column_stack([pwm[:, k] - pwm[:, 0] for k in (1, 2, 3)])
-    powers = band_power(np.column_stack([acc, gyro, apart]), hop=1)
+    differences = np.column_stack([pwm[:, k] - pwm[:, 0] for k in (1, 2, 3)])
+    powers = band_power(np.column_stack([acc, gyro, differences]), hop=1)
     ready = np.flatnonzero(events.ready)
     assert ready[0] == p.band_window - 1 and (np.diff(ready) == p.band_hop).all()
     np.testing.assert_allclose(events.band_power[ready], powers[ready], rtol=1e-9)
@@ -60,51 +60,51 @@ def test_values_beyond_what_is_possible_are_those_at_the_limit(signals):
     for over, at in ((70000.0, 65535.0), (-9.0, 0.0)):
         high, limited = pwm.copy(), pwm.copy()
         high[400, 2], limited[400, 2] = over, at
-        one, other = (edge_pipeline(acc, gyro, x, VEHICLE) for x in (high, limited))
-        np.testing.assert_array_equal(one.band_power, other.band_power)
-        np.testing.assert_array_equal(one.force, other.force)
+        beyond, at_limit = (edge_pipeline(acc, gyro, x, VEHICLE) for x in (high, limited))
+        np.testing.assert_array_equal(beyond.band_power, at_limit.band_power)
+        np.testing.assert_array_equal(beyond.force, at_limit.force)
     wild, limited = acc.copy(), acc.copy()
     wild[300, 0], limited[300, 0] = 50.0 * ACC_LIMIT, ACC_LIMIT
     np.testing.assert_array_equal(disturbance_force(wild, pwm, VEHICLE), disturbance_force(limited, pwm, VEHICLE))
-    spun, turned = gyro.copy(), gyro.copy()
-    spun[300, 1], turned[300, 1] = -50.0 * RATE_LIMIT, -RATE_LIMIT
+    spun, slow = gyro.copy(), gyro.copy()
+    spun[300, 1], slow[300, 1] = -50.0 * RATE_LIMIT, -RATE_LIMIT
     wide = MotionConfig(limit=1e12)
-    np.testing.assert_array_equal(motion_channels(acc, spun, pwm, wide)[0], motion_channels(acc, turned, pwm, wide)[0])
+    np.testing.assert_array_equal(motion_channels(acc, spun, pwm, wide)[0], motion_channels(acc, slow, pwm, wide)[0])
     np.testing.assert_array_equal(edge_pipeline(acc, spun, pwm, VEHICLE).band_power,
-                                  edge_pipeline(acc, turned, pwm, VEHICLE).band_power)
+                                  edge_pipeline(acc, slow, pwm, VEHICLE).band_power)
 
 
 def test_single_precision_is_reckoned_in_double(signals):
     single = [s.astype(np.float32) for s in signals]
     double = [s.astype(np.float64) for s in single]
-    for made in (lambda a, g, p: disturbance_force(a, p, VEHICLE), lambda a, g, p: total_thrust(p, VEHICLE),
-                 lambda a, g, p: force_norm(a), lambda a, g, p: band_power(a), lambda a, g, p: hold_power(a[:, 0]),
-                 lambda a, g, p: edge_pipeline(a, g, p, VEHICLE).band_power):
-        one, other = made(*single), made(*double)
-        assert one.dtype == np.float64
-        np.testing.assert_array_equal(one, other)
+    for compute in (lambda a, g, p: disturbance_force(a, p, VEHICLE), lambda a, g, p: total_thrust(p, VEHICLE),
+                    lambda a, g, p: force_norm(a), lambda a, g, p: band_power(a), lambda a, g, p: hold_power(a[:, 0]),
+                    lambda a, g, p: edge_pipeline(a, g, p, VEHICLE).band_power):
+        from_single, from_double = compute(*single), compute(*double)
+        assert from_single.dtype == np.float64
+        np.testing.assert_array_equal(from_single, from_double)
 
 
 def test_a_battery_weakens_the_thrust_of_the_force(signals):
     acc, _, pwm = signals
     volts = 0.9 * VEHICLE.nominal_voltage_v
-    full, less = (disturbance_force(acc, pwm, VEHICLE, vbat_v=v) for v in (None, volts))
+    full, sagging = (disturbance_force(acc, pwm, VEHICLE, vbat_v=v) for v in (None, volts))
     thrust = VEHICLE.thrust(pwm).sum(axis=1)
-    np.testing.assert_allclose((less - full)[:, 2], (1.0 - 0.81) * thrust, rtol=1e-9)
+    np.testing.assert_allclose((sagging - full)[:, 2], (1.0 - 0.81) * thrust, rtol=1e-9)
     for v, share in ((1000.0, 4.0), (1001.0, 1.0), (0.11, 0.25), (0.09, 1.0)):
         np.testing.assert_allclose(total_thrust(pwm, VEHICLE, v), share * thrust)
 
 
 def test_a_deviation_is_from_the_weighted_mean_before():
     x, tau = np.random.default_rng(2).normal(3.0, 1.0, 60), 7.0
-    found = deviation_from_mean(x, tau)
-    assert found[0] == 0.0 and deviation_from_mean(np.zeros(0), tau).shape == (0,)
+    deviation = deviation_from_mean(x, tau)
+    assert deviation[0] == 0.0 and deviation_from_mean(np.zeros(0), tau).shape == (0,)
     for i in range(1, 60):
         weight = np.exp(-np.arange(i - 1, -1, -1) / tau)
-        assert found[i] == pytest.approx(x[i] - np.average(x[:i], weights=weight), abs=1e-9)
-    for bad in (0.0, -1.0, np.nan, np.inf):
+        assert deviation[i] == pytest.approx(x[i] - np.average(x[:i], weights=weight), abs=1e-9)
+    for invalid_tau in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(AirTouchError, match="the time constant must be positive, not"):
-            deviation_from_mean(x, bad)
+            deviation_from_mean(x, invalid_tau)
 
 
 def test_nothing_in_nothing_out():
@@ -144,5 +144,5 @@ def test_limits_and_slow_clocks():
     assert hold_power([1e35, 1.0]).tolist() == [POWER_LIMIT, 1.0] == hold_power([1e35, 1.0, np.nan])[:2].tolist()
     assert band_bins(0.5, 10, (0.1, 0.2)) == (2, 4), "a sample every two seconds is a clock as well"
     single = [np.float32(x) for x in (np.full((50, 3), 0.1), np.full((50, 3), 0.1), np.full((50, 4), 40000.3))]
-    for one, other in zip(motion_channels(*single), motion_channels(*map(np.float64, single)), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for a, b in zip(motion_channels(*single), motion_channels(*map(np.float64, single)), strict=True):
+        np.testing.assert_array_equal(a, b)

@@ -26,8 +26,8 @@ from made_diagnosis import VEHICLE, cell, diagnosis, of_flights
 
 
 @pytest.fixture(scope="module")
-def flown():
-    return made_diagnosis.flown()
+def pushed_flights():
+    return made_diagnosis.fly_pushed()
 
 
 class Checker(html.parser.HTMLParser):
@@ -60,15 +60,15 @@ def checked(path):
     return " ".join(" ".join(checker.text).split()), checker
 
 
-def test_page_of_a_diagnosis(flown, tmp_path):
-    path, found = tmp_path / "gap.html", of_flights(flown)
-    gap_report.write_diagnosis(path, found, command="airtouch gap diagnose <x>")
+def test_page_of_a_diagnosis(pushed_flights, tmp_path):
+    path, result = tmp_path / "gap.html", of_flights(pushed_flights)
+    gap_report.write_diagnosis(path, result, command="airtouch gap diagnose <x>")
     text, checker = checked(path)
-    said = words.sentences(found)
-    assert found.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in said[0]
-    assert "imu bias (probability 93%)" in said[1] and "takes away 90% (80% to 95%)" in said[2]
-    assert [text.index(s) for s in said] == sorted(text.index(s) for s in said)
-    order = [text.index(s) for s in (said[2], "What to do next", "The largest cells", "still be the wrong one")]
+    sentences = words.sentences(result)
+    assert result.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in sentences[0]
+    assert "imu bias (probability 93%)" in sentences[1] and "takes away 90% (80% to 95%)" in sentences[2]
+    assert [text.index(s) for s in sentences] == sorted(text.index(s) for s in sentences)
+    order = [text.index(s) for s in (sentences[2], "What to do next", "The largest cells", "still be the wrong one")]
     assert order == sorted(order)
     for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
                  "no velocity",
@@ -77,18 +77,18 @@ def test_page_of_a_diagnosis(flown, tmp_path):
         assert part in text, part
     assert sum(v.startswith("data:") for v in checker.loaded) == 3
     with pytest.raises(AirTouchError, match="--force"):
-        gap_report.write_diagnosis(path, found, command="x")
+        gap_report.write_diagnosis(path, result, command="x")
 
 
-def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(flown, tmp_path):
-    path, found = tmp_path / "gap.html", of_flights(flown)
-    gap_report.write_diagnosis(path, found, command="x")
+def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):
+    path, result = tmp_path / "gap.html", of_flights(pushed_flights)
+    gap_report.write_diagnosis(path, result, command="x")
     source = path.read_text()
-    for s in (*words.sentences(found), found.advice):
+    for s in (*words.sentences(result), result.advice):
         assert source.count(s.replace("<", "&lt;").replace(">", "&gt;")) == 1, s
     assert source.count('<td class="headline"') == 1 and source.count('<tr class="headline"') == 1
     title = re.search(r'<td class="headline"[^>]*title="([^"]*)"', source).group(1)
-    assert title.startswith(gap_tables.in_words(found.headline))
+    assert title.startswith(gap_tables.in_words(result.headline))
 
 
 def test_phases_are_folded_by_importance(tmp_path):
@@ -104,9 +104,9 @@ def test_phases_are_folded_by_importance(tmp_path):
 @pytest.mark.parametrize(("verdict", "words_there"), [
     ("none", "No unmodelled effect stands out (probability 93%)"),
     ("unknown", "No known effect explains it (probability 93%)")])
-def test_pages_of_other_verdicts(flown, tmp_path, verdict, words_there):
+def test_pages_of_other_verdicts(pushed_flights, tmp_path, verdict, words_there):
     path = tmp_path / "gap.html"
-    gap_report.write_diagnosis(path, of_flights(flown[:1], (), verdict=verdict), command="x")
+    gap_report.write_diagnosis(path, of_flights(pushed_flights[:1], (), verdict=verdict), command="x")
     text, _ = checked(path)
     assert words_there in text and "How far it closes" not in text
 
@@ -116,10 +116,10 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
              "to_s": 42.0,
              "over_floor": 6.1, "follows": ["height"],
              "nearest": [{"name": "wind", "fails": "gains 3 nats, 12 are needed"}]}
-    found = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(entry,))
-    steps = advice.steps("unknown", [], [], found.headline, [], True, VEHICLE.name)
+    result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(entry,))
+    steps = advice.steps("unknown", [], [], result.headline, [], True, VEHICLE.name)
     path = tmp_path / "gap.html"
-    gap_report.write_diagnosis(path, replace(found, next=steps), command="x")
+    gap_report.write_diagnosis(path, replace(result, next=steps), command="x")
     text, _ = checked(path)
     assert ("sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; "
             "follows height") in text
@@ -127,9 +127,10 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
     assert 'href="#add-an-effect"' in path.read_text() and "EFFECT = Effect(" in text  # the link leads to a whole file
 
 
-def test_page_of_a_measurement(flown, tmp_path):
-    path, found = tmp_path / "gap.html", measure(flown, VEHICLE)
-    gap_report.write_measurement(path, found, of_measurement(found, flown, VEHICLE), command="airtouch gap measure x")
+def test_page_of_a_measurement(pushed_flights, tmp_path):
+    path, gap = tmp_path / "gap.html", measure(pushed_flights, VEHICLE)
+    pictures = of_measurement(gap, pushed_flights, VEHICLE)
+    gap_report.write_measurement(path, gap, pictures, command="airtouch gap measure x")
     text, checker = checked(path)
     assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
     assert sum(v.startswith("data:") for v in checker.loaded) == 3 and "Which effect" not in text and "→" not in text
@@ -140,21 +141,22 @@ def test_the_report_computes_nothing():
     for name in ("gap_report", "gap_tables", "gap_figures"):
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
-        used = {f"{module}.{what}." for module, names in lines for what in names.replace(" ", "").split(",")}
+        imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
         allowed = ("measure", "result", "where.gap_map", "where.summary", "answer.advice", "answer.pictures",
                    "answer.words", "signals.channels")
-        assert used and all(u.startswith(tuple(f"airtouch.gap.{a}." for a in allowed)) for u in used), (name, used)
+        packages = tuple(f"airtouch.gap.{a}." for a in allowed)
+        assert imports and all(u.startswith(packages) for u in imports), (name, imports)
         assert not re.search(r"\b(residual|calibrate|ready|shrink_of|gap_map)\(", source)
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))
-def test_any_effect_can_be_shown(flown, name):
+def test_any_effect_can_be_shown(pushed_flights, name):
     term = term_of(Found(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
     assert dict(term.values) == EFFECTS[name].values()
-    study, flight = calibrate.declared(VEHICLE, ()), ready(flown[0], VEHICLE)
-    made = gap_map(study, [flight], terms=[term])
-    assert all(c.after is not None and c.after >= 0.0 for c in made.cells) and len(where(made)) >= 10
-    assert gap_tables.maps(made.cells)
+    study, flight = calibrate.declared(VEHICLE, ()), ready(pushed_flights[0], VEHICLE)
+    cells_map = gap_map(study, [flight], terms=[term])
+    assert all(c.after is not None and c.after >= 0.0 for c in cells_map.cells) and len(where(cells_map)) >= 10
+    assert gap_tables.maps(cells_map.cells)
 
 
 def test_the_page_shows_the_docs_own_effect():

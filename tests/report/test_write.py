@@ -32,7 +32,7 @@ EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
 DETECTIONS = (Detection(210, "entry", 0.9), Detection(50, "exit", 0.8))
 
 
-def shown(name="a<b>.csv", detections=DETECTIONS):
+def flight_shown(name="a<b>.csv", detections=DETECTIONS):
     rng = np.random.default_rng(0)
     log = FlightLog({"zrange_m": np.full(N, 0.8)}, {"source": name})
     signals = {"channels": rng.normal(size=(N, 9)), "band_power": rng.exponential(size=(N, 9)),
@@ -62,7 +62,7 @@ class Checker(html.parser.HTMLParser):
 
 
 def test_report_is_one_file_with_the_figures(tmp_path):
-    flight = shown()
+    flight = flight_shown()
     path = tmp_path / "report.html"
     scores = {"paper": [flight.score, flight.score], "baseline": []}
     write_report(path, "A & B", score_report(scores, [flight]), parameters={"p_fa": 1e-6}, command="airtouch demo",
@@ -82,28 +82,28 @@ def test_report_is_one_file_with_the_figures(tmp_path):
 
 
 def test_words_say_misses_and_false_edges():
-    flight = shown()
+    flight = flight_shown()
     assert in_words(flight.score) == ("entry at 2.00 s found 0.10 s late (0.020 m); exit at 4.00 s missed; "
                                       "1 false edges.")
-    said = answer("paper", summarise([flight.score]))
-    assert "1 missed (50%)" in said and "1 false (10.0 a minute)" in said and "0.020 m" in said
+    sentence = answer("paper", summarise([flight.score]))
+    assert "1 missed (50%)" in sentence and "1 false (10.0 a minute)" in sentence and "0.020 m" in sentence
 
 
 def test_plots_are_made_of_whatever_is_there():
-    flight = shown()
-    bare = Trace(np.full(N, np.nan), [])
-    for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": reliability_of([])}),
+    flight = flight_shown()
+    no_trace = Trace(np.full(N, np.nan), [])
+    for image in (figures.flight(flight.log, no_trace, None, {}), figures.reliability({"none": reliability_of([])}),
                   figures.reliability({"paper": reliability_of([flight.score])}),
                   figures.error_distribution({"paper": hit_curve([flight.score])})):
         assert image.startswith(b"\x89PNG") and len(image) > 5000
 
 
 def test_curves_are_those_of_the_edges_and_samples():
-    one, other = shown().score, shown(detections=()).score
-    hits = hit_curve([one, other])
+    both_hit, none_hit = flight_shown().score, flight_shown(detections=()).score
+    hits = hit_curve([both_hit, none_hit])
     np.testing.assert_allclose(hits.distance_m, [0.0, 0.02, 1.0])  # 0.1 s at 0.2 m/s
     assert hits.edges == 4 and hits.share.tolist() == [0.0, 0.25, 0.25]  # one of four
-    curve = reliability_of([one])
+    curve = reliability_of([both_hit])
     assert curve.samples.sum() == pytest.approx(1.0)
     assert np.sum(curve.samples * np.abs(curve.stated - curve.truly)) == pytest.approx(curve.ece)
 
@@ -120,5 +120,5 @@ def test_flights_are_shown_from_the_best_found_to_the_worst():
 
 
 def result(name, detections):
-    flight = shown(name, detections)
+    flight = flight_shown(name, detections)
     return Result(flight.log, flight.trace, flight.score)

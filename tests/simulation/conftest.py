@@ -19,7 +19,7 @@ def vehicle():
 
 
 @pytest.fixture(scope="session")
-def quiet(vehicle):
+def ideal(vehicle):
     """The same vehicle with sensors that do not err."""
     from dataclasses import replace
     return replace(vehicle, acc_noise_rms_mps2=0.0, gyro_noise_rms_radps=0.0, range_noise_rms_m=0.0,
@@ -43,9 +43,9 @@ def hover():
 
 
 @pytest.fixture(scope="session")
-def steady(quiet, hover):
+def steady(ideal, hover):
     """steady(effects) -> the log of a hover, its last four seconds."""
-    def fly(effects=(), vehicle=quiet, scene=hover):
+    def fly(effects=(), vehicle=ideal, scene=hover):
         log = flight.fly(scene, vehicle, 1, 0, effects=effects)
         assert not isinstance(log, flight.Diverged), str(log)
         return log.slice(len(log) - 400, len(log))

@@ -54,9 +54,9 @@ def real(flights):
 @pytest.fixture(scope="module")
 def simulated():
     results = batch.flights("paper-mixed", 40, workers=2)
-    good = [r for r in results if not isinstance(r, flight.Diverged)]
-    assert len(good) >= 38
-    return good
+    flights = [r for r in results if not isinstance(r, flight.Diverged)]
+    assert len(flights) >= 38
+    return flights
 
 
 def test_hover_command_level_and_slope(real, simulated):
@@ -69,18 +69,18 @@ def test_hover_command_level_and_slope(real, simulated):
 def test_hover_spectra(real, simulated):
     """Median over flights, 6 channels by 10 bands: 85 % within 3 dB, all within 5 dB."""
     medians = [np.median([h[0] for h in map(hover, group) if h], axis=0) for group in (real, simulated)]
-    apart = np.abs(10 * np.log10(medians[1] / medians[0]))
+    difference_db = np.abs(10 * np.log10(medians[1] / medians[0]))
     print(np.round(10 * np.log10(medians[1] / medians[0]), 1))
-    assert np.mean(apart < 3.0) >= 0.85
-    assert apart.max() < 5.0
+    assert np.mean(difference_db < 3.0) >= 0.85
+    assert difference_db.max() < 5.0
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.02, 0.045), (0.045, 0.065), (0.065, 0.12)])
 def test_lift_over_the_platform_by_height(real, simulated, low, high):
     """Mean lift in each class of down range, share of the weight, at the real flights' heights:
     within 1 % of the weight."""
-    found = [np.array([lift(log) for log in group if len(true_edges(log)) >= 2]) for group in (real, simulated)]
+    lifts = [np.array([lift(log) for log in group if len(true_edges(log)) >= 2]) for group in (real, simulated)]
     real_class, near = ((x[(x[:, 0] >= a) & (x[:, 0] < b)]) for x, a, b in (
-        (found[0], low, high), (found[1], low - 0.01, high + 0.01)))
+        (lifts[0], low, high), (lifts[1], low - 0.01, high + 0.01)))
     slope, level = np.polyfit(near[:, 0], near[:, 1], 1)
     assert level + slope * real_class[:, 0].mean() == pytest.approx(real_class[:, 1].mean(), abs=0.011)

@@ -45,24 +45,24 @@ def table(log):
 
 def test_flights_do_not_depend_on_workers_or_batch():
     scene = scenario.parse(QUICK, "quick")
-    one = batch.simulate(scene, seeds=4, workers=1)
+    by_one = batch.simulate(scene, seeds=4, workers=1)
     for other in (batch.simulate(scene, seeds=4, workers=3), batch.simulate(scene, seeds=[3, 2, 1, 0])[::-1]):
-        for a, b in zip(one, other, strict=True):
+        for a, b in zip(by_one, other, strict=True):
             np.testing.assert_array_equal(table(a), table(b))
-    assert not np.array_equal(table(one[0])[-1], table(one[1])[-1])
+    assert not np.array_equal(table(by_one[0])[-1], table(by_one[1])[-1])
     other_seed = batch.simulate(scene, seeds=1, seed=1)[0]
-    assert not np.array_equal(table(one[0])[-1], table(other_seed)[-1])
+    assert not np.array_equal(table(by_one[0])[-1], table(other_seed)[-1])
 
 
 def test_the_generator_flies_only_a_little_ahead(monkeypatch):
-    started = []
+    numbers = []
     real = batch.fly
-    monkeypatch.setattr(batch, "fly", lambda *a, **k: started.append(a[3]) or real(*a, **k))
+    monkeypatch.setattr(batch, "fly", lambda *a, **k: numbers.append(a[3]) or real(*a, **k))
     flying = batch.flights(scenario.parse(QUICK, "quick"), 10_000, workers=2)
     for _ in range(3):
         next(flying)
     flying.close()
-    assert len(started) <= 3 + batch.AHEAD * 2 + 2
+    assert len(numbers) <= 3 + batch.AHEAD * 2 + 2
 
 
 @pytest.mark.parametrize("name", scenario.names())
@@ -122,12 +122,12 @@ def test_a_killed_run_continues(quick, tmp_path):
                           text=True) as process:
         assert process.stdout.readline() == "the fourth\n"
         process.kill()
-    done = {f.name: f.stat().st_mtime_ns for f in out.glob("*.csv.gz")}
-    assert len(done) == 3 and len(list(out.glob(".quick_*"))) == 1  # the fourth is written and has not its name yet
+    times = {f.name: f.stat().st_mtime_ns for f in out.glob("*.csv.gz")}
+    assert len(times) == 3 and len(list(out.glob(".quick_*"))) == 1  # the fourth is written and has not its name yet
     CliRunner().invoke(command, args, catch_exceptions=False)
     files = sorted(out.glob("*.csv.gz"))
     assert len(files) == 8
-    assert all((out / name).stat().st_mtime_ns == stamp for name, stamp in done.items())
+    assert all((out / name).stat().st_mtime_ns == stamp for name, stamp in times.items())
     assert all(len(logs.read(f)) > 100 for f in files)
 
 
@@ -143,7 +143,7 @@ def test_diverged_flights_are_reported_and_never_written(quick, tmp_path):
         batch.simulate(quick, effects={"weak_motor": {"thrust_loss": 0.9}})
 
 
-@pytest.mark.parametrize(("change", "said"), [
+@pytest.mark.parametrize(("change", "message"), [
     (("height_m = \"= height\"", "height_m = \"= heigth\""), "uses 'heigth'"),
     (('do = "hover"', 'do = "dance"'), "no step 'dance'"),
     (("time_s = 1.0\n[effects]", "time_s = -1.0\n[effects]"), "must be positive"),
@@ -153,10 +153,10 @@ def test_diverged_flights_are_reported_and_never_written(quick, tmp_path):
      "faster than the firmware"),
     (('do = "hover"\ntime_s = 1.0', 'do = "go"\nheight_m = -0.2\nspeed_mps = 0.2'), "through a surface"),
 ])
-def test_bad_scenarios_get_one_clear_line(change, said):
+def test_bad_scenarios_get_one_clear_line(change, message):
     text = QUICK.replace(*change)
     assert text != QUICK
-    with pytest.raises(AirTouchError, match=said) as error:
+    with pytest.raises(AirTouchError, match=message) as error:
         scenario.parse(text, "quick.toml")
     assert "\n" not in str(error.value)
 
@@ -173,20 +173,20 @@ def test_dask_gives_every_flight_once_though_a_worker_dies(quick, tmp_path, vehi
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
                                   silence_logs=50) as local:
         client = cluster.connect(local.scheduler_address)
-        got, killed = [], False
+        numbers, killed = [], False
         for result in cluster.flights(client, scene, range(150), vehicle=vehicle):
-            got.append(result.meta["flight"])
-            if len(got) == 10 and not killed:
+            numbers.append(result.meta["flight"])
+            if len(numbers) == 10 and not killed:
                 killed = True
                 os.kill(next(iter(local.workers.values())).process.pid, 9)
         sample = next(iter(cluster.flights(client, scene, [7], vehicle=vehicle)))
         client.close()
     assert killed
-    assert sorted(got) == list(range(150))
+    assert sorted(numbers) == list(range(150))
     np.testing.assert_array_equal(table(sample), table(flight.fly(scene, vehicle, 0, 7)))
 
 
 def test_failures_survive_a_line_cut_short(tmp_path):
-    whole = json.dumps({"flight": 3, "seed": 0, "reason": "x", "time_s": 1.0, "scenario": "s"})
-    (tmp_path / store.FAILED).write_text(whole + "\n" + whole[:20])
+    line = json.dumps({"flight": 3, "seed": 0, "reason": "x", "time_s": 1.0, "scenario": "s"})
+    (tmp_path / store.FAILED).write_text(line + "\n" + line[:20])
     assert [f["flight"] for f in store.failures(tmp_path)] == [3]

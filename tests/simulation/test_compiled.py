@@ -13,5 +13,5 @@ print(sum(loop.fly.stats.cache_hits.values()), sum(loop.fly.stats.cache_misses.v
 
 def test_what_one_process_compiles_another_reads():
     compiled.compile_all()
-    run = subprocess.run([sys.executable, "-c", COUNTS], capture_output=True, text=True, check=True)
-    assert run.stdout.split() == ["1", "0"]
+    process = subprocess.run([sys.executable, "-c", COUNTS], capture_output=True, text=True, check=True)
+    assert process.stdout.split() == ["1", "0"]

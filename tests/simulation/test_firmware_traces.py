@@ -30,7 +30,7 @@ def trace(name):
 
 
 @pytest.mark.parametrize("name", ["step", "cruise", "turning"])
-def test_estimator(name):
+def test_the_estimator_follows_the_firmwares_trace(name):
     t = trace(f"estimator_{name}")
     plant, est = from_vehicle(vehicles.load("crazyflie-2.1"))[0], np.zeros(1, kalman.STATE)[0]
     plant["firmware"], plant["gravity"] = settings.load("2026.08")[0], G
@@ -41,7 +41,7 @@ def test_estimator(name):
     blocks = {int(tick) // 10 - (t["event"][i] == "P"): i for tick, i in rows.items() if t["event"][i] != "T"}
     acc = np.stack([t[f"acc_{a}_g"] for a in "xyz"], axis=1) * G
     gyro = np.radians(np.stack([t[f"gyro_{a}_dps"] for a in "xyz"], axis=1))
-    got = np.full((len(rows), 19), np.nan)
+    estimates = np.full((len(rows), 19), np.nan)
     reading = np.zeros(1, estimator.READING)[0]
     flying = False
     for tick in range(max(rows) + 1):  # what the simulator's loop calls at every tick
@@ -59,18 +59,18 @@ def test_estimator(name):
         reading["acc"], reading["gyro"] = acc[blocks[tick // 10]], gyro[blocks[tick // 10]]
         estimator.tick(plant, est, tick, flying, reading)
         if i is not None:
-            got[i] = [*est["x"], *est["v"], *est["q"], *np.diag(est["p"])]
+            estimates[i] = [*est["x"], *est["v"], *est["q"], *np.diag(est["p"])]
     names = ["x_m", "y_m", "z_m", *(f"v{a}_body_mps" for a in "xyz"), *(f"q{a}" for a in "wxyz")]
     truth = np.stack([t[n] for n in names], axis=1)
-    np.testing.assert_allclose(got[:, :10], truth, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(estimates[:, :10], truth, rtol=0, atol=1e-4)
     variances = [f"var_{a}" for a in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw")]
-    np.testing.assert_allclose(got[:, 10:], np.stack([t[n] for n in variances], axis=1), rtol=2e-3, atol=0)
+    np.testing.assert_allclose(estimates[:, 10:], np.stack([t[n] for n in variances], axis=1), rtol=2e-3, atol=0)
 
 
 @pytest.mark.parametrize(("name", "firmware"), [
     ("position", "2026.08"), ("velocity", "2026.08"), ("attitude", "2026.08"), ("saturation", "2026.08"),
     ("fork_position", "authors-2024-01"), ("fork_velocity", "authors-2024-01")])
-def test_controller_and_mixer(name, firmware):
+def test_the_controller_and_mixer_follow_the_firmwares_trace(name, firmware):
     t = trace(f"controller_{name}")
     release, plant = settings.load(firmware)[0], from_vehicle(vehicles.load("crazyflie-2.1"))[0]
     state, setpoints = np.zeros(1, controller.STATE)[0], np.zeros(1, controller.SETPOINT)
@@ -100,14 +100,14 @@ def test_controller_and_mixer(name, firmware):
         controller.run(plant, state, s, estimate, tick)
         desired[i] = [*state["attitude"], *state["rate"]]
         commands[i] = [state["thrust"], *state["command"]]
-        mixed = np.zeros(4)
-        mixer.mix(*commands[i], mixed)
-        motors[i, :4] = mixed
-        mixer.cap(mixed)
-        motors[i, 4:] = mixed
-    wanted = columns(*(f"des_{a}_deg" for a in ("roll", "pitch", "yaw")),
+        pwm = np.zeros(4)
+        mixer.mix(*commands[i], pwm)
+        motors[i, :4] = pwm
+        mixer.cap(pwm)
+        motors[i, 4:] = pwm
+    traced = columns(*(f"des_{a}_deg" for a in ("roll", "pitch", "yaw")),
                      *(f"des_{a}rate_dps" for a in ("roll", "pitch", "yaw")))
-    np.testing.assert_allclose(desired, wanted, rtol=0, atol=0.05)
+    np.testing.assert_allclose(desired, traced, rtol=0, atol=0.05)
     np.testing.assert_allclose(commands, columns("out_thrust", "out_roll", "out_pitch", "out_yaw"), rtol=0, atol=15)
     expected = columns(*(f"m{k}_uncapped" for k in range(1, 5)), *(f"m{k}_pwm" for k in range(1, 5)))
     np.testing.assert_allclose(motors, expected, rtol=0, atol=15)
@@ -118,16 +118,16 @@ HEAD = {"threshold_m": 0.30, "height_m": 0.70}  #: in force from 2024-06-26
 
 @pytest.mark.parametrize("case", ["exact", "low", "off", "soft", "drift", "slow", "fast"])
 @pytest.mark.parametrize("release", ["jan", "head"])
-def test_range_module(release, case):
+def test_the_range_module_follows_the_firmwares_trace(release, case):
     t = trace(f"authors_range_{release}_{case}")
     firmware, state = settings.load("authors-2024-01")[0], np.zeros(1, range_module.STATE)[0]
     if release == "head":
         for key, value in HEAD.items():
             firmware["range_module"][key] = value
     for i, raw in enumerate(t["raw_m"]):
-        passed = range_module.platform(firmware, state, raw)
-        assert passed == pytest.approx(t["enqueued_m"][i], abs=1e-6)
+        height = range_module.platform(firmware, state, raw)
+        assert height == pytest.approx(t["enqueued_m"][i], abs=1e-6)
         assert state["over"] == t["over_platform"][i]
         assert state["held"] == pytest.approx(t["held_height_m"][i], abs=1e-6)
         assert state["reference"] == pytest.approx(t["reference_m"][i], abs=1e-6)
-    assert math.isfinite(passed)
+    assert math.isfinite(height)

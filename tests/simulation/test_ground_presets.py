@@ -28,15 +28,15 @@ def wrench(values, signals):
 def test_preset_is_the_measured_curve(preset, signals):
     radius, spacing, lift = MEASURED[preset]
     signals[:, at.ROTOR_RADIUS], signals[:, at.ROTOR_SPACING] = radius, spacing
-    apart = []
+    errors = []
     for height, measured in zip(HEIGHT_CM, lift, strict=True):
         signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.01 * height + STANDING_M
         gain = wrench({"preset": preset}, signals)[2] / signals[0, at.THRUST:at.THRUST + 4].sum()
-        apart.append(100 * gain - measured)
+        errors.append(100 * gain - measured)
         print(f"{preset} at {height:g} cm: {100 * gain:.2f} % of weight, measured {measured:g}, residual "
-              f"{apart[-1]:+.2f}")
-    assert np.abs(apart).max() < 0.8
-    assert np.sqrt(np.mean(np.square(apart))) < 0.45
+              f"{errors[-1]:+.2f}")
+    assert np.abs(errors).max() < 0.8
+    assert np.sqrt(np.mean(np.square(errors))) < 0.45
 
 
 def test_presets_are_named_in_scenarios_and_on_the_command_line():

@@ -44,31 +44,31 @@ def swept(vehicle, top=0.75, **choice):
     return log, (log["x_m"] > 0.3) & (log["x_m"] < 0.8), over
 
 
-def test_the_stock_firmware_climbs_over_a_platform(quiet):
-    log, before, over = swept(quiet, top=0.3, firmware="2026.08", range_module="firmware")
+def test_the_stock_firmware_climbs_over_a_platform(ideal):
+    log, before, over = swept(ideal, top=0.3, firmware="2026.08", range_module="firmware")
     assert log["z_m"][before].mean() == pytest.approx(0.82, abs=0.06)
     assert log["z_m"][over].mean() == pytest.approx(0.3 + 0.82, abs=0.12)  # the height over what is below
     assert log.meta["firmware"] == "2026.08" and log.meta["range_module"] == "firmware"
 
 
-def test_the_authors_firmware_keeps_its_height(quiet):
+def test_the_authors_firmware_keeps_its_height(ideal):
     """Their module adds 0.75 m: the drone keeps its height over a platform as high, and errs by what it is off."""
-    log, before, over = swept(quiet, firmware="authors-2024-01", range_module="firmware")
+    log, before, over = swept(ideal, firmware="authors-2024-01", range_module="firmware")
     assert log["z_m"][over].mean() == pytest.approx(log["z_m"][before].mean(), abs=0.03)
     assert [e.kind for e in true_edges(log)] == ["entry", "exit"]
-    high, _, above = swept(quiet, top=0.77, firmware="authors-2024-01", range_module="firmware")
-    low, _, under = swept(quiet, top=0.72, firmware="authors-2024-01", range_module="firmware")
+    high, _, above = swept(ideal, top=0.77, firmware="authors-2024-01", range_module="firmware")
+    low, _, under = swept(ideal, top=0.72, firmware="authors-2024-01", range_module="firmware")
     assert high["z_m"][above].mean() - low["z_m"][under].mean() == pytest.approx(0.05, abs=0.015)
 
 
 @pytest.mark.parametrize("firmware", settings.names())
-def test_a_module_that_knows_the_floor_keeps_the_height_over_any_platform(quiet, firmware):
-    log, before, over = swept(quiet, top=0.4, firmware=firmware, range_module="map")
+def test_a_module_that_knows_the_floor_keeps_the_height_over_any_platform(ideal, firmware):
+    log, before, over = swept(ideal, top=0.4, firmware=firmware, range_module="map")
     assert log["z_m"][over].mean() == pytest.approx(log["z_m"][before].mean(), abs=0.03)
 
 
-def test_without_a_module_the_authors_firmware_climbs_too(quiet):
-    log, _, over = swept(quiet, top=0.3, firmware="authors-2024-01", range_module="none")
+def test_without_a_module_the_authors_firmware_climbs_too(ideal):
+    log, _, over = swept(ideal, top=0.3, firmware="authors-2024-01", range_module="none")
     assert log["z_m"][over].mean() > 1.0
 
 
@@ -91,12 +91,12 @@ def test_the_estimate_follows_the_truth(vehicle, firmware):
     assert np.degrees(rms[4:]).max() < 1.0
 
 
-def test_readings_come_when_the_firmware_reads_them(quiet):
+def test_readings_come_when_the_firmware_reads_them(ideal):
     """Down range every 25 ms, flow every 10 ms, at ticks of their own; a delay makes them older by itself."""
     plan = scenario.draw_flight(scenario.load("hover"), 0, 0)
 
     def looks(**fields):
-        stepper = Stepper(plan, quiet, 0, 0, ())
+        stepper = Stepper(plan, ideal, 0, 0, ())
         for name, value in fields.items():
             stepper.plant[name] = value
         stepper.begin(plan.setpoints[0])
@@ -111,11 +111,11 @@ def test_readings_come_when_the_firmware_reads_them(quiet):
     assert looks(range_delay=0.05)[1] - age == pytest.approx(0.05, abs=0.005)
 
 
-def test_errors_of_the_down_range_act_where_they_should(quiet):
+def test_errors_of_the_down_range_act_where_they_should(ideal):
     plan = scenario.draw_flight(scenario.load("hover"), 0, 0)
 
     def hovering(**fields):
-        stepper = Stepper(plan, quiet, 0, 0, ())
+        stepper = Stepper(plan, ideal, 0, 0, ())
         for name, value in fields.items():
             stepper.plant[name] = value
         stepper.begin(plan.setpoints[0])
@@ -130,12 +130,12 @@ def test_errors_of_the_down_range_act_where_they_should(quiet):
     assert dipped == height  # no edge, no dip
 
 
-def test_late_flow_makes_the_velocity_loop_ring(quiet):
+def test_late_flow_makes_the_velocity_loop_ring(ideal):
     """The estimate of the velocity lags, and steps of the set-point overshoot more."""
     plan = scenario.draw_flight(scenario.parse(PLATFORM.format(choice="", top=0.0), "flat"), 0, 0)
 
     def overshoot(delay):
-        stepper = Stepper(plan, quiet, 0, 0, ())
+        stepper = Stepper(plan, ideal, 0, 0, ())
         stepper.plant["flow_delay"] = delay
         stepper.begin(plan.setpoints[0])
         table = np.zeros((1250, 33))
@@ -163,15 +163,15 @@ def test_set_points_reach_the_firmware_in_its_modes():
     assert out["mode"].tolist() == [0] * 6 and out["thrust"] == 0.0
 
 
-@pytest.mark.parametrize(("line", "said"), [
+@pytest.mark.parametrize(("line", "message"), [
     ('firmware = "2025.01"', "no firmware '2025.01'; did you mean 2026.08"),
     ('firmware = "zzz"', "no firmware 'zzz'; known: 2026.08, authors-2024-01"),
     ('firmware = "mine.toml"', "no such firmware file"),
     ("firmware = 3", "text in quotes"),
     ('range_module = "laser"', "one of map, platform, none, firmware")])
-def test_unknown_choices_get_one_clear_line(line, said):
+def test_unknown_choices_get_one_clear_line(line, message):
     for parse, text in ((scenario.parse, PLATFORM.format(choice=line, top=0.0)), (vehicles.parse, VEHICLE + line)):
-        with pytest.raises(AirTouchError, match=said) as error:
+        with pytest.raises(AirTouchError, match=message) as error:
             parse(text, "mine")
         assert "\n" not in str(error.value) and str(error.value).startswith("mine")
 
@@ -188,13 +188,13 @@ rotor_radius_m = 0.02
 """
 
 
-def test_a_firmware_of_ones_own_is_a_small_file(tmp_path, quiet, hover):
+def test_a_firmware_of_ones_own_is_a_small_file(tmp_path, ideal, hover):
     path = tmp_path / "slow.toml"
     path.write_text('base = "2026.08"\n[loops.position_z]\np = 1.0\n')
-    mine = replace(quiet, firmware=str(path))
+    mine = replace(ideal, firmware=str(path))
     assert flight.prepare(mine, ())[0][0]["firmware"]["loops"][settings.POSITION_Z]["p"] == 1.0
-    slow, plain = flight.fly(hover, mine, 0, 0), flight.fly(hover, replace(quiet, firmware="2026.08"), 0, 0)
-    assert slow["z_m"][:250].max() < plain["z_m"][:250].max()
+    slow, stock = flight.fly(hover, mine, 0, 0), flight.fly(hover, replace(ideal, firmware="2026.08"), 0, 0)
+    assert slow["z_m"][:250].max() < stock["z_m"][:250].max()
 
 
 def test_on_a_crazyflie_the_firmware_flies_unscaled():

@@ -25,7 +25,7 @@ def peer():
 
 
 @pytest.fixture(scope="module")
-def same(vehicle, peer):
+def same_vehicle(vehicle, peer):
     """Our vehicle with their parameters."""
     p = peer[1]
     return replace(vehicle, mass_kg=p["mass"], inertia_kg_m2=(p["Ixx"], p["Iyy"], p["Izz"]),
@@ -47,14 +47,14 @@ def commands(hover):
                              climb + roll + pitch - yaw, climb + roll - pitch + yaw], axis=1)
 
 
-def theirs(peer, given, aero):
+def theirs(peer, commands, aero):
     """(steps, 10): position, velocity and quaternion (w first) after each step."""
     kind, parameters = peer
     state = {"x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0, 0, 1]), "w": np.zeros(3),
-             "wind": np.zeros(3), "rotor_speeds": np.full(4, given[0].mean())}
+             "wind": np.zeros(3), "rotor_speeds": np.full(4, commands[0].mean())}
     craft = kind(parameters, state, aero=aero, integrator_kwargs={"rtol": 1e-8, "atol": 1e-10})
     rows = []
-    for command in given:
+    for command in commands:
         back = np.empty(4)
         back[ORDER] = command
         state = craft.step(state, {"cmd_motor_speeds": back}, STEP_S)
@@ -62,15 +62,15 @@ def theirs(peer, given, aero):
     return np.array(rows)
 
 
-def ours(vehicle, given, drag=None):
+def ours(vehicle, commands, drag=None):
     """The same from our rigid body; drag: the effect that is on, or none."""
     plant, body = from_vehicle(vehicle), np.zeros(1, rigid_body.BODY)
     plant["step"] = STEP_S
     state, speed = body["state"][0], body["rotor_speed"][0]
-    state[6], speed[:], body["gain"] = 1.0, given[0].mean(), plant["gain"]
+    state[6], speed[:], body["gain"] = 1.0, commands[0].mean(), plant["gain"]
     s, rows = np.zeros((1, at.COUNT)), []
     s[:, at.HOVER_SPEED] = hover_speed(plant)
-    for command in given:
+    for command in commands:
         body["target_speed"] = command
         if drag is not None:
             s[0, at.ROTOR_SPEED:at.ROTOR_SPEED + 4] = speed
@@ -91,18 +91,18 @@ def thrust_axis(rows):
 
 
 @pytest.mark.parametrize("drag", [False, True])
-def test_trajectories_agree_within_one_percent(peer, same, drag):
+def test_trajectories_agree_within_one_percent(peer, same_vehicle, drag):
     # k_z at the hubs also damps roll and pitch, which `rotor_drag` leaves out: drag in the plane is compared
     kind, parameters = peer[0], {**peer[1], "k_z": 0.0}
-    hover = hover_speed(from_vehicle(same))
+    hover = hover_speed(from_vehicle(same_vehicle))
     horizontal = 4.0 * parameters["k_d"] * hover
     active = effects.activate({"rotor_drag": {"horizontal": horizontal}})[0] if drag else None
-    given = commands(hover)
-    them, us = theirs((kind, parameters), given, drag), ours(same, given, active)
-    apart = np.linalg.norm(them[:, :3] - us[:, :3], axis=1).max() / path_length(them)
+    pwm = commands(hover)
+    them, us = theirs((kind, parameters), pwm, drag), ours(same_vehicle, pwm, active)
+    deviation = np.linalg.norm(them[:, :3] - us[:, :3], axis=1).max() / path_length(them)
     tilt = np.arccos(np.clip((thrust_axis(them) * thrust_axis(us)).sum(axis=1), -1, 1)).max()
     largest = np.arccos(thrust_axis(them)[:, 2]).max()
     assert path_length(them) > 2.0 and largest > np.deg2rad(20)
-    assert apart < 0.01
+    assert deviation < 0.01
     if not drag:  # with it, RotorPy's hubs damp the yaw as well
-        assert apart < 1e-6 and tilt < 1e-4 * largest
+        assert deviation < 1e-6 and tilt < 1e-4 * largest

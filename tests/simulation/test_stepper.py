@@ -15,22 +15,22 @@ def test_pieces_equal_the_whole(name):
     plan = scenario.draw_flight(scenario.load(name), 5, 2)
     rows = min(len(plan.setpoints), 1500)
 
-    def flown(sizes):
+    def fly_in_pieces(sizes):
         stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan))
-        table, done = np.full((rows, log_row.COLUMNS), np.nan), 0
+        table, row = np.full((rows, log_row.COLUMNS), np.nan), 0
         stepper.begin(plan.setpoints[0])
-        while done < rows:
-            size = min(next(sizes), rows - done)
-            ending, filled = stepper.fly(plan.setpoints[done:done + size], table[done:done + size])
+        while row < rows:
+            size = min(next(sizes), rows - row)
+            ending, filled = stepper.fly(plan.setpoints[row:row + size], table[row:row + size])
             assert (ending, filled) == (loop.OK, size)
-            done += size
+            row += size
         return table
 
-    whole = flown(iter([rows]))
-    assert np.ptp(whole[:, log_row.POSITION + 2]) > 0.3  # it does fly
+    at_once = fly_in_pieces(iter([rows]))
+    assert np.ptp(at_once[:, log_row.POSITION + 2]) > 0.3  # it does fly
     rng = np.random.default_rng(1)
     for sizes in (iter(lambda: 1, 0), iter(lambda: int(rng.integers(1, 40)), 0)):
-        np.testing.assert_array_equal(flown(sizes), whole)
+        np.testing.assert_array_equal(fly_in_pieces(sizes), at_once)
 
 
 def test_a_second_flight_begins_with_the_rotors_of_the_first():

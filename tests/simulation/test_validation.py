@@ -38,8 +38,8 @@ def settled(name, flights):
     speed[fine] = np.nanmean(rpm[fine], axis=1) * np.pi / 30.0
     thrust = d["weight_g"] * GRAM_N / 4 if "weight_g" in d else np.full(len(pwm), np.nan)
     if name == "steps":
-        held = np.array([i >= 60 and np.ptp(pwm[i - 60:i + 1]) == 0 for i in range(len(pwm))])
-        fine &= held
+        constant = np.array([i >= 60 and np.ptp(pwm[i - 60:i + 1]) == 0 for i in range(len(pwm))])
+        fine &= constant
     if name != "ramp":
         return pwm[fine], volts[fine], thrust[fine], speed[fine]
     top = np.argmax(pwm)
@@ -76,29 +76,29 @@ def fitted_on(name, flights):
                    nominal_voltage_v=3.8, voltage_exponent=1.25, thrust_per_speed2=float(np.mean(thrust / speed**2)))
 
 
-@pytest.mark.parametrize(("fitted", "tested"), [("ramp", "steps"), ("steps", "ramp")])
-def test_thrust_and_rpm_fitted_on_one_stand_hold_on_another(flights, fitted, tested):
-    vehicle = fitted_on(fitted, flights)
-    pwm, volts, thrust, speed = settled(tested, flights)
-    got = speeds(vehicle, pwm, volts)
-    assert rms(vehicle.thrust_per_speed2 * got**2, thrust) < 0.03
-    assert rms(got, speed) < 0.03
+@pytest.mark.parametrize(("fit_stand", "test_stand"), [("ramp", "steps"), ("steps", "ramp")])
+def test_thrust_and_rpm_fitted_on_one_stand_hold_on_another(flights, fit_stand, test_stand):
+    vehicle = fitted_on(fit_stand, flights)
+    pwm, volts, thrust, speed = settled(test_stand, flights)
+    predicted = speeds(vehicle, pwm, volts)
+    assert rms(vehicle.thrust_per_speed2 * predicted**2, thrust) < 0.03
+    assert rms(predicted, speed) < 0.03
 
 
-@pytest.mark.parametrize(("fitted", "tested", "goal"), [
+@pytest.mark.parametrize(("fit_stand", "test_stand", "goal"), [
     ("ramp", "other", 0.04), ("steps", "other", 0.04), ("other", "ramp", 0.035), ("other", "steps", 0.055)])
-def test_thrust_between_laboratories_is_above_three_percent(flights, fitted, tested, goal):
+def test_thrust_between_laboratories_is_above_three_percent(flights, fit_stand, test_stand, goal):
     """Between laboratories the goal of 3 % is missed: mostly level, as rpm holds within 2 %."""
-    vehicle = fitted_on(fitted, flights)
-    pwm, volts, thrust, speed = settled(tested, flights)
-    got = speeds(vehicle, pwm, volts)
-    assert 0.03 < rms(vehicle.thrust_per_speed2 * got**2, thrust) < goal
-    assert rms(got, speed) < 0.02
+    vehicle = fitted_on(fit_stand, flights)
+    pwm, volts, thrust, speed = settled(test_stand, flights)
+    predicted = speeds(vehicle, pwm, volts)
+    assert 0.03 < rms(vehicle.thrust_per_speed2 * predicted**2, thrust) < goal
+    assert rms(predicted, speed) < 0.02
 
 
-@pytest.mark.parametrize("fitted", ["ramp", "steps"])
-def test_rpm_holds_on_a_stand_of_other_people_with_other_batteries(flights, fitted):
-    pwm, volts, thrust, speed = settled(fitted, flights)
+@pytest.mark.parametrize("stand", ["ramp", "steps"])
+def test_rpm_holds_on_a_stand_of_other_people_with_other_batteries(flights, stand):
+    pwm, volts, thrust, speed = settled(stand, flights)
     k = float(np.mean(thrust / speed**2))
     vehicle = replace(vehicles.load("crazyflie-2.1"), thrust_of_pwm_n=curve(pwm, volts, k * speed**2, 1.25),
                       nominal_voltage_v=3.8, voltage_exponent=1.25, thrust_per_speed2=k)
@@ -109,7 +109,7 @@ def test_rpm_holds_on_a_stand_of_other_people_with_other_batteries(flights, fitt
 STEP_S = 0.002
 
 
-def flown(flights, name):
+def in_the_air(flights, name):
     """A recorded flight on an even 2 ms grid, and where no gap was within 0.3 s before."""
     log = logs.read(flights / "imrclab" / f"brushed_{name}.csv.gz")
     t = log["t_s"]
@@ -118,9 +118,9 @@ def flown(flights, name):
     last = np.searchsorted(t, even, side="right") - 1
     columns |= {k: log[k][last] for k in PWM}
     gap = np.diff(t, append=t[-1] + STEP_S)[last] > 0.01
-    good = np.convolve(gap, np.ones(150))[:len(even)] == 0
-    good[:300] = False
-    return FlightLog(columns, log.meta), good
+    usable = np.convolve(gap, np.ones(150))[:len(even)] == 0
+    usable[:300] = False
+    return FlightLog(columns, log.meta), usable
 
 
 def replayed(log, scale, bend, lag, delay):
@@ -140,25 +140,25 @@ def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
     level is taken out: it is the battery's. The fast flights are tested; in the slow ones noise is
     most of the signal.
     """
-    training = [flown(flights, n) for n in ("jana20", "jana27")]
+    training = [in_the_air(flights, n) for n in ("jana20", "jana27")]
 
     def cost(x):
-        return sum(np.var((log["acc_z_mps2"] - replayed(log, *x)[0])[good]) for log, good in training)
+        return sum(np.var((log["acc_z_mps2"] - replayed(log, *x)[0])[usable]) for log, usable in training)
 
     best = minimize(cost, (0.9, 0.8, 0.03, 0.015), method="Nelder-Mead", options={"maxiter": 70}).x
     assert 0.0 < best[2] < 0.12
     for name in ("jana28",):
-        log, good = flown(flights, name)
+        log, usable = in_the_air(flights, name)
         force, speed = replayed(log, *best)
-        error = (log["acc_z_mps2"] - force)[good]
-        assert 1 - np.var(error) / np.var(log["acc_z_mps2"][good]) > 0.9
-    per_rpm = [np.mean(replayed(log, *best)[1][good, 1:], axis=0) / log.stack(("rpm_2", "rpm_3",
-            "rpm_4"))[good].mean(0)
-               for log, good in training]
+        error = (log["acc_z_mps2"] - force)[usable]
+        assert 1 - np.var(error) / np.var(log["acc_z_mps2"][usable]) > 0.9
+    per_rpm = [np.mean(replayed(log, *best)[1][usable, 1:], axis=0) / log.stack(("rpm_2", "rpm_3",
+            "rpm_4"))[usable].mean(0)
+               for log, usable in training]
     for name in ("jana23", "jana28"):
-        log, good = flown(flights, name)
-        got = replayed(log, *best)[1][good, 1:] / np.mean(per_rpm, axis=0)
-        assert rms(got, log.stack(("rpm_2", "rpm_3", "rpm_4"))[good]) < 0.05
+        log, usable = in_the_air(flights, name)
+        ratio = replayed(log, *best)[1][usable, 1:] / np.mean(per_rpm, axis=0)
+        assert rms(ratio, log.stack(("rpm_2", "rpm_3", "rpm_4"))[usable]) < 0.05
 
 
 @pytest.mark.parametrize(("name", "letter"), [("cal_A_0", "a"), ("cal_A_1", "a"), ("cal_B_0", "b"),
@@ -169,14 +169,14 @@ def test_other_peoples_simulators_are_replayed_to_their_sensor_noise(flights, na
     vehicle = vehicles.load(flights / "peers" / f"vehicle_{letter}.toml")
     flying = (log["z_m"] > 0.1) & (log.stack(PWM).mean(1) > 15000)
     result = replay.run(log, vehicle)
-    left = (log.stack(ACC) - result.specific_force)[flying]
-    np.testing.assert_allclose(left.std(0), vehicle.acc_noise_rms_mps2, rtol=0.08)
-    np.testing.assert_allclose(left.mean(0), 0.0, atol=0.01)
+    noise = (log.stack(ACC) - result.specific_force)[flying]
+    np.testing.assert_allclose(noise.std(0), vehicle.acc_noise_rms_mps2, rtol=0.08)
+    np.testing.assert_allclose(noise.mean(0), 0.0, atol=0.01)
     # rates over 0.1 s from the motors alone: correlation, and what is left against the gyro's own noise
-    turned = np.cumsum(result.angular_acceleration, axis=0) * 0.01
+    rates = np.cumsum(result.angular_acceleration, axis=0) * 0.01
     at = np.flatnonzero(flying)[:-10]
     gyro = log.stack(GYRO)
-    model, measured = (turned[at + 10] - turned[at])[:, :2], (gyro[at + 10] - gyro[at])[:, :2]
+    model, measured = (rates[at + 10] - rates[at])[:, :2], (gyro[at + 10] - gyro[at])[:, :2]
     for axis in range(2):
         assert np.corrcoef(model[:, axis], measured[:, axis])[0, 1] > 0.99
     assert np.all((model - measured).std(0) < 2.1 * np.sqrt(2) * vehicle.gyro_noise_rms_radps)

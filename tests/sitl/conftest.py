@@ -51,12 +51,12 @@ class Bench:
 @pytest.fixture
 def bench():
     """bench(scenario, ...): a Bench."""
-    made = []
+    servers = []
 
     def make(scenario="hover", **settings):
-        made.append(Server(scenario, port=0, **settings))
-        return Bench(made[-1])
+        servers.append(Server(scenario, port=0, **settings))
+        return Bench(servers[-1])
 
     yield make
-    for server in made:
-        server.close()
+    for open_server in servers:
+        open_server.close()

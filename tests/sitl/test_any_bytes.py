@@ -49,10 +49,10 @@ def test_no_datagram_breaks_the_server():
     draw = random.Random(0)
     with serve("hover", port=0, speed=5.0) as virtual:
         def client():
-            made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            made.connect(("127.0.0.1", virtual.port))
-            made.settimeout(ASK_S)
-            return made
+            sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            sender.connect(("127.0.0.1", virtual.port))
+            sender.settimeout(ASK_S)
+            return sender
 
         for _ in range(5):
             with client() as noisy:  # gone before it gets its answers

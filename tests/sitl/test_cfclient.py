@@ -71,13 +71,13 @@ def test_headless_client_log_configurations_and_log_files(tmp_path):
     environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path),
                    "QT_QPA_PLATFORM": "offscreen"}
     with serve("hover", port=0, without=["gust"]) as virtual:
-        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri, str(HANG_S)], env=environment, timeout=HANG_S,
-                              capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr[-2000:]
+        process = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri, str(HANG_S)], env=environment,
+                                 timeout=HANG_S, capture_output=True, text=True)
+        assert process.returncode == 0, process.stderr[-2000:]
         assert virtual.drone.took_off_s is not None
-    told = json.loads(done.stderr.strip().splitlines()[-1])
-    assert told["names"] == ["stabilizer.pitch", "stabilizer.roll", "stabilizer.yaw"]
-    header, *lines = told["files"][0].splitlines()
+    report = json.loads(process.stderr.strip().splitlines()[-1])
+    assert report["names"] == ["stabilizer.pitch", "stabilizer.roll", "stabilizer.yaw"]
+    header, *lines = report["files"][0].splitlines()
     assert header == "Timestamp,stabilizer.roll,stabilizer.pitch,stabilizer.yaw"
     stamps = [int(line.split(",")[0]) for line in lines]
     assert len(stamps) > 15 and {b - a for a, b in pairwise(stamps)} == {20}

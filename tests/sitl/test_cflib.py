@@ -67,14 +67,14 @@ def test_a_block_that_is_too_large_is_refused(craft):
     from cflib.crazyflie.log import LogConfig
 
     virtual, cf = craft
-    refused = LogConfig("refused", 10)
+    too_large = LogConfig("refused", 10)
     for name in ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"):
-        refused.add_variable(name, "float")
-    cf.log.add_config(refused)
-    refused.variables += refused.variables[:1]
+        too_large.add_variable(name, "float")
+    cf.log.add_config(too_large)
+    too_large.variables += too_large.variables[:1]
     errors = []
-    refused.error_cb.add_callback(lambda block, text: errors.append(text))
-    refused.start()
+    too_large.error_cb.add_callback(lambda block, text: errors.append(text))
+    too_large.start()
     assert virtual.clock.wait_for(lambda: errors) == ["Block too large"]
 
 
@@ -104,17 +104,17 @@ def test_clients_come_and_go(cflib, tmp_path):
                 rows = []
                 log_block(cf, "one", 10, {"pm.vbat": "float"}, rows)
                 wait_for(lambda rows=rows: len(rows) > 5)
-                said = []
-                cf.console.receivedChar.add_callback(said.append)
+                console = []
+                cf.console.receivedChar.add_callback(console.append)
                 line = "hello, a long line on the console of the drone"
                 virtual.firmware.say(line)
-                wait_for(lambda said=said, line=line: line + "\n" in "".join(said))
+                wait_for(lambda console=console, line=line: line + "\n" in "".join(console))
         with connected(virtual.uri) as cf:
             wait_for(lambda: cf.link_statistics.latency.latency > 0.0)
             assert "Can fly" in cf.supervisor.read_state_list()
 
 
-def test_scan_finds_it(cflib, monkeypatch):
+def test_cflibs_scan_finds_the_virtual_drone(cflib, monkeypatch):
     from cflib.crtp import udpdriver
 
     with serve("hover", port=0) as virtual:
@@ -149,9 +149,9 @@ def test_sweep_over_a_platform_is_felt(monkeypatch):
         assert (np.diff(stamps) == 10).all()
         over = (x > start + 0.1) & (x < end - 0.1)
         assert np.median(down[over]) < 90 and np.median(down[(x > 0.5) & (x < start - 0.1)]) > 600
-        counted = np.flatnonzero(np.diff(edges) == 1)
-        assert len(counted) >= 2  # in and out again
-        assert any(start <= x[i] <= end + 0.7 for i in counted)
+        samples = np.flatnonzero(np.diff(edges) == 1)
+        assert len(samples) >= 2  # in and out again
+        assert any(start <= x[i] <= end + 0.7 for i in samples)
         assert rows[-1][1]["airtouch.edge"] in (1, 2) and rows[-1][1]["airtouch.health"] == 0
         # its down range reads short near the floor: let go a little above
         assert virtual.drone.height_over_floor < 0.05

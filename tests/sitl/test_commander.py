@@ -35,8 +35,8 @@ class Drone:
         """The last of the rows of these seconds."""
         for _ in range(round(seconds / PERIOD_S)):
             self.t += PERIOD_S
-            flown = self.commander.setpoint(self.t, self.estimate)
-        return flown
+            set_point = self.commander.setpoint(self.t, self.estimate)
+        return set_point
 
 
 @pytest.mark.parametrize("protocol", [8, 12])  # cflib turns the sign of the yaw rate for firmware that wants it so
@@ -46,30 +46,30 @@ def test_a_hover_is_flown_in_body_axes(protocol):
         warnings.simplefilter("ignore")
         for _ in range(10):
             drone.client.send_hover_setpoint(0.3, 0.1, 30.0, 0.5)
-            flown = drone.fly(0.1)
-    assert flown[row.MODE] == row.FLY and flown[row.MOTORS] == 1.0 and flown[row.Z] == pytest.approx(0.5)
-    assert flown[[row.VX, row.VY]] == pytest.approx([-0.1, 0.3])  # forward is world y, left is minus world x
-    assert np.degrees(flown[row.YAW]) == pytest.approx(90.0 + 30.0)
+            set_point = drone.fly(0.1)
+    assert set_point[row.MODE] == row.FLY and set_point[row.MOTORS] == 1.0 and set_point[row.Z] == pytest.approx(0.5)
+    assert set_point[[row.VX, row.VY]] == pytest.approx([-0.1, 0.3])  # forward is world y, left is minus world x
+    assert np.degrees(set_point[row.YAW]) == pytest.approx(90.0 + 30.0)
 
 
 def test_a_velocity_is_flown_in_world_axes_and_climbs():
     drone = Drone()
     for _ in range(10):
         drone.client.send_velocity_world_setpoint(0.3, 0.1, 0.2, 0.0)
-        flown = drone.fly(0.1)
-    assert flown[[row.VX, row.VY]] == pytest.approx([0.3, 0.1]) and flown[row.Z] == pytest.approx(0.4 + 0.2)
+        set_point = drone.fly(0.1)
+    assert set_point[[row.VX, row.VY]] == pytest.approx([0.3, 0.1]) and set_point[row.Z] == pytest.approx(0.4 + 0.2)
     for _ in range(50):
         drone.client.send_velocity_world_setpoint(0.0, 0.0, 0.2, 0.0)
-        flown = drone.fly(0.1)
-    assert flown[row.Z] == pytest.approx(0.4 + 0.5)  # it never runs away from a drone that does not follow
+        set_point = drone.fly(0.1)
+    assert set_point[row.Z] == pytest.approx(0.4 + 0.5)  # it never runs away from a drone that does not follow
 
 
 def test_a_position_is_held():
     drone = Drone()
     drone.client.send_position_setpoint(0.7, -0.2, 0.9, 45.0)
-    flown = drone.fly()
-    assert flown[row.MODE] == row.HOLD and flown[[row.X, row.Y, row.Z]] == pytest.approx([0.7, -0.2, 0.9])
-    assert np.degrees(flown[row.YAW]) == pytest.approx(45.0)
+    set_point = drone.fly()
+    assert set_point[row.MODE] == row.HOLD and set_point[[row.X, row.Y, row.Z]] == pytest.approx([0.7, -0.2, 0.9])
+    assert np.degrees(set_point[row.YAW]) == pytest.approx(45.0)
 
 
 def test_without_packets_it_levels_out_and_then_stops():
@@ -98,6 +98,6 @@ def test_thrust_is_locked_until_it_was_zero():
     assert drone.fly()[row.MOTORS] == 0.0
     drone.client.send_setpoint(0.0, 0.0, 0.0, 0)
     drone.client.send_setpoint(5.0, 60.0, 0.0, 40000)
-    flown = drone.fly()
-    assert (flown[row.MODE], flown[row.MOTORS], flown[row.Z]) == (row.TILT_THRUST, 1.0, 40000.0)
-    assert flown[[row.VX, row.VY]] == pytest.approx([5.0, 30.0])  # degrees; the pitch is limited
+    set_point = drone.fly()
+    assert (set_point[row.MODE], set_point[row.MOTORS], set_point[row.Z]) == (row.TILT_THRUST, 1.0, 40000.0)
+    assert set_point[[row.VX, row.VY]] == pytest.approx([5.0, 30.0])  # degrees; the pitch is limited

@@ -19,11 +19,11 @@ HOVER, POSITION, VELOCITY, Z_DISTANCE, MANUAL, STOP = 10, 7, 8, 9, 11, 0
 QUIET = {"without": ["gust"]}
 
 
-def keep(craft, seconds, kind, *values, every=0.1):
+def keep(craft, seconds, kind, *values, period_s=0.1):
     """Repeat a set-point as a client does."""
-    for _ in range(round(seconds / every)):
+    for _ in range(round(seconds / period_s)):
         craft.take(GENERIC, 0, bytes([kind]) + struct.pack("<ffff", *values))
-        craft.fly(every)
+        craft.fly(period_s)
 
 
 def place(craft):
@@ -37,8 +37,8 @@ def test_hover_set_points_follow_the_nose(bench):
     assert math.degrees(craft.drone.row[25]) == pytest.approx(90.0, abs=8.0)
     before = place(craft)
     keep(craft, 3.0, HOVER, 0.3, 0.0, 0.0, 0.5)
-    moved = place(craft) - before
-    assert moved[1] == pytest.approx(0.9, abs=0.3) and abs(moved[0]) < 0.35
+    displacement = place(craft) - before
+    assert displacement[1] == pytest.approx(0.9, abs=0.3) and abs(displacement[0]) < 0.35
     assert craft.height == pytest.approx(0.5, abs=0.12)
 
 
@@ -49,8 +49,8 @@ def test_position_and_velocity_set_points(bench):
     np.testing.assert_allclose(craft.drone.estimate[6:9], [0.5, -0.5, 0.6], atol=0.12)
     before = place(craft)
     keep(craft, 2.0, VELOCITY, -0.2, 0.0, 0.2, 0.0)
-    moved = place(craft) - before
-    assert moved[0] < -0.2 and moved[2] == pytest.approx(0.4, abs=0.15)
+    displacement = place(craft) - before
+    assert displacement[0] < -0.2 and displacement[2] == pytest.approx(0.4, abs=0.15)
 
 
 def test_tilts_push_the_right_way(bench):
@@ -84,9 +84,9 @@ def test_watchdog_levels_out_and_then_stops(bench):
     craft.take(GENERIC, 0, bytes([HOVER]) + struct.pack("<ffff", 0.4, 0.0, 0.0, 0.6))
     craft.fly(0.6)
     assert craft.drone.commander.levelled and craft.drone.motors_on
-    sent = craft.fly(3.0)
+    packets = craft.fly(3.0)
     assert craft.drone.state == LOCKED and not craft.drone.motors_on
-    assert b"".join(p.data for p in sent if p.port == CONSOLE).count(b"Locked, reboot required") == 1
+    assert b"".join(p.data for p in packets if p.port == CONSOLE).count(b"Locked, reboot required") == 1
     keep(craft, 0.5, HOVER, 0.0, 0.0, 0.0, 0.6)
     assert not craft.drone.motors_on
 
@@ -129,7 +129,7 @@ def test_a_fall_from_high_up_is_a_crash_that_can_be_recovered_from(bench):
 
 
 @pytest.mark.parametrize("port, channel, data", [(SUPERVISOR, 1, [3]), (LOCALIZATION, 1, [3])])
-def test_emergency_stop(bench, port, channel, data):
+def test_an_emergency_stop_drops_the_drone(bench, port, channel, data):
     craft = bench(**QUIET)
     craft.take_off(0.3)
     craft.take(port, channel, data)
@@ -137,7 +137,7 @@ def test_emergency_stop(bench, port, channel, data):
     assert not craft.drone.motors_on and craft.height < 0.05 and not bits(craft) & 1
 
 
-def test_versions(bench):
+def test_protocol_and_platform_are_those_of_a_crazyflie(bench):
     craft = bench()
     assert craft.take(PLATFORM, 1, [0])[0].data == bytes([0, 12, 0, 0, 0])
     assert craft.take(PLATFORM, 1, [2])[0].data == b"\2CF21"
@@ -164,16 +164,16 @@ def test_the_app_is_best_over_what_it_was_given(bench):
     A log that begins one sample later is another matter: `best` computes at every second sample, and the log's even
     ones are the app's odd ones. These 8 flights give the same edges within 0.1 s all the same.
     """
-    alike = 0
+    equal_flights = 0
     for flight in range(8):
         edges, logits, log = flown_with_the_app(bench("paper-4cm", flight=flight, ai_deck=False))
         trace = best.run(log)
         np.testing.assert_array_equal(trace.signals["logits"], logits)
         assert [(edge.sample, edge.kind) for edge in trace.edges] == edges and len(edges) >= 2
         later = best.run(FlightLog({name: values[1:] for name, values in log.columns.items()}, log.meta)).edges
-        alike += ([edge.kind for edge in later] == [kind for _, kind in edges] and
-                  all(abs(edge.sample + 1 - at) <= 10 for edge, (at, _) in zip(later, edges, strict=True)))
-    assert alike == 8
+        equal_flights += ([edge.kind for edge in later] == [kind for _, kind in edges] and
+                          all(abs(edge.sample + 1 - at) <= 10 for edge, (at, _) in zip(later, edges, strict=True)))
+    assert equal_flights == 8
 
 
 def flown_with_the_app(craft):
@@ -222,11 +222,11 @@ def without_heading(acc_world, quaternion):
     return cosine * ax + sine * ay, cosine * ay - sine * ax, az
 
 
-@pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]},
-                                   {"faults": ["rain=1"]}, {"faults": ["disconnect=3"]},
-                                   {"record": "/nowhere/at/all.csv"}])
-def test_wrong_settings_are_named(wrong):
-    settings = {"port": 0, **wrong}
+@pytest.mark.parametrize("setting", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]},
+                                     {"faults": ["rain=1"]}, {"faults": ["disconnect=3"]},
+                                     {"record": "/nowhere/at/all.csv"}])
+def test_wrong_settings_are_named(setting):
+    settings = {"port": 0, **setting}
     if "record" in settings:
         settings["record"] = Path(settings["record"])
     with pytest.raises(AirTouchError) as error:

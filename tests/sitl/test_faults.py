@@ -19,7 +19,7 @@ from simulated_link import simulated
     ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,all", Fault("loss", amount=0.3, all_packets=True)),
     ("late=50ms", Fault("late", amount=0.05)), ("disconnect=3,5s", Fault("disconnect", 3.0, 5.0)),
     ("gap8-reset=2.5s", Fault("gap8-reset", 2.5)), ("low-battery=start", Fault("low-battery"))])
-def test_written_faults(text, fault):
+def test_a_fault_is_parsed_from_its_text(text, fault):
     assert parse(text) == fault
 
 
@@ -32,8 +32,8 @@ def test_badly_written_faults_are_named(text):
 
 def test_a_lossy_line_loses_that_share():
     log, answer = Packet(LOG, 2, b"1234"), Packet(PARAM, 1, b"123")
-    for fault, kept in (("loss=0.3", (0.7, 1.0)), ("loss=0.3,all", (0.7, 0.7))):
-        for packet, share in zip((log, answer), kept, strict=True):
+    for fault, shares in (("loss=0.3", (0.7, 1.0)), ("loss=0.3,all", (0.7, 0.7))):
+        for packet, share in zip((log, answer), shares, strict=True):
             line = Line([parse(fault)], np.random.default_rng(0))
             for _ in range(5000):
                 line.put(packet, None, 0.0)
@@ -47,7 +47,7 @@ def test_a_late_line_keeps_the_order():
         line.put(Packet(CONSOLE, 0, struct.pack("<H", tick)), None, 0.01 * tick)
         for packet, _ in line.ready(0.01 * tick):
             arrived[struct.unpack("<H", packet.data)[0]] = 0.01 * tick
-    delays = [at - 0.01 * sent for sent, at in arrived.items()]
+    delays = [at - 0.01 * number for number, at in arrived.items()]
     assert list(arrived) == sorted(arrived) and len(arrived) > 490
     assert max(delays) <= 0.06 and np.mean(delays) > 0.02
 
@@ -116,7 +116,7 @@ def test_without_an_ai_deck_the_stm32_does_it(bench):
     assert craft.firmware.param.values["deck.bcAI"] == 0
 
 
-def test_low_battery(bench):
+def test_a_low_battery_warns_before_the_drone_falls(bench):
     craft, pass_ = flying(bench, "low-battery=3")
     before = craft.drone.row[16]
     pass_(1.0)

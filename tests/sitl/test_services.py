@@ -82,11 +82,11 @@ def test_blocks_run_at_their_period(bench):
     craft.log(START, 1, 1)
     craft.log(START, 2, 5)
     assert craft.take(LOG, 1, struct.pack("<BBH", 8, 3, 20))[0].data[2] == 0  # version 2: milliseconds
-    sent = [p for p in craft.fly(1.0) if p.port == LOG]
-    stamps = {n: [int.from_bytes(p.data[1:4], "little") for p in sent if p.data[0] == n] for n in (1, 2, 3)}
+    packets = [p for p in craft.fly(1.0) if p.port == LOG]
+    stamps = {n: [int.from_bytes(p.data[1:4], "little") for p in packets if p.data[0] == n] for n in (1, 2, 3)}
     assert [len(stamps[n]) for n in (1, 2, 3)] == [100, 20, 50]
     assert [set(np.diff(stamps[n])) for n in (1, 2, 3)] == [{10}, {50}, {20}]
-    assert struct.unpack("<f", sent[0].data[4:])[0] == pytest.approx(1.0, abs=0.2)
+    assert struct.unpack("<f", packets[0].data[4:])[0] == pytest.approx(1.0, abs=0.2)
     craft.log(STOP, 1)
     craft.log(DELETE, 2)
     assert {p.data[0] for p in craft.fly(0.2) if p.port == LOG} == {3}
@@ -112,7 +112,7 @@ def test_quaternions_survive_compression():
     rng = np.random.default_rng(0)
     q = rng.normal(size=(200, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
-    back = decompress(np.array([compress(tuple(one)) for one in q]))
+    back = decompress(np.array([compress(tuple(quaternion)) for quaternion in q]))
     assert np.abs(np.sum(q * back, axis=1)).min() > 0.9999
 
 
@@ -123,8 +123,8 @@ def test_parameters_and_their_errors(bench):
     def number(name):
         return struct.pack("<H", ids[name])
 
-    read = craft.take(PARAM, 1, number("pm.lowVoltage"))[0]
-    assert read.data == number("pm.lowVoltage") + b"\0" + struct.pack("<f", 3.2)
+    reply = craft.take(PARAM, 1, number("pm.lowVoltage"))[0]
+    assert reply.data == number("pm.lowVoltage") + b"\0" + struct.pack("<f", 3.2)
     missing = struct.pack("<H", 999)
     assert craft.take(PARAM, 1, missing)[0].data == missing + bytes([errno.ENOENT])
     assert craft.take(PARAM, 2, missing + b"\1")[0].data == missing + bytes([errno.ENOENT])
@@ -133,8 +133,8 @@ def test_parameters_and_their_errors(bench):
     for command in (7, 2):  # extended type
         assert craft.take(PARAM, 3, bytes([command]) + missing)[0].data[3] == errno.ENOENT
     assert craft.take(PARAM, 3, bytes([7]) + number("pm.lowVoltage"))[0].data[3:] == b"\0\1"
-    written = number("pm.lowVoltage") + struct.pack("<f", 3.4)
-    assert craft.take(PARAM, 2, written)[0].data == written
+    request = number("pm.lowVoltage") + struct.pack("<f", 3.4)
+    assert craft.take(PARAM, 2, request)[0].data == request
     default = craft.take(PARAM, 3, bytes([8]) + number("pm.lowVoltage"))[0].data[3:]
     assert default == b"\0" + struct.pack("<f", 3.2)
     assert craft.take(PARAM, 3, bytes([3]) + number("pm.lowVoltage"))[0].data[3:] == b"\0"  # stored

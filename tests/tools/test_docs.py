@@ -22,7 +22,7 @@ def anchors(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_somewhere(page):
+def test_each_link_leads_to_a_page_and_a_heading_that_are_there(page):
     text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.S)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if re.match(r"https?:|mailto:", target):
@@ -36,9 +36,9 @@ def test_links_lead_somewhere(page):
 
 def test_tables_of_the_readme_are_those_of_the_results():
     text = (ROOT / "README.md").read_text("utf-8")
-    shown = rows(text[text.index("## What it reaches"):text.index("## Use\n")])
+    in_readme = rows(text[text.index("## What it reaches"):text.index("## Use\n")])
     there = rows((DOCS / "results.md").read_text("utf-8"))
-    assert len(shown) > 8 and shown <= there, shown - there
+    assert len(in_readme) > 8 and in_readme <= there, in_readme - there
 
 
 def rows(text):
@@ -55,31 +55,31 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
 
     view, build, nominal = map(table, ("nothing was fitted on", "were built on.", "**Every nominal flight"))
 
-    def told(rows, truth):
-        found = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()
-                 if f"| {truth} |" in line and line.startswith("| neural") and "--partner" not in line]
-        return " of ".join(str(sum(map(int, column))) for column in zip(*found, strict=True))
+    def total(rows, truth):
+        counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()
+                  if f"| {truth} |" in line and line.startswith("| neural") and "--partner" not in line]
+        return " of ".join(str(sum(map(int, column))) for column in zip(*counts, strict=True))
 
-    every = [re.search(r"(\d+) of (\d+)", line).groups() for line in nominal.splitlines()]
-    together = " of ".join(str(sum(map(int, column))) for column in zip(*every, strict=True))
+    nominal_counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in nominal.splitlines()]
+    nominal_sum = " of ".join(str(sum(map(int, column))) for column in zip(*nominal_counts, strict=True))
     results = (DOCS / "results.md").read_text("utf-8")
     goals = page[page.index("## Goals"):page.index("## Flight by flight")].splitlines()
     for truth, sign in (("none", "same, blind"), ("ground effect", "effect named"), ("downwash", "downwash named, no")):
-        shown = "".join(line for line in goals if sign in line)
-        assert told(view, truth) in shown and told(view, truth) in results, truth
-        assert told(build, truth) in results and (truth == "none" or told(build, truth) in shown), truth
-    assert together in page[:page.index("## Flight by flight")] and together in results
+        goal_lines = "".join(line for line in goals if sign in line)
+        assert total(view, truth) in goal_lines and total(view, truth) in results, truth
+        assert total(build, truth) in results and (truth == "none" or total(build, truth) in goal_lines), truth
+    assert nominal_sum in page[:page.index("## Flight by flight")] and nominal_sum in results
 
 
 def test_every_page_can_be_reached_from_the_readme():
     linked = set(re.findall(r"\(host/docs/([\w-]+\.md)", (ROOT / "README.md").read_text("utf-8")))
-    seen, todo = set(), list(linked)
+    reached, todo = set(), list(linked)
     while todo:
         name = todo.pop()
-        if name not in seen and (DOCS / name).exists():
-            seen.add(name)
+        if name not in reached and (DOCS / name).exists():
+            reached.add(name)
             todo += re.findall(r"\(([\w-]+\.md)", (DOCS / name).read_text("utf-8"))
-    assert {p.name for p in DOCS.glob("*.md")} <= seen, {p.name for p in DOCS.glob("*.md")} - seen
+    assert {p.name for p in DOCS.glob("*.md")} <= reached, {p.name for p in DOCS.glob("*.md")} - reached
 
 
 def test_lines_are_no_longer_than_they_may():
@@ -110,12 +110,12 @@ def commands(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_of_a_page_and_their_options_exist(page):
     for words in commands(page):
-        context, group, rest = click.Context(airtouch), airtouch, words
-        while isinstance(group, click.Group) and not rest[0].startswith("-"):
-            name, group, rest = group.resolve_command(context, rest)
+        context, group, arguments = click.Context(airtouch), airtouch, words
+        while isinstance(group, click.Group) and not arguments[0].startswith("-"):
+            name, group, arguments = group.resolve_command(context, arguments)
             context = click.Context(group, info_name=name, parent=context)
         try:
-            group.make_parser(context).parse_args(list(rest))
+            group.make_parser(context).parse_args(list(arguments))
         except click.UsageError as error:
             pytest.fail(f"{page.name}: airtouch {shlex.join(words)}: {error.format_message()}")
 
@@ -138,8 +138,8 @@ def test_files_and_names_that_a_page_sends_to_are_there(name):
     for path, names in re.findall(r"`((?:[\w-]+/)+\w+\.py)`(?: \||:) ((?:`\w+`(?:, )?)+)", text):
         file = next(root / path for root in (ROOT, ROOT / "host/airtouch") if (root / path).exists())
         source = file.read_text("utf-8")
-        for wanted in re.findall(r"`(\w+)`", names):
-            assert re.search(rf"^(def |class |)?{wanted}\b|^[A-Z_, ]*\b{wanted}\b.* = ", source, re.M), (path, wanted)
+        for symbol in re.findall(r"`(\w+)`", names):
+            assert re.search(rf"^(def |class |)?{symbol}\b|^[A-Z_, ]*\b{symbol}\b.* = ", source, re.M), (path, symbol)
 
 
 def test_every_file_of_the_diagnosis_is_named_by_a_decision():

@@ -31,8 +31,8 @@ def test_a_clean_step_has_none():
 def test_the_height_loop_holds_still_and_pushes_against_a_lower_reading():
     """Nothing where the reading is the set height; over a platform the module adds its 0.75 m; 1 cm less than set
     asks for more thrust, in the end by both integrals."""
-    command, passed = edge_readings.height_loop(np.full(400, 0.8), np.zeros(400), 0.8)
-    assert np.abs(command).max() < 1e-6 and np.ptp(passed) == 0.0
+    command, heights = edge_readings.height_loop(np.full(400, 0.8), np.zeros(400), 0.8)
+    assert np.abs(command).max() < 1e-6 and np.ptp(heights) == 0.0
     over = np.r_[np.full(200, 0.8), np.full(200, 0.05)]
     assert edge_readings.height_loop(over, np.zeros(400), 0.8)[1] == pytest.approx(np.full(400, 0.8))
     low = np.r_[np.full(200, 0.8), np.full(400, 0.79)]

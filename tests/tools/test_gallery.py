@@ -12,9 +12,9 @@ pytest.importorskip("matplotlib")
 
 
 def test_every_picture_of_the_page_is_made_by_the_tool_and_small():
-    shown = re.findall(r"\(img/([\w-]+)\.png\)", (DOCS / "gallery.md").read_text("utf-8"))
-    assert len(shown) >= 5
-    for name in shown:
+    pictures = re.findall(r"\(img/([\w-]+)\.png\)", (DOCS / "gallery.md").read_text("utf-8"))
+    assert len(pictures) >= 5
+    for name in pictures:
         assert f'"{name}"' in TOOL.read_text("utf-8")
         assert (DOCS / "img" / f"{name}.png").stat().st_size < 100_000
 
@@ -29,5 +29,5 @@ def test_a_palette_keeps_the_picture():
     picture[10:20] = (11, 87, 208)
     raw = io.BytesIO()
     Image.fromarray(picture).save(raw, "png")
-    again = np.asarray(Image.open(io.BytesIO(gallery.smaller(raw.getvalue()))).convert("RGB"))
-    np.testing.assert_allclose(again, picture, atol=4)
+    compressed = np.asarray(Image.open(io.BytesIO(gallery.smaller(raw.getvalue()))).convert("RGB"))
+    np.testing.assert_allclose(compressed, picture, atol=4)

@@ -28,40 +28,40 @@ def test_only_the_channel_that_is_read_matters_when_muted(name):
     log = made_flight(0)
     x, _ = channels_of(log)
     edges = np.flatnonzero(np.abs(np.diff(log["zrange_m"])) > 0.05)
-    flown = SimpleNamespace(entry=int(edges[0]), exit=int(edges[-1]))
+    span = SimpleNamespace(entry=int(edges[0]), exit=int(edges[-1]))
     channel = high_edges.CHANNELS.index(name)
-    assert np.ptp(x[flown.entry:flown.exit, channel]) > 0.0
-    changes = high_edges.muted(log, flown, one_channel(channel))[1:]
+    assert np.ptp(x[span.entry:span.exit, channel]) > 0.0
+    changes = high_edges.muted(log, span, one_channel(channel))[1:]
     assert changes[channel] != 0.0
     np.testing.assert_array_equal(np.delete(changes, channel), 0.0)
 
 
 def test_air_is_replaced_by_the_flights_own_hover_there_and_nowhere_else():
     log = made_flight(0)
-    flown = course(log, 0.3)
+    sweep = course(log, 0.3)
     values = np.arange(len(log))[:, None] * np.ones(3)
-    hover, middle = flown.phases()["hover"], flown.entry - high_edges.AHEAD
+    hover, middle = sweep.phases()["hover"], sweep.entry - high_edges.AHEAD
     for before, platform in ((True, False), (False, True), (True, True)):
-        out = high_edges.hovering(values, flown, before, platform)
-        changed = np.zeros(len(values), bool)
-        changed[hover.start:middle] = before
-        changed[middle:flown.exit] = platform
-        np.testing.assert_array_equal(out[~changed], values[~changed])
-        moved = values[middle - 100:middle].mean() - values[hover].mean()
-        assert hover.start <= (out[changed] - moved).min() <= (out[changed] - moved).max() <= hover.stop - 1
+        out = high_edges.hovering(values, sweep, before, platform)
+        replaced = np.zeros(len(values), bool)
+        replaced[hover.start:middle] = before
+        replaced[middle:sweep.exit] = platform
+        np.testing.assert_array_equal(out[~replaced], values[~replaced])
+        shift = values[middle - 100:middle].mean() - values[hover].mean()
+        assert hover.start <= (out[replaced] - shift).min() <= (out[replaced] - shift).max() <= hover.stop - 1
         if before:
-            np.testing.assert_allclose(out[middle - 200:middle] - moved, values[hover][-200:])
-        assert np.abs(np.diff(out[changed][:, 0])).max() <= 1.0, "the hover jumps"
+            np.testing.assert_allclose(out[middle - 200:middle] - shift, values[hover][-200:])
+        assert np.abs(np.diff(out[replaced][:, 0])).max() <= 1.0, "the hover jumps"
 
 
 def test_a_network_that_forgets_the_approach_does_not_feel_it():
     log = made_flight(0)
-    flown = course(log, 0.3)
+    sweep = course(log, 0.3)
     channel = high_edges.CHANNELS.index("gyro y")
-    whole, hovered = high_edges.approach(log, flown, one_channel(channel))[:2]
+    full, hovered = high_edges.approach(log, sweep, one_channel(channel))[:2]
     reach = SMALL.receptive_samples
-    assert flown.exit - flown.entry > 2 * (reach + high_edges.AHEAD), "the flight is too short for this test"
-    assert whole == pytest.approx(hovered, abs=0.2 * abs(whole))
+    assert sweep.exit - sweep.entry > 2 * (reach + high_edges.AHEAD), "the flight is too short for this test"
+    assert full == pytest.approx(hovered, abs=0.2 * abs(full))
 
 
 def test_shaking_over_a_platform_is_counted_above_3_hz_only():
@@ -76,11 +76,11 @@ def test_shaking_over_a_platform_is_counted_above_3_hz_only():
 def test_hover_and_the_second_before_the_entry_are_apart():
     log = made_flight(0)
     columns = {name: values.copy() for name, values in log.columns.items()}
-    flown = course(log, 0.3)
-    hover = flown.phases()["hover"]
+    sweep = course(log, 0.3)
+    hover = sweep.phases()["hover"]
     columns["gyro_y_radps"][hover] += np.random.default_rng(2).normal(0.0, 0.2618 * 3, hover.stop - hover.start)
-    rough, before = high_edges.calm(type(log)(columns, log.meta), flown)
-    same, calm = high_edges.calm(log, flown)
+    rough, before = high_edges.calm(type(log)(columns, log.meta), sweep)
+    same, calm = high_edges.calm(log, sweep)
     pitch = high_edges.CHANNELS.index("gyro y")
     assert rough[pitch] > same[pitch] + 1.0
     np.testing.assert_allclose(before, calm, atol=1e-9)

@@ -62,14 +62,14 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
     for i in range(3):
         logs.write(made_flight(20 + i), beside / f"g{i}.csv")
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
-    asked, fit = [], best.fit
+    fits, fit = [], best.fit
     monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
-    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((len(flights), o)) or fit(flights, *a, **o))
+    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: fits.append((len(flights), o)) or fit(flights, *a, **o))
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
             "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--speed", 0.3)
     run(monkeypatch, *call, "--beside", beside)
-    assert [count for count, _ in asked] == [4, 4] and all(o["start"] is not None for _, o in asked)
-    assert all(o["emphasis"] == [3.0, 1.0, 1.0, 1.0] for _, o in asked)
+    assert [count for count, _ in fits] == [4, 4] and all(o["start"] is not None for _, o in fits)
+    assert all(o["emphasis"] == [3.0, 1.0, 1.0, 1.0] for _, o in fits)
     with pytest.raises(SystemExit, match="no --twin"):
         run(monkeypatch, *call, "--beside", beside, "--twin", tmp_path)
 
@@ -82,10 +82,10 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
     taught, begun = [], []
 
-    def self_trained(start, teacher, labelled, others, *rest):
-        taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in others]))
+    def self_trained(start, teacher, labelled, unlabelled, *rest):
+        taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in unlabelled]))
         begun.append(start)
-        assert all(not f.labelled for f in others)
+        assert all(not f.labelled for f in unlabelled)
         return teacher
 
     monkeypatch.setattr(adapt, "self_trained", self_trained)
@@ -123,19 +123,19 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
 
 def test_draws_of_a_flight_add_up():
     edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
-    one = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
-    both = labelled_flights.merged([one, one, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
+    score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
+    both = labelled_flights.merged([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
     assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
         ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
     assert both[0].windows == (2, 4, 6, 8)
 
 
 def test_missed_edges_are_counted_by_height():
-    found, missed = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
+    hit_edge, missed_edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
     low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)
-                 for h, edges in (("low", (found, found)), ("h82", (found, missed))))
+                 for h, edges in (("low", (hit_edge, hit_edge)), ("h82", (hit_edge, missed_edge))))
     assert labelled_flights.missed_by_height([low, high, high]) == "h82 2/4, low 0/2"
-    assert labelled_flights.missed_by_height([FlightScore("a", Condition(), (missed,), (), 1, 30.0)]) == "-"
+    assert labelled_flights.missed_by_height([FlightScore("a", Condition(), (missed_edge,), (), 1, 30.0)]) == "-"
 
 
 def test_false_edges_are_counted_by_place():

@@ -16,10 +16,10 @@ def test_shares_of_mutants(capsys):
     codes = {"airtouch.a.x_f__mutmut_1": 1, "airtouch.a.x_f__mutmut_2": 0, "airtouch.b.x_g__mutmut_1": 33,
              "airtouch.b.x_g__mutmut_2": 36, "airtouch.b.x_g__mutmut_3": None}
     assert mutate.table(codes) == 0.5
-    a, b, whole = capsys.readouterr().out.splitlines()
+    a, b, total = capsys.readouterr().out.splitlines()
     assert a.startswith("a: noticed 1 of 2, 50.0% [") and a.endswith("unnoticed 1")
     assert b.startswith("b: noticed 1 of 2") and b.endswith("reached by no test 1")
-    assert whole.startswith("all: noticed 2 of 4, 50.0% [15%, 85%]")
+    assert total.startswith("all: noticed 2 of 4, 50.0% [15%, 85%]")
 
 
 def test_a_group_that_is_none_is_named(capsys):

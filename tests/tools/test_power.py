@@ -31,11 +31,11 @@ def constant(seconds=5.0, volts=3.8, milliamperes=20.0, rate=200):
 
 
 @given(st.floats(0.1, 20.0), st.floats(-300.0, 300.0))
-def test_constant_power(volts, milliamperes):
-    found = ina219.power(ina219.parse(text(*constant(3.0, volts, milliamperes)), "f"))
-    assert found.mw == pytest.approx(volts * milliamperes, abs=0.01 + 1e-3 * abs(volts * milliamperes))
-    assert found.mj == pytest.approx(found.mw * found.seconds) and found.seconds == pytest.approx(2.995)
-    assert found.half_mw == pytest.approx(0.0, abs=1e-6)
+def test_constant_power_is_measured_to_a_thousandth(volts, milliamperes):
+    power = ina219.power(ina219.parse(text(*constant(3.0, volts, milliamperes)), "f"))
+    assert power.mw == pytest.approx(volts * milliamperes, abs=0.01 + 1e-3 * abs(volts * milliamperes))
+    assert power.mj == pytest.approx(power.mw * power.seconds) and power.seconds == pytest.approx(2.995)
+    assert power.half_mw == pytest.approx(0.0, abs=1e-6)
 
 
 def test_energy_of_a_ramp_is_its_integral():
@@ -50,17 +50,17 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
     for _ in range(100):
         times, volts, current = constant(20.0)
         noisy = (current + rng.normal(0, 5, len(times))) / 1000.0
-        found = ina219.power(ina219.Trace(times / 1000.0, volts, noisy, ("",) * len(times), ()))
-        hits += abs(found.mw - 76.0) <= found.half_mw
+        power = ina219.power(ina219.Trace(times / 1000.0, volts, noisy, ("",) * len(times), ()))
+        hits += abs(power.mw - 76.0) <= power.half_mw
     assert 85 <= hits <= 100
 
 
 def test_gaps_and_a_reset_of_the_arduino_are_no_energy():
     times, volts, current = constant(2.0)
-    joined = np.r_[times, times + 60_000, times]  # a minute is missing, then the clock starts anew
-    trace = ina219.parse(text(joined, np.tile(volts, 3), np.tile(current, 3)), "f")
-    found = ina219.power(trace)
-    assert found.seconds == pytest.approx(3 * 1.995) and found.mw == pytest.approx(76.0)
+    all_times = np.r_[times, times + 60_000, times]  # a minute is missing, then the clock starts anew
+    trace = ina219.parse(text(all_times, np.tile(volts, 3), np.tile(current, 3)), "f")
+    power = ina219.power(trace)
+    assert power.seconds == pytest.approx(3 * 1.995) and power.mw == pytest.approx(76.0)
 
 
 @pytest.mark.parametrize("header, row, expected", [
@@ -72,9 +72,9 @@ def test_gaps_and_a_reset_of_the_arduino_are_no_energy():
 ])
 def test_any_order_unit_and_separator(header, row, expected):
     lines = [row.format(t=str(k * 0.005).replace(".", ","), us=5000 * k, ms=5 * k) for k in range(500)]
-    found = ina219.power(ina219.parse("\ufeff# made by hand\r\n" + "\r\n".join([*([header] if header else []), *lines]),
+    power = ina219.power(ina219.parse("\ufeff# made by hand\r\n" + "\r\n".join([*([header] if header else []), *lines]),
                                       "f"))
-    assert found.mw == pytest.approx(expected) and found.seconds == pytest.approx(2.495)
+    assert power.mw == pytest.approx(expected) and power.seconds == pytest.approx(2.495)
 
 
 def test_damaged_lines_are_passed_over_and_told():
@@ -87,13 +87,13 @@ def test_damaged_lines_are_passed_over_and_told():
     assert ina219.power(trace).mw == pytest.approx(76.0)
 
 
-@pytest.mark.parametrize("content, says", [
+@pytest.mark.parametrize("content, message", [
     ("", "no data"), ("# only a comment\n", "no data"), ("time_ms,bus_V\n1,2\n", "no column for amperes"),
     ("1,2,3\n", "1 usable lines"), ("time_ms,bus_V,current_mA\n" + "a,b,c\n" * 50, ":2: 50 of 50 lines"),
     ("time_ms,bus_V,current_A\n" + "".join(f"{k},3.8,20\n" for k in range(50)), "check the columns and their units"),
 ])
-def test_what_is_no_log_is_said_in_one_line(content, says):
-    with pytest.raises(AirTouchError, match=re.escape(says)) as error:
+def test_what_is_no_log_is_said_in_one_line(content, message):
+    with pytest.raises(AirTouchError, match=re.escape(message)) as error:
         ina219.parse(content, "run.csv")
     assert str(error.value).startswith("run.csv") and "\n" not in str(error.value)
 
@@ -130,13 +130,13 @@ LEVELS = {"baseline": 78.0, "fc-fe": 84.0, "CCS_FF": 86.0, "Filter": 88.0, "netw
 def test_each_stage_is_what_it_adds(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(measured(LEVELS))
-    found = ina219.by_stage(ina219.parse(path.read_text(), "run.csv"), KNOWN)
-    assert list(found) == list(KNOWN)
-    for name, (mw, half) in ina219.added(found).items():
+    powers = ina219.by_stage(ina219.parse(path.read_text(), "run.csv"), KNOWN)
+    assert list(powers) == list(KNOWN)
+    for name, (mw, half) in ina219.added(powers).items():
         assert mw == pytest.approx(stages.PAPER_MW[name], abs=2 * half + 0.1) and 0.0 < half < 1.0
-    shown = stages.table(found)
-    assert re.search(r"Physical Knowledge-aided Network\s+3[23]\.\d \[.*\]\s+3[23]\d\s+33\s", shown)
-    assert re.search(r"Total\s+12[01]\.\d \[.*\]\s+121", shown)
+    table = stages.table(powers)
+    assert re.search(r"Physical Knowledge-aided Network\s+3[23]\.\d \[.*\]\s+3[23]\d\s+33\s", table)
+    assert re.search(r"Total\s+12[01]\.\d \[.*\]\s+121", table)
 
 
 def run(*arguments):
@@ -147,26 +147,26 @@ def run(*arguments):
 def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):
     for name, mw in (("baseline", 78.0), ("network", 111.0)):
         (tmp_path / f"{name}.csv").write_text(text(*constant(3.0, 3.8, mw / 3.8)))
-    shown = run("measure", f"baseline={tmp_path}/baseline.csv", f"network={tmp_path}/network.csv")
-    assert shown.returncode == 0 and re.search(r"Network\s+33.0 ", shown.stdout), shown
-    for arguments, says in ((["measure", tmp_path / "baseline.csv"], "no column of stages"),
-                            (["measure", tmp_path / "none.csv"], "cannot be read")):
-        refused = run(*arguments)
-        assert refused.returncode == 1 and says in refused.stderr and refused.stderr.count("\n") == 1
+    process = run("measure", f"baseline={tmp_path}/baseline.csv", f"network={tmp_path}/network.csv")
+    assert process.returncode == 0 and re.search(r"Network\s+33.0 ", process.stdout), process
+    for arguments, message in ((["measure", tmp_path / "baseline.csv"], "no column of stages"),
+                               (["measure", tmp_path / "none.csv"], "cannot be read")):
+        refusal = run(*arguments)
+        assert refusal.returncode == 1 and message in refusal.stderr and refusal.stderr.count("\n") == 1
 
 
 def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():
     budget, gap8 = (stages.counts(ROOT / "tests" / "emulation" / f"{name}.toml") for name in ("budget", "gap8_budget"))
-    found = stages.estimate(budget, gap8)
-    one = budget["cortex-m4"]["band_power"]["instructions_mean"] * 100 / 168e6  # share of the core at a cycle each
-    assert found["FC-FE"].low_mw == pytest.approx(one * 20 * 3.7)
-    assert found["FC-FE"].high_mw == pytest.approx(one * 2 * 40 * 3.7)
-    window = found["network, paper on the GAP8"]
+    estimates = stages.estimate(budget, gap8)
+    load = budget["cortex-m4"]["band_power"]["instructions_mean"] * 100 / 168e6  # share of the core at a cycle each
+    assert estimates["FC-FE"].low_mw == pytest.approx(load * 20 * 3.7)
+    assert estimates["FC-FE"].high_mw == pytest.approx(load * 2 * 40 * 3.7)
+    window = estimates["network, paper on the GAP8"]
     assert window.high_mw == pytest.approx(gap8["paper"]["window_instructions"] * 100 * 64 / 800e6)
     assert window.low_mw == pytest.approx(8 * gap8["paper"]["cycles_8"] * 100 * 64 / 800e6)
-    assert found["network, best on the GAP8"].low_mw == found["network, best on the GAP8"].high_mw
-    assert stages.estimate_table(found).count("ESTIMATE") == 2
-    assert all(math.isfinite(e.high_mw) and e.low_mw <= e.high_mw for e in found.values())
+    assert estimates["network, best on the GAP8"].low_mw == estimates["network, best on the GAP8"].high_mw
+    assert stages.estimate_table(estimates).count("ESTIMATE") == 2
+    assert all(math.isfinite(e.high_mw) and e.low_mw <= e.high_mw for e in estimates.values())
 
 
 def test_budgets_that_lack_something_are_refused():

@@ -29,29 +29,29 @@ class Shortened(tuple):
 @pytest.fixture
 def trained(tmp_path, monkeypatch):
     """Four made flights in two folds, of which fold 1 is held out; what `best.fit` is asked for, and the model."""
-    folder, asked = tmp_path / "flights", []
+    folder, scenes = tmp_path / "flights", []
     folder.mkdir()
     for i in range(4):
         logs.write(made_flight(i), folder / f"f{i}.csv")
     (folder / "manifest.csv").write_text("file,fold,speed_mps\n" + "".join(f"f{i}.csv,{i % 2},0.3\n" for i in range(4)))
-    laid = [made_flight(20 + i) for i in range(6)]
+    overlaid = [made_flight(20 + i) for i in range(6)]
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     monkeypatch.setattr(scenario, "load", lambda path: str(path))
     monkeypatch.setattr(tool.vehicle, "load", lambda path: load())
     monkeypatch.setattr(tool, "shorten", lambda scene, least, seed: Shortened((scene, least)))
-    monkeypatch.setattr(overlay, "simulate_responses", lambda scene, *_: asked.append(scene) or [])
+    monkeypatch.setattr(overlay, "simulate_responses", lambda scene, *_: scenes.append(scene) or [])
     monkeypatch.setattr(overlay, "free_air", lambda flights: flights)
-    monkeypatch.setattr(overlay, "flights", lambda *_: (laid, [evaluate.truth(log) for log in laid]))
+    monkeypatch.setattr(overlay, "flights", lambda *_: (overlaid, [evaluate.truth(log) for log in overlaid]))
     monkeypatch.setattr(edge_strength, "strengths", lambda flights, weak: {})
     monkeypatch.setattr(adapt, "STEPS", {"scratch": 3})
     fit = best.fit
-    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((flights, o)) or fit(flights, *a, **o))
+    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: scenes.append((flights, o)) or fit(flights, *a, **o))
     out = tmp_path / "without.npz"
     monkeypatch.setattr(sys, "argv", ["tool", str(folder), "--twin", "twin", "--hold-out", "1", "--out", str(out)])
     tool.main()
     with pytest.raises(AirTouchError, match="--force"):
         tool.main()
-    return asked, best.load(out)
+    return scenes, best.load(out)
 
 
 def test_recorded_and_simulated_flights_have_half_each_and_no_acceleration(trained):

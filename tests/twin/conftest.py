@@ -19,15 +19,15 @@ def vehicle():
 @pytest.fixture(scope="session")
 def fly_course(vehicle):
     """fly_course(course, effects, number) -> a log that ended well, or None."""
-    def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle, pulse_s=0.0, **mission):
+    def flight_of(course, effects=PLAIN, number=0, seed=3, craft=vehicle, pulse_s=0.0, **mission):
         course = replace(course, pulse_s=pulse_s) if pulse_s else course
         log = fly(missions.scenario_of(course, effects, **mission), craft, seed, number)
         return None if isinstance(log, Diverged) else log
-    return flown
+    return flight_of
 
 
 @pytest.fixture(scope="session")
-def made(fly_course):
+def sweeps(fly_course):
     """Twelve flights at 3, 6 and 9 cm: (course as planned, log, set-points)."""
     out = []
     for number in range(12):

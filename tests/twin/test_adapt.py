@@ -34,11 +34,11 @@ def quick(monkeypatch):
         monkeypatch.setattr(adapt, name, value)
 
 
-def flights_of(made, count, down=True):
+def flights_of(sweeps, count, down=True):
     def of(log):
         return log if down else FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
     return [adapt.Flight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
-            for i, (_, log, _) in enumerate(made[:count])]
+            for i, (_, log, _) in enumerate(sweeps[:count])]
 
 
 def write(folder, flights):
@@ -49,9 +49,9 @@ def write(folder, flights):
 
 
 @pytest.mark.slow
-def test_command_trains_says_and_goes_on(made, quick, tmp_path, monkeypatch):
+def test_command_trains_says_and_goes_on(sweeps, quick, tmp_path, monkeypatch):
     """Five flights: every one is held out once; a second call trains nothing again; nothing is overwritten."""
-    folder = write(tmp_path / "flights", flights_of(made, 5))
+    folder = write(tmp_path / "flights", flights_of(sweeps, 5))
     twin = tmp_path / "twin"
     twin.mkdir()
     from airtouch import vehicle
@@ -59,60 +59,60 @@ def test_command_trains_says_and_goes_on(made, quick, tmp_path, monkeypatch):
     from airtouch.twin.fitting import levers
     from airtouch.twin.recorded.course import course
     craft = vehicle.load()
-    files.write(twin, craft, (), levers.starts(()), [course(log) for _, log, _ in made[:5]], PLAIN)
-    asked = ["adapt", str(folder), "--twin", str(twin), "--out", str(tmp_path / "mine.npz")]
-    first = CliRunner().invoke(airtouch, asked)
+    files.write(twin, craft, (), levers.starts(()), [course(log) for _, log, _ in sweeps[:5]], PLAIN)
+    arguments = ["adapt", str(folder), "--twin", str(twin), "--out", str(tmp_path / "mine.npz")]
+    first = CliRunner().invoke(airtouch, arguments)
     assert first.exit_code == 0, first.output + str(first.exception)
     assert "5 flights that their down range labels" in first.output
     assert "held out, all others: error" in first.output and "5 flights, 10 edges" in first.output
-    again = CliRunner().invoke(airtouch, asked)
-    assert again.exit_code != 0 and "--force" in str(again.exception)
+    repeat = CliRunner().invoke(airtouch, arguments)
+    assert repeat.exit_code != 0 and "--force" in str(repeat.exception)
     monkeypatch.setattr(best, "fit", lambda *_, **__: pytest.fail("trained again"))
-    resumed = CliRunner().invoke(airtouch, [*asked, "--force"])
+    resumed = CliRunner().invoke(airtouch, [*arguments, "--force"])
     assert resumed.exit_code == 0, resumed.output + str(resumed.exception)
     model = best.load(tmp_path / "mine.npz")
     assert model.metadata["adapted"]["labelled"] == 5
-    assert best.run(made[0][1], model).probability.shape == (len(made[0][1]),)
+    assert best.run(sweeps[0][1], model).probability.shape == (len(sweeps[0][1]),)
 
 
 @pytest.mark.slow
-def test_flights_without_down_range_are_used_by_pseudo_labels(made, quick, tmp_path, monkeypatch):
-    seen = []
+def test_flights_without_down_range_are_used_by_pseudo_labels(sweeps, quick, tmp_path, monkeypatch):
+    labels = []
     fit = best.fit
     monkeypatch.setattr(best, "fit",
-                        lambda flights, seed, **o: seen.append(o.get("pseudo_labels")) or fit(flights, seed, **o))
-    flights = [*flights_of(made, 2), *flights_of(made, 5, down=False)[2:]]
+                        lambda flights, seed, **o: labels.append(o.get("pseudo_labels")) or fit(flights, seed, **o))
+    flights = [*flights_of(sweeps, 2), *flights_of(sweeps, 5, down=False)[2:]]
     scene = scenario.load("paper-low")
-    found = adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None))
-    assert not found.held_out  # two labelled flights are too few
-    assert [label is None for label in seen[-1][:5]] == [True, True, False, False, False]
+    result = adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None))
+    assert not result.held_out  # two labelled flights are too few
+    assert [label is None for label in labels[-1][:5]] == [True, True, False, False, False]
     adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None), withhold=True)
-    assert [label is None for label in seen[-1][:5]] == [False] * 5
-    assert found.model.metadata["adapted"]["pseudo_labelled"] == 3
+    assert [label is None for label in labels[-1][:5]] == [False] * 5
+    assert result.model.metadata["adapted"]["pseudo_labelled"] == 3
 
 
 @pytest.mark.slow
-def test_flights_without_acceleration_train_a_detector_without(made, quick, tmp_path):
+def test_flights_without_acceleration_train_a_detector_without(sweeps, quick, tmp_path):
     """The simulated flights beside them have none either, and the shipped model for such logs is gone on from."""
-    bare = [replace(f, log=sensors.without(f.log, ("acceleration",))) for f in flights_of(made, 4)]
-    folder, out = write(tmp_path / "flights", bare), tmp_path / "mine.npz"
-    said = CliRunner().invoke(airtouch, ["adapt", str(folder), "--out", str(out), "--no-hold-out"])
-    assert said.exit_code == 0, said.output + str(said.exception)
-    assert "no twin: it needs 4 flights" in said.output and "here are 0" in said.output
-    assert "nothing was held out, as asked" in said.output
+    flights = [replace(f, log=sensors.without(f.log, ("acceleration",))) for f in flights_of(sweeps, 4)]
+    folder, out = write(tmp_path / "flights", flights), tmp_path / "mine.npz"
+    result = CliRunner().invoke(airtouch, ["adapt", str(folder), "--out", str(out), "--no-hold-out"])
+    assert result.exit_code == 0, result.output + str(result.exception)
+    assert "no twin: it needs 4 flights" in result.output and "here are 0" in result.output
+    assert "nothing was held out, as asked" in result.output
     model = best.load(out)
     assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
-    assert best.run(bare[0].log, model).probability.shape == (len(bare[0].log),)
+    assert best.run(flights[0].log, model).probability.shape == (len(flights[0].log),)
 
 
 @pytest.mark.slow
-def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made, quick, tmp_path, monkeypatch):
+def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(sweeps, quick, tmp_path, monkeypatch):
     from airtouch.cli.shared.progress import Bar
     from airtouch.twin.fitting import calibrate, edge_fit
     monkeypatch.setattr(calibrate, "ROUNDS", 1)
     monkeypatch.setattr(calibrate, "BATCH", 40)
     monkeypatch.setattr(edge_fit, "FLIGHTS", 16)
-    flights, work = flights_of(made, 5), tmp_path / "work"
+    flights, work = flights_of(sweeps, 5), tmp_path / "work"
     folder = write(tmp_path / "flights", flights)
     listed = [replace(f, file=replace(f.file, path=folder / f"flight_{i}.csv.gz")) for i, f in enumerate(flights)]
 
@@ -129,9 +129,9 @@ def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made
 
 
 def test_a_twin_and_a_vehicle_are_one_too_many(tmp_path):
-    said = CliRunner().invoke(airtouch, ["adapt", str(tmp_path), "--twin", str(tmp_path), "--vehicle", "mine.toml",
-                                         "--out", str(tmp_path / "mine.npz")])
-    assert said.exit_code != 0 and "leave --vehicle out" in str(said.exception)
+    result = CliRunner().invoke(airtouch, ["adapt", str(tmp_path), "--twin", str(tmp_path), "--vehicle", "mine.toml",
+                                           "--out", str(tmp_path / "mine.npz")])
+    assert result.exit_code != 0 and "leave --vehicle out" in str(result.exception)
 
 
 def adapt_vehicle():
@@ -139,7 +139,7 @@ def adapt_vehicle():
     return vehicle.load()
 
 
-def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypatch):
+def test_no_flight_is_in_training_and_held_out_at_once(sweeps, tmp_path, monkeypatch):
     """Each held-out flight is scored once, by a model whose training flights lack it."""
     scored = []
     monkeypatch.setattr(adapt, "together",
@@ -148,9 +148,9 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     monkeypatch.setattr(adapt.cache, "scores", lambda path, make: make())
     monkeypatch.setattr(adapt, "score_flights", lambda flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
-    flights = flights_of(made, 8)
-    held, half = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
-    assert sorted(held) == sorted(half) == sorted(str(f.file.path) for f in flights)
+    flights = flights_of(sweeps, 8)
+    scores, half_scores = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
+    assert sorted(scores) == sorted(half_scores) == sorted(str(f.file.path) for f in flights)
     for test, train in scored:
         assert not test & train and train
     sizes = [len(train) for _, train in scored]
@@ -165,15 +165,15 @@ def trained(number, lag_s=0.2):
 @pytest.fixture
 def trainings(monkeypatch):
     """What every training is asked for. Its model labels every second flight in full, and detects edges 0.3 s late."""
-    asked = []
+    calls = []
 
     def fit(flights, seed, **options):
-        asked.append({**options, "flights": flights})
-        return best.timed(trained(len(asked)), options["lag_of"])
+        calls.append({**options, "flights": flights})
+        return best.timed(trained(len(calls)), options["lag_of"])
 
     def labels(flights, model):
         if flights:
-            asked.append(model)
+            calls.append(model)
         edge = [logs.Edge(100 * (i + 1), kind, np.nan, np.nan) for i, kind in enumerate(("entry", "exit", "entry"))]
         return [(edge[:2], [], edge)[i % 3] for i in range(len(flights))]
 
@@ -184,36 +184,36 @@ def trainings(monkeypatch):
     for name, value in (("fit", fit), ("pseudo_labels", labels)):
         monkeypatch.setattr(best, name, value)
     monkeypatch.setattr(detector, "run", run)
-    return asked
+    return calls
 
 
-def test_labelled_flights_are_half_of_what_is_learnt(made, trainings):
+def test_labelled_flights_are_half_of_what_is_learnt(sweeps, trainings):
     """From `start`, with the twin's flights beside them, and with the lag of the recorded flights."""
-    simulated = adapt.SimulatedFlights([log for _, log, _ in made[3:8]], [None] * 5)
-    labelled, start, twin = flights_of(made, 2), object(), object()
+    simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[3:8]], [None] * 5)
+    labelled, start, twin = flights_of(sweeps, 2), object(), object()
     model = adapt.together(start, twin, labelled, simulated, 0, None, "")
-    (asked,) = trainings
+    (training,) = trainings
     assert model.metadata == {"number": 1, "lag_s": pytest.approx(0.3)}
-    assert asked["start"] is start and len(asked["flights"]) == 7 and asked["pseudo_labels"] == [None] * 7
-    assert sum(asked["emphasis"][:2]) == pytest.approx(sum(asked["emphasis"][2:]))
+    assert training["start"] is start and len(training["flights"]) == 7 and training["pseudo_labels"] == [None] * 7
+    assert sum(training["emphasis"][:2]) == pytest.approx(sum(training["emphasis"][2:]))
     assert adapt.together(start, twin, [], simulated, 0, None, "") is twin
 
 
-def test_flights_without_labels_get_those_of_the_twins_detector(made, trainings):
+def test_flights_without_labels_get_those_of_the_twins_detector(sweeps, trainings):
     """Three flights, the second without an edge that it sees, the third with an entry alone: the first is learnt."""
-    simulated = adapt.SimulatedFlights([log for _, log, _ in made[3:8]], [None] * 5)
+    simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[3:8]], [None] * 5)
     start, twin = object(), object()
-    adapt.together(start, twin, flights_of(made, 3, down=False), simulated, 0, None, "")
-    teacher, asked, again, *_ = trainings
-    assert teacher is twin and asked["start"] is start and again.metadata["number"] == 2
-    assert [len(x) if x else x for x in asked["pseudo_labels"]] == [2] + [None] * 5
-    assert asked["emphasis"] == [5.0] + [1.0] * 5
+    adapt.together(start, twin, flights_of(sweeps, 3, down=False), simulated, 0, None, "")
+    teacher, training, student, *_ = trainings
+    assert teacher is twin and training["start"] is start and student.metadata["number"] == 2
+    assert [len(x) if x else x for x in training["pseudo_labels"]] == [2] + [None] * 5
+    assert training["emphasis"] == [5.0] + [1.0] * 5
 
 
-def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
+def test_a_detector_of_labelled_flights_labels_the_others(sweeps, trainings):
     """Of five flights without labels those in which it sees an entry without exit, or nothing, are left out."""
-    simulated = adapt.SimulatedFlights([log for _, log, _ in made[:4]], [None] * 4)
-    flights = [*flights_of(made, 3), *flights_of(made, 8, down=False)[3:]]
+    simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[:4]], [None] * 4)
+    flights = [*flights_of(sweeps, 3), *flights_of(sweeps, 8, down=False)[3:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
     first, teacher, second, better, third = trainings
     assert len(first["flights"]) == 3 + 4 and teacher.metadata["number"] == 1 and better.metadata["number"] == 3
@@ -224,17 +224,17 @@ def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
     assert thirds == pytest.approx([thirds[0]] * 3)
 
 
-def test_a_teacher_that_sees_nothing_is_the_detector(made, trainings, monkeypatch):
+def test_a_teacher_that_sees_nothing_is_the_detector(sweeps, trainings, monkeypatch):
     monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
-    simulated = adapt.SimulatedFlights([made[0][1]], [None])
-    flights = [*flights_of(made, 2), *flights_of(made, 4, down=False)[2:]]
+    simulated = adapt.SimulatedFlights([sweeps[0][1]], [None])
+    flights = [*flights_of(sweeps, 2), *flights_of(sweeps, 4, down=False)[2:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
     assert model.metadata["number"] == len(trainings) == 1
 
 
-def test_the_lag_is_that_of_recorded_flights(made, trainings):
+def test_the_lag_is_that_of_recorded_flights(sweeps, trainings):
     """Down range and pseudo-labels alike; a model that detects none of their edges keeps its own."""
-    log = made[0][1]
+    log = sweeps[0][1]
     edges = logs.true_edges(log)
     early = [replace(e, sample=e.sample - 10) for e in edges]
     assert best.timed(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
@@ -258,8 +258,8 @@ def test_outlook_is_a_power_law_that_never_promises_worse_or_a_miracle():
     assert adapt.outlook(adapt.Adapted(None, [], [], []), 10) is None
 
 
-def test_readable_takes_the_speed_from_the_log(made, tmp_path):
-    _, log, _ = made[0]
+def test_readable_takes_the_speed_from_the_log(sweeps, tmp_path):
+    _, log, _ = sweeps[0]
     logs.write(log, tmp_path / "good.csv.gz")
     logs.write(replace(log, columns={k: v[:50] for k, v in log.columns.items()}), tmp_path / "short.csv.gz")
     usable, left_out = adapt.readable([FlightFile(tmp_path / n, Condition()) for n in ("good.csv.gz", "short.csv.gz")])

@@ -24,10 +24,10 @@ def run(*arguments):
 
 
 @pytest.fixture(scope="module")
-def folder(made, tmp_path_factory):
+def folder(sweeps, tmp_path_factory):
     """Six recorded flights, of a simulator."""
     out = tmp_path_factory.mktemp("recorded")
-    for i, (_, log, _) in enumerate(made[:6]):
+    for i, (_, log, _) in enumerate(sweeps[:6]):
         logs.write(log, out / f"flight_{i}.csv.gz")
     return out
 
@@ -44,12 +44,12 @@ def twin(folder, tmp_path_factory):
 
 
 def test_files_are_those_that_simulate_takes(twin):
-    out, said = twin
+    out, output = twin
     scene, craft = scenario.load(out / "scenario.toml"), vehicle.load(out / "vehicle.toml")
-    flown = [f for f in batch.flights(scene, 4, vehicle=craft, workers=1) if isinstance(f, FlightLog)]
-    assert len(flown) >= 2
-    assert 0.6 < course(flown[0]).cruise_m < 1.0
-    assert "AUROC" in said and "largest differences:" in said
+    logs = [f for f in batch.flights(scene, 4, vehicle=craft, workers=1) if isinstance(f, FlightLog)]
+    assert len(logs) >= 2
+    assert 0.6 < course(logs[0]).cruise_m < 1.0
+    assert "AUROC" in output and "largest differences:" in output
 
 
 def test_report_shows_all_of_it(twin):
@@ -66,42 +66,42 @@ def test_report_shows_all_of_it(twin):
 
 
 def test_it_does_not_overwrite_and_it_goes_on(twin, folder, tmp_path, monkeypatch):
-    written = []
-    monkeypatch.setattr(twin_report, "write_report", lambda path, *_, **__: written.append(path))  # drawn for `twin`
+    paths = []
+    monkeypatch.setattr(twin_report, "write_report", lambda path, *_, **__: paths.append(path))  # drawn for `twin`
     # and what does not depend on which rounds were flown before
     monkeypatch.setattr(compare, "two_sample", lambda *_: [])
     monkeypatch.setattr(edge_fit, "refine", lambda aim, craft, levers, values, **_: edge_fit.EdgeFit(values, []))
     out = tmp_path / "mine"
     shutil.copytree(twin[0], out)
-    again = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40)
-    assert again.exit_code != 0 and "--resume" in str(again.exception)
+    repeat = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40)
+    assert repeat.exit_code != 0 and "--resume" in str(repeat.exception)
     result = run("twin", folder, "--out", out, "--rounds", 2, "--batch", 40, "--resume", "--workers", 1)
     assert result.exit_code == 0, result.output + str(result.exception)
-    assert len(json.loads((out / "twin.json").read_text())["history"]) == 2 and written == [out / "report.html"]
+    assert len(json.loads((out / "twin.json").read_text())["history"]) == 2 and paths == [out / "report.html"]
 
 
-def test_bad_input_is_one_line_with_what_to_fly(made, folder, tmp_path):
-    def refused(name, flown):
+def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
+    def refusal(name, sweeps):
         place = tmp_path / name
         place.mkdir()
-        for i, log in enumerate(flown):
+        for i, log in enumerate(sweeps):
             logs.write(log, place / f"{i}.csv")
         result = run("twin", place, "--out", tmp_path / "out")
         assert result.exit_code != 0
-        said = str(result.exception)
-        assert "\n" not in said
-        return said
+        message = str(result.exception)
+        assert "\n" not in message
+        return message
 
-    some = [log for _, log, _ in made[:5]]
-    assert "4 are needed: fly straight over" in refused("few", some[:2])
+    some = [log for _, log, _ in sweeps[:5]]
+    assert "4 are needed: fly straight over" in refusal("few", some[:2])
     blind = [FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta) for log in some]
-    assert "no down range in this log; log range.zrange" in refused("blind", blind)
-    assert "hover 5 s" in refused("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
+    assert "no down range in this log; log range.zrange" in refusal("blind", blind)
+    assert "hover 5 s" in refusal("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
     other = FlightLog(some[0].columns, {**some[0].meta, "vehicle": "quadrotor-450"})
-    assert "two vehicles" in refused("two", [*some, other])
+    assert "two vehicles" in refusal("two", [*some, other])
 
 
-def test_help_teaches():
-    said = run("twin", "--help").output
+def test_the_help_of_twin_says_what_to_fly_and_how_to_go_on():
+    output = run("twin", "--help").output
     for text in ("What to fly", "airtouch simulate twin/scenario.toml", "0.5 is closed"):
-        assert text in said
+        assert text in output

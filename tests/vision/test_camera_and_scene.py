@@ -20,7 +20,7 @@ def scenes():
     return scene
 
 
-def plain(floor, top, corners=HALF_PLANE, height=0.76):
+def plain_scene(floor, top, corners=HALF_PLANE, height=0.76):
     flat = np.ones((scenes().TILE_PX, scenes().TILE_PX), np.float32)
     return scenes().Scene(floor * flat, top * flat, corners, height)
 
@@ -56,22 +56,22 @@ def test_a_drone_that_pitches_down_looks_behind_itself():
 @pytest.mark.parametrize("place", [-0.02, 0.0, 0.015])
 def test_the_rim_is_rendered_where_it_projects_to(place):
     pose = scenes().Pose(np.array([place, 0.0, 0.80]), LEVEL)
-    row = scenes().view(CAMERA, pose, plain(0.2, 0.8))[120]
+    row = scenes().view(CAMERA, pose, plain_scene(0.2, 0.8))[120]
     assert np.argmax(row > 0.5) == math.ceil(161.5 - 180.0 * place / 0.04)
 
 
 def test_a_ray_beside_the_platform_meets_the_floor_and_one_at_the_sky_nothing():
     pose = scenes().Pose(np.array([-1.0, 0.0, 0.80]), about_y(-1.2))
-    image = scenes().view(CAMERA, pose, plain(0.2, 0.8))
+    image = scenes().view(CAMERA, pose, plain_scene(0.2, 0.8))
     assert np.isfinite(image).all()
     assert scenes().view(CAMERA, scenes().Pose(np.array([-1.0, 0.0, 0.8]), LEVEL),
-                         plain(0.2, 0.8)) == pytest.approx(0.2)
+                         plain_scene(0.2, 0.8)) == pytest.approx(0.2)
 
 
 def test_blur_is_as_long_as_speed_times_exposure_times_focal_length_over_height():
     speed, seconds, height = 0.3, 0.02, 0.04
     places = [np.array([speed * seconds * s, 0.0, 0.76 + height]) for s in np.linspace(-0.5, 0.5, 41)]
-    row = scenes().blurred(CAMERA, [scenes().Pose(p, LEVEL) for p in places], plain(0.0, 1.0))[120]
+    row = scenes().blurred(CAMERA, [scenes().Pose(p, LEVEL) for p in places], plain_scene(0.0, 1.0))[120]
     ramp = np.count_nonzero((row > 0.01) & (row < 0.99))
     assert blur_px(CAMERA, speed, seconds, height) == pytest.approx(27.0)
     assert ramp == pytest.approx(27.0, abs=1.5)

@@ -20,10 +20,10 @@ def test_a_straight_edge_is_found_where_it_crosses_the_middle_row(column, tilt_d
     rows, columns = np.mgrid[0:244, 0:324]
     image = np.where(columns > column + np.tan(np.radians(tilt_deg)) * (rows - 121.5), 200, 60).astype(np.uint8)
     image = np.clip(image + np.random.default_rng(4).normal(0, 20, image.shape), 0, 255).astype(np.uint8)
-    found = lines.strongest(lines.classical(lines.binned(image)), CAMERA)
-    assert found.column == pytest.approx(column + 0.5, abs=1.0)
+    line = lines.strongest(lines.classical(lines.binned(image)), CAMERA)
+    assert line.column == pytest.approx(column + 0.5, abs=1.0)
     empty = np.full((244, 324), 120) + np.random.default_rng(5).normal(0, 20, (244, 324))
-    assert lines.strongest(lines.classical(lines.binned(empty)), CAMERA).strength < 0.3 * found.strength
+    assert lines.strongest(lines.classical(lines.binned(empty)), CAMERA).strength < 0.3 * line.strength
 
 
 def level_flight(speed=0.3, clearance=0.04):
@@ -48,8 +48,8 @@ def made_film():
     log, edges = level_flight()
     rng = np.random.default_rng(6)
     corners = np.array([[0.0, -2.0], [0.75, -2.0], [0.75, 2.0], [0.0, 2.0]])
-    shown = scene.Scene(scene.texture(rng, 0.25, 0.05), scene.texture(rng, 0.7, 0.05), corners, 0.76)
-    return crossings.Film(log, edges, shown, 0.04, 0.3, edges[0].sample * 0.01 - 0.6, edges[1].sample * 0.01 + 0.6)
+    floor = scene.Scene(scene.texture(rng, 0.25, 0.05), scene.texture(rng, 0.7, 0.05), corners, 0.76)
+    return crossings.Film(log, edges, floor, 0.04, 0.3, edges[0].sample * 0.01 - 0.6, edges[1].sample * 0.01 + 0.6)
 
 
 def test_in_good_light_the_camera_places_both_edges_within_a_centimetre():
@@ -57,8 +57,8 @@ def test_in_good_light_the_camera_places_both_edges_within_a_centimetre():
 
     film = made_film()
     sights = compare.filmed([film], 500.0, {"classical": lines.classical}, 7)["classical"]
-    found = compare.crossings([film], sights, compare.threshold([film], sights))
-    score = compare.scored([film], found)[0]
+    detections = compare.crossings([film], sights, compare.threshold([film], sights))
+    score = compare.scored([film], detections)[0]
     assert [e.detected_sample is not None for e in score.edges] == [True, True] and score.false == ()
     assert max(abs(e.error_m) for e in score.edges) < 0.01
 
@@ -74,8 +74,8 @@ def test_frames_come_at_the_cameras_rate():
 def test_a_line_ahead_is_crossed_after_its_distance_over_the_speed():
     from airtouch.vision.crossings import Sight, detections
 
-    seen = [Sight(2.0, 0.9, 0.03), Sight(2.16, 0.9, -0.018), Sight(3.0, 0.1, 0.0), Sight(5.0, 0.8, 0.0)]
-    assert [d.sample for d in detections(seen, 0.5, 0.3)] == [210, 500]
+    sights = [Sight(2.0, 0.9, 0.03), Sight(2.16, 0.9, -0.018), Sight(3.0, 0.1, 0.0), Sight(5.0, 0.8, 0.0)]
+    assert [d.sample for d in detections(sights, 0.5, 0.3)] == [210, 500]
 
 
 def test_a_fusion_weighs_pairs_and_drops_or_keeps_single_edges():
@@ -122,7 +122,7 @@ def test_a_constant_lag_is_learnt_on_the_first_films_and_taken_off_all():
     from airtouch.vision import compare
 
     film = made_film()
-    found = [[Detection(e.sample + off, "edge") for e in film.edges] for off in (7, 7, 12)]
-    moved = compare.without_lag(found, compare.lag([film, film], found[:2]))
-    off = [[d.sample - e.sample for d, e in zip(some, film.edges, strict=True)] for some in moved]
+    late = [[Detection(e.sample + off, "edge") for e in film.edges] for off in (7, 7, 12)]
+    corrected = compare.without_lag(late, compare.lag([film, film], late[:2]))
+    off = [[d.sample - e.sample for d, e in zip(some, film.edges, strict=True)] for some in corrected]
     assert off == [[0, 0], [0, 0], [5, 5]]

@@ -19,8 +19,8 @@ def test_three_colours_give_the_published_number_of_parameters():
 
 def test_multiplications_of_one_layer_at_a_time():
     """The first layer: 9 x 16 of one colour, at half the rows and columns."""
-    less = teed.multiplications(320, 320, colours=3) - teed.multiplications(320, 320, colours=1)
-    assert less == 2 * 9 * 16 * 160 * 160
+    difference = teed.multiplications(320, 320, colours=3) - teed.multiplications(320, 320, colours=1)
+    assert difference == 2 * 9 * 16 * 160 * 160
 
 
 def test_smish_is_its_definition():
@@ -30,7 +30,7 @@ def test_smish_is_its_definition():
 
 @needs("keras")
 @needs("tensorflow")
-def test_numpy_equals_keras():
+def test_the_network_in_numpy_has_keras_outputs():
     model = teed.build_keras((4, 8, 12))
     assert model.count_params() == teed.parameters((4, 8, 12))
     rng = np.random.default_rng(3)

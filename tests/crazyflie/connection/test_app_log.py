@@ -14,8 +14,8 @@ APP = Path(__file__).parents[3] / "firmware" / "app"
 def test_names_and_types_are_those_of_the_log_group():
     source = (APP / "src" / "airtouch_app.c").read_text()
     assert f"LOG_GROUP_START({app_log.GROUP})" in source
-    logged = set(re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\(LOG_\w+, (\w+),", source))
-    assert {name.split(".")[1] for name in app_log.WANTED.names} <= logged
+    variables = set(re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\(LOG_\w+, (\w+),", source))
+    assert {name.split(".")[1] for name in app_log.WANTED.names} <= variables
     assert app_log.WANTED.size <= blocks.MOST_BYTES
 
 

@@ -47,9 +47,9 @@ def test_units_are_si():
 
 def test_slow_values_hold_for_a_quarter_second_and_no_longer():
     fast = np.arange(0, 1, 0.01)
-    held = blocks.hold(fast, np.array([0.2, 0.1]), {"x_m": np.array([2.0, 1.0])})["x_m"]
-    assert np.isnan(held[:10]).all() and (held[10:20] == 1.0).all() and (held[20:46] == 2.0).all()
-    assert np.isnan(held[46:]).all()
+    values = blocks.hold(fast, np.array([0.2, 0.1]), {"x_m": np.array([2.0, 1.0])})["x_m"]
+    assert np.isnan(values[:10]).all() and (values[10:20] == 1.0).all() and (values[20:46] == 2.0).all()
+    assert np.isnan(values[46:]).all()
     assert np.isnan(blocks.hold(fast, np.empty(0), {"x_m": np.empty(0)})["x_m"]).all()
 
 

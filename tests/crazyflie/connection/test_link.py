@@ -23,17 +23,18 @@ def silent():
 
 def test_within_three_seconds_it_is_said_that_nobody_answers(silent, capsys):
     stop, times, began_s = threading.Event(), [], time.monotonic()
-    say = waiting(silent, stop)
+    report = waiting(silent, stop)
 
     def unanswered(reason):
         times.append(time.monotonic() - began_s)
-        say(reason)
+        report(reason)
 
     with pytest.raises(AirTouchError, match="no connection"):
         Drone(silent, patience_s=3.0, unanswered=unanswered)
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert times[0] < 3.0 and len(times) > 1
-    assert said.count("\n") == 1 and f"{silent}: no answer yet" in said and "is `airtouch sitl` running" in said
+    assert message.count("\n") == 1
+    assert f"{silent}: no answer yet" in message and "is `airtouch sitl` running" in message
 
 
 def test_a_stop_ends_the_attempts(silent):

@@ -9,7 +9,7 @@ from airtouch.crazyflie.connection.ticks import WRAP_MS, Restarted, Ticks, gaps,
 
 
 @given(st.integers(0, WRAP_MS - 1), st.lists(st.integers(1, 5_000_000), min_size=1, max_size=30))
-def test_wraps_vanish(start, steps):
+def test_ticks_go_on_where_the_counter_wraps(start, steps):
     true = start + np.cumsum([0, *steps])
     ticks = Ticks()
     assert [ticks.unwrap(int(t) % WRAP_MS) for t in true] == list(true)
@@ -30,12 +30,12 @@ def test_a_clock_that_starts_anew_is_told():
 
 
 @given(st.sets(st.integers(0, 300), min_size=2), st.integers(-3, 3))
-def test_gaps_are_the_samples_that_are_not_there(kept, jitter):
-    slots = np.array(sorted(kept))
+def test_gaps_are_the_samples_that_are_not_there(numbers, jitter):
+    slots = np.array(sorted(numbers))
     times = 10 * slots + np.where(slots % 2, jitter, 0)
-    found = gaps(times)
-    assert sum(g.lost for g in found) == slots[-1] - slots[0] + 1 - len(slots)
-    for gap in found:
+    missing = gaps(times)
+    assert sum(g.lost for g in missing) == slots[-1] - slots[0] + 1 - len(slots)
+    for gap in missing:
         assert slots[gap.sample] - slots[gap.sample - 1] - 1 == gap.lost
 
 

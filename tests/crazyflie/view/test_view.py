@@ -59,5 +59,9 @@ def test_a_board_places_edges_one_lag_back_and_draws_itself():
     assert "SILENT for 3.0 s" in board.line()
 
 
-def test_an_empty_board_draws_too():
-    Console(file=io.StringIO(), width=100).print(Board("test", "best").render())
+def test_an_empty_board_shows_no_value_no_position_and_no_edge():
+    out = io.StringIO()
+    Console(file=out, width=100).print(Board("test", "best").render())
+    text = out.getvalue()
+    assert text.count("nan") == len(SIGNALS) and all(name in text for name in SIGNALS)
+    assert "no position" in text and "edges (0, best)" in text

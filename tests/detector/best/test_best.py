@@ -28,15 +28,15 @@ from made_flight import SMALL, made_flight
 
 def test_the_same_arguments_give_the_same_bits(small):
     best.fit([made_flight(2)], seed=4, recipe=SMALL)  # what was compiled is used again and must remember nothing
-    again = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
-    assert again.to_bytes() == small.to_bytes()
+    repeat = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
+    assert repeat.to_bytes() == small.to_bytes()
 
 
 def test_what_is_compiled_is_known_by_all_that_it_reads():
     """A field that the compiled step read and COMPILED lacked would be taken from another recipe."""
-    read = {name for part in (training.compiled_step.__wrapped__, *(o.weight for o in OUTPUTS), Recipe.graph.fget)
-            for name in re.findall(r"(?:recipe|self)\.(\w+)", inspect.getsource(part))}
-    assert read - {"graph"} == set(training.COMPILED)
+    attributes = {name for part in (training.compiled_step.__wrapped__, *(o.weight for o in OUTPUTS), Recipe.graph.fget)
+                  for name in re.findall(r"(?:recipe|self)\.(\w+)", inspect.getsource(part))}
+    assert attributes - {"graph"} == set(training.COMPILED)
 
 
 def test_pruned_blocks_are_whole_and_exact(small):
@@ -98,12 +98,12 @@ def test_the_float_network_is_the_one_that_keras_trained(small):
 
 def test_it_is_causal_and_never_looks_at_the_range(small):
     log = made_flight(7)
-    whole = best.run(log, small)
-    cut = best.run(log.slice(0, 1500), small)
-    assert cut.edges == [e for e in whole.edges if e.sample < 1500]
-    assert np.array_equal(cut.probability, whole.probability[:1500])
+    full = best.run(log, small)
+    beginning = best.run(log.slice(0, 1500), small)
+    assert beginning.edges == [e for e in full.edges if e.sample < 1500]
+    assert np.array_equal(beginning.probability, full.probability[:1500])
     blind = FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
-    assert best.run(blind, small).edges == whole.edges
+    assert best.run(blind, small).edges == full.edges
 
 
 def test_a_mirrored_flight_has_mirrored_channels():
@@ -119,8 +119,8 @@ def test_a_mirrored_flight_has_mirrored_channels():
 
 def test_the_file_gives_the_model_back(small, tmp_path):
     small.save(tmp_path / "m.npz")
-    again = best.load(tmp_path / "m.npz")
-    assert again.to_bytes() == small.to_bytes() and again.digest == small.digest
+    reloaded = best.load(tmp_path / "m.npz")
+    assert reloaded.to_bytes() == small.to_bytes() and reloaded.digest == small.digest
     with pytest.raises(AirTouchError, match="--force"):
         small.save(tmp_path / "m.npz")
 
@@ -138,14 +138,14 @@ def test_a_damaged_file_is_one_clear_line(small, data):
         assert "\n" not in str(error) and "m.npz" in str(error) or "model" in str(error)
 
 
-@pytest.mark.parametrize(("change", "said"), [
+@pytest.mark.parametrize(("change", "message"), [
     (lambda m: replace(m, recipe=replace(m.recipe, width=12)), "another shape"),
     (lambda m: replace(m, recipe=replace(m.recipe, dilations=(1, 2, 999))), "shape is missing"),
     (lambda m: replace(m, metadata={**m.metadata, "lag_s": "soon"}), "not numbers"),
     (lambda m: replace(m, metadata={**m.metadata, "decoder": {"a": 1}}), "decoder settings"),
 ])
-def test_a_wrong_model_is_named(small, change, said):
-    with pytest.raises(AirTouchError, match=said):
+def test_a_wrong_model_is_named(small, change, message):
+    with pytest.raises(AirTouchError, match=message):
         model_file.parse(change(small).to_bytes(), "m.npz")
 
 
@@ -164,9 +164,9 @@ def test_unknown_settings_are_refused():
 
 def test_representative_windows_cover_every_flight():
     recipe = Recipe(width=8, dilations=(1,))
-    found = quantisation.windows([np.full((50, CHANNELS), k) for k in range(4)], recipe, 8)
-    assert found.shape == (8, recipe.receptive_samples, CHANNELS)
-    assert sorted(set(found[:, 0, 0])) == [0, 1, 2, 3]
+    windows = quantisation.windows([np.full((50, CHANNELS), k) for k in range(4)], recipe, 8)
+    assert windows.shape == (8, recipe.receptive_samples, CHANNELS)
+    assert sorted(set(windows[:, 0, 0])) == [0, 1, 2, 3]
 
 
 def test_the_first_outputs_are_what_the_decoder_reads():
@@ -177,9 +177,9 @@ def test_goals_peak_where_their_edge_is_due():
     over = np.zeros(400, dtype=np.uint8)
     over[100:300] = 1
     edges = [logs.Edge(100, "entry", 0.8, 0.05), logs.Edge(300, "exit", 0.05, 0.8)]
-    wanted = goals(over, edges, SMALL)
-    assert wanted.shape == (400, len(OUTPUTS)) and wanted.dtype == np.float32
-    assert np.array_equal(np.flatnonzero(wanted[:, 0]), np.arange(100, 300) + SMALL.over_delay)
+    targets = goals(over, edges, SMALL)
+    assert targets.shape == (400, len(OUTPUTS)) and targets.dtype == np.float32
+    assert np.array_equal(np.flatnonzero(targets[:, 0]), np.arange(100, 300) + SMALL.over_delay)
     for column, edge in ((1, edges[0]), (2, edges[1])):
-        assert wanted[:, column].argmax() == edge.sample + SMALL.delay
-        assert wanted[:, column].max() == 1.0
+        assert targets[:, column].argmax() == edge.sample + SMALL.delay
+        assert targets[:, column].max() == 1.0

@@ -10,11 +10,11 @@ from airtouch.detector.best.recipe import CHANNELS, Recipe
 @pytest.mark.parametrize("flights", [3, 87, 100, 150, 300])
 def test_windows_are_not_all_at_the_ends_of_flights(flights):
     recipe = Recipe()
-    rest = 600
-    length = recipe.receptive_samples + rest
+    spare_rows = 600
+    length = recipe.receptive_samples + spare_rows
     along = np.repeat(np.arange(length, dtype=np.float32)[:, None], CHANNELS, axis=1)
-    found = windows([along + 10000 * i for i in range(flights)], recipe)
-    assert found.shape == (400, recipe.receptive_samples, CHANNELS)
-    starts, of_flight = found[:, 0, 0] % 10000, found[:, 0, 0] // 10000
-    assert np.mean((starts > 0) & (starts < rest)) >= 0.5
+    chosen = windows([along + 10000 * i for i in range(flights)], recipe)
+    assert chosen.shape == (400, recipe.receptive_samples, CHANNELS)
+    starts, of_flight = chosen[:, 0, 0] % 10000, chosen[:, 0, 0] // 10000
+    assert np.mean((starts > 0) & (starts < spare_rows)) >= 0.5
     assert of_flight.max() >= 0.9 * (flights - 1)

@@ -24,17 +24,18 @@ def test_labels_that_are_given_train_like_the_down_range(small):
     """The same edges, once read from the down range and once given, lead to the same bits."""
     flights = [made_flight(0), made_flight(1)]
     labels = [[logs.Edge(e.sample, e.kind, np.nan, np.nan) for e in logs.true_edges(log)] for log in flights]
-    given = best.fit([blind(log) for log in flights], seed=3, recipe=replace(SMALL, balance=1.0), pseudo_labels=labels)
-    read = best.fit(flights, seed=3, recipe=replace(SMALL, balance=1.0))
-    assert given.to_bytes() == read.to_bytes()
+    recipe = replace(SMALL, balance=1.0)
+    by_labels = best.fit([blind(log) for log in flights], seed=3, recipe=recipe, pseudo_labels=labels)
+    by_range = best.fit(flights, seed=3, recipe=recipe)
+    assert by_labels.to_bytes() == by_range.to_bytes()
 
 
 def test_training_goes_on_from_a_model(small):
     flights = [made_flight(2)]
     tuned = best.fit(flights, start=small, steps=SMALL.steps, peak_rate=1e-3)
     assert tuned.recipe.steps == SMALL.steps and tuned.recipe.width == small.recipe.width
-    moved = [np.abs(tuned.weights[name] - small.weights[name]).max() for name in small.weights]
-    assert 0 < max(moved) < 0.5
+    changes = [np.abs(tuned.weights[name] - small.weights[name]).max() for name in small.weights]
+    assert 0 < max(changes) < 0.5
     for i in range(1, 1 + len(SMALL.dilations)):
         kernel = small.weights[f"layer{i}.kernel"]
         zero = ~kernel.reshape(-1, 4, kernel.shape[-1]).any(axis=1)
@@ -61,9 +62,9 @@ def test_pseudo_labels_are_the_detections_without_the_lag(small):
         **small.metadata["decoder"], "entry_score": -6.0, "exit_score": -6.0}})
     log = blind(made_flight(7))
     labels, own = best.pseudo_labels([log, made_flight(7)], model)
-    found = best.run(log, model).edges
-    assert own is None and found and [e.sample for e in labels] == [max(e.sample - 20, 0) for e in found]
-    assert [e.kind for e in labels] == [e.kind for e in found]
+    edges = best.run(log, model).edges
+    assert own is None and edges and [e.sample for e in labels] == [max(e.sample - 20, 0) for e in edges]
+    assert [e.kind for e in labels] == [e.kind for e in edges]
 
 
 def test_free_air_is_drawn_and_has_no_goals():
@@ -74,21 +75,22 @@ def test_free_air_is_drawn_and_has_no_goals():
     calm = batches.flight_of(made_flight(1), recipe, ())
     assert not calm.goals.any() and not len(calm.edges)
     _, y = batches.batch([flight], recipe, np.random.default_rng(0), [calm])
-    without = [batches.batch([flight], recipe, np.random.default_rng(k))[1].any(axis=(1, 2)).mean() for k in range(20)]
-    mixed = [batches.batch([flight], recipe, np.random.default_rng(k), [calm])[1].any(axis=(1, 2)).mean()
-             for k in range(20)]
-    assert np.mean(mixed) == pytest.approx(0.5 * np.mean(without), abs=0.12)
+    sweeps_only = [batches.batch([flight], recipe, np.random.default_rng(k))[1].any(axis=(1, 2)).mean()
+                   for k in range(20)]
+    with_free_air = [batches.batch([flight], recipe, np.random.default_rng(k), [calm])[1].any(axis=(1, 2)).mean()
+                     for k in range(20)]
+    assert np.mean(with_free_air) == pytest.approx(0.5 * np.mean(sweeps_only), abs=0.12)
 
 
-def test_free_air_folders(tmp_path):
+def test_free_air_is_read_from_folders_and_a_bad_file_is_told(tmp_path):
     calm = made_flight(0)
     calm.columns["zrange_m"] = np.full(len(calm), 0.8)
     logs.write(calm, tmp_path / "calm.csv")
     logs.write(sensors.without(calm, ("rates",)), tmp_path / "no_gyro.csv")
     logs.write(sensors.without(calm, ("rates", "motors")), tmp_path / "bare.csv")
     (tmp_path / "manifest.csv").write_text("file\n")
-    told = []
-    assert len(free_air.read([tmp_path], told.append)) == 2 and len(told) == 1 and "bare.csv" in told[0]
+    messages = []
+    assert len(free_air.read([tmp_path], messages.append)) == 2 and len(messages) == 1 and "bare.csv" in messages[0]
     logs.write(made_flight(1), tmp_path / "edge.csv")
     with pytest.raises(AirTouchError, match="edge.csv.*not free air"):
         free_air.read([tmp_path])
@@ -117,17 +119,17 @@ def test_a_training_that_was_stopped_goes_on_to_the_same_bits(small, tmp_path, m
 
     monkeypatch.setattr(training, "KEEP_EVERY", 10)
     flights = [made_flight(0), made_flight(1)]
-    seen = []
+    reports = []
 
-    def stop(stage, done, _total, _note):
-        seen.append((stage, done))
-        if (stage, done) == ("steps", 50):
+    def stop(stage, step, _total, _note):
+        reports.append((stage, step))
+        if (stage, step) == ("steps", 50):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
-    assert len(list(tmp_path.iterdir())) == 1 and ("steps", 50) in seen
-    seen.clear()
-    again = best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
-    assert ("steps", 50) not in seen and not list(tmp_path.iterdir())
-    assert again.to_bytes() == small.to_bytes()
+    assert len(list(tmp_path.iterdir())) == 1 and ("steps", 50) in reports
+    reports.clear()
+    resumed_model = best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
+    assert ("steps", 50) not in reports and not list(tmp_path.iterdir())
+    assert resumed_model.to_bytes() == small.to_bytes()

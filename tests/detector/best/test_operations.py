@@ -63,6 +63,6 @@ def test_int8_is_the_float_operation_to_a_step_of_its_output(name):
         "weight_scale": np.full(WIDTH, 0.01, np.float32), "scale": np.array([0.02, 0.25], np.float32),
         "zero_point": np.zeros(2, np.int32)})
     patches = q if layer.reads else np.hstack(taps_of(layer, q, 0))
-    found = 0.25 * OPERATIONS[name].kind.run(int8, patches).reshape(ROWS, WIDTH)
+    output = 0.25 * OPERATIONS[name].kind.run(int8, patches).reshape(ROWS, WIDTH)
     true = OPERATIONS[name].rows(layer, 0.01 * weights, np.zeros(WIDTH), 0.02 * q)
-    assert np.abs(found - np.clip(true, -32.0, 31.75)).max() <= 0.126
+    assert np.abs(output - np.clip(true, -32.0, 31.75)).max() <= 0.126

@@ -15,22 +15,22 @@ def folder(tmp_path, text):
     return tmp_path
 
 
-def test_conditions_by_name(tmp_path):
-    where = folder(tmp_path, HEADER + "a.csv,clean,3,h79,-10,none,0.35\nb.csv,messy,,,,,\n")
-    assert read_manifest(where / "manifest.csv")["a.csv"] == Condition("clean", 3, "h79", -10.0, "none", 0.35)
-    assert [f.path.name for f in collect([where])] == ["a.csv"]
-    named = collect([where / "a.csv", where / "b.csv", where], speed_mps=0.2)
-    assert [f.path.name for f in named] == ["a.csv", "b.csv"]
-    assert [f.condition.speed_mps for f in named] == [0.35, 0.2]
+def test_files_have_the_conditions_of_their_manifest(tmp_path):
+    place = folder(tmp_path, HEADER + "a.csv,clean,3,h79,-10,none,0.35\nb.csv,messy,,,,,\n")
+    assert read_manifest(place / "manifest.csv")["a.csv"] == Condition("clean", 3, "h79", -10.0, "none", 0.35)
+    assert [f.path.name for f in collect([place])] == ["a.csv"]
+    dataset = collect([place / "a.csv", place / "b.csv", place], speed_mps=0.2)
+    assert [f.path.name for f in dataset] == ["a.csv", "b.csv"]
+    assert [f.condition.speed_mps for f in dataset] == [0.35, 0.2]
 
 
 def test_without_manifest_every_log(tmp_path):
-    where = folder(tmp_path, "")
-    (where / "manifest.csv").unlink()
-    assert [f.path.name for f in collect([where])] == ["a.csv", "b.csv", "c.csv.gz"]
+    place = folder(tmp_path, "")
+    (place / "manifest.csv").unlink()
+    assert [f.path.name for f in collect([place])] == ["a.csv", "b.csv", "c.csv.gz"]
 
 
-@pytest.mark.parametrize(("text", "said"), [
+@pytest.mark.parametrize(("text", "message"), [
     ("name,use\nx,clean\n", ":1: no column 'file'"),
     (HEADER + "a.csv,clean,three,,,,\n", ":2: fold is 'three'"),
     (HEADER + "a.csv,clean,0,,,,fast\n", ":2: speed_mps is 'fast'"),
@@ -40,19 +40,19 @@ def test_without_manifest_every_log(tmp_path):
     (HEADER + ",clean,0,,,,1\n", ":2: empty file name"),
     ("", "no column 'file'"),
 ])
-def test_bad_manifest_says_where(tmp_path, text, said):
+def test_bad_manifest_says_where(tmp_path, text, message):
     with pytest.raises(AirTouchError, match="manifest.csv") as error:
         collect([folder(tmp_path, text)])
-    assert said in str(error.value) and "\n" not in str(error.value)
+    assert message in str(error.value) and "\n" not in str(error.value)
 
 
-def test_binary_manifest(tmp_path):
+def test_a_manifest_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "manifest.csv").write_bytes(b"\xff\xfe\x00file")
     with pytest.raises(AirTouchError, match="cannot be read"):
         collect([tmp_path])
 
 
-def test_missing_and_empty(tmp_path):
+def test_a_missing_file_and_an_empty_folder_are_refused(tmp_path):
     with pytest.raises(AirTouchError, match="no such file"):
         collect([tmp_path / "none"])
     with pytest.raises(AirTouchError, match="no flights"):

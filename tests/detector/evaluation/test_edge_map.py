@@ -44,9 +44,9 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_zigzag_finds_the_shape(name):
-    found = edge_map.platforms(detected_points(SHAPES[name], zigzag(1.0, ROWS), sigma_s=0.05))
-    assert len(found) == 1
-    assert overlap(found[0].outline, SHAPES[name]) > 0.88
+    platforms = edge_map.platforms(detected_points(SHAPES[name], zigzag(1.0, ROWS), sigma_s=0.05))
+    assert len(platforms) == 1
+    assert overlap(platforms[0].outline, SHAPES[name]) > 0.88
 
 
 def test_the_uncertainty_is_the_timing_error_times_the_speed():
@@ -57,16 +57,16 @@ def test_the_uncertainty_is_the_timing_error_times_the_speed():
 
 
 def test_two_platforms_stay_two():
-    two = SHAPES["square"].union(shapely.affinity.translate(SHAPES["square"], xoff=1.4))
+    both_shapes = SHAPES["square"].union(shapely.affinity.translate(SHAPES["square"], xoff=1.4))
     xy = zigzag(1.0, ROWS) * [1.5, 1.0] + [0.7, 0.0]
-    assert len(edge_map.platforms(detected_points(two, xy))) == 2
+    assert len(edge_map.platforms(detected_points(both_shapes, xy))) == 2
 
 
 def test_a_single_sweep_gives_points_only():
     xy = zigzag(1.0, np.array([0.0]))
-    found = edge_map.platforms(detected_points(SHAPES["square"], xy))
-    assert len(found) == 1 and found[0].outline is None
-    assert found[0].far_side.x - found[0].near_side.x == pytest.approx(0.8, abs=0.01)
+    platforms = edge_map.platforms(detected_points(SHAPES["square"], xy))
+    assert len(platforms) == 1 and platforms[0].outline is None
+    assert platforms[0].far_side.x - platforms[0].near_side.x == pytest.approx(0.8, abs=0.01)
 
 
 def test_dead_reckoning_needs_a_speed():

@@ -23,8 +23,8 @@ def test_days_are_held_out_whole_in_even_groups():
 
 def test_the_authors_days_are_in_the_names(flights):
     groups = folds.by_day(collect([flights / "airtouch"]))
-    found = {f.condition.day for members in groups.values() for f in members}
-    assert found == {"0102", "0103", "0108", "0126", "0127", "0128", "0201"}
+    days = {f.condition.day for members in groups.values() for f in members}
+    assert days == {"0102", "0103", "0108", "0126", "0127", "0128", "0201"}
     assert day_of(Path("f0.csv.gz")) is None
 
 

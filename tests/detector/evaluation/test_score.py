@@ -45,8 +45,8 @@ def test_lag_is_taken_off_before_matching():
 
 
 def test_a_detection_serves_one_edge_and_the_rest_are_false():
-    near, far = Detection(1010, "entry"), Detection(1020, "entry")
-    score = flight([near, far, Detection(100, "exit")])
+    near, later = Detection(1010, "entry"), Detection(1020, "entry")
+    score = flight([near, later, Detection(100, "exit")])
     assert score.edges[0].detected_sample == 1010
     assert score.edges[1].detected_sample is None
     assert score.false == (1020, 100)
@@ -143,9 +143,9 @@ def test_an_edge_of_unknown_kind_changes_the_state_and_a_named_one_sets_it():
 
 
 def test_a_score_says_which_flight_and_which_edges():
-    missed, found = flight([Detection(1410, "exit")]).edges
-    assert missed == EdgeScore("entry", 1000)
-    assert found == EdgeScore("exit", 1400, 1410, "exit", pytest.approx(-0.1), pytest.approx(-0.02))
+    missed_edge, detected_edge = flight([Detection(1410, "exit")]).edges
+    assert missed_edge == EdgeScore("entry", 1000)
+    assert detected_edge == EdgeScore("exit", 1400, 1410, "exit", pytest.approx(-0.1), pytest.approx(-0.02))
     for true in ((ENTRY, EXIT), None):
         score = flight([Detection(500, "entry")], true=true)
         assert (score.file, score.condition, score.airborne_s) == ("f.csv", LOW, pytest.approx(16.0))
@@ -174,9 +174,9 @@ def test_a_score_is_the_same_after_it_was_json():
     assert (entry["balanced_accuracy"], entry["detections"], entry["airborne_s"]) == (0.625, 2, 16.0)
     assert entry["false"] == [500] and entry["condition"]["height"] == "low"
     assert [e["error_s"] for e in entry["edges"]] == [pytest.approx(0.1), None]
-    again = FlightScore.from_dict(entry)
-    np.testing.assert_array_equal(again.bins, bins)
-    assert replace(again, bins=score.bins) == score
+    restored = FlightScore.from_dict(entry)
+    np.testing.assert_array_equal(restored.bins, bins)
+    assert replace(restored, bins=score.bins) == score
     unknown = flight([Detection(500, "entry")], true=None)
     assert FlightScore.from_dict(json.loads(json.dumps(unknown.as_dict()))).false is None
     del entry["in_training"]  # as older files have it
@@ -203,7 +203,7 @@ def test_matching_is_optimal(true, detected):
     small, large, flip = (true, detected, False) if len(true) <= len(detected) else (detected, true, True)
     for order in itertools.permutations(range(len(large)), len(small)):
         distances = [abs(small[i] - large[j]) for i, j in enumerate(order)]
-        kept = [d for d in distances if d <= 150]
-        best = min(best, (-len(kept), sum(kept)))
+        matches = [d for d in distances if d <= 150]
+        best = min(best, (-len(matches), sum(matches)))
     assert (-len(pairs), sum(abs(true[r] - detected[c]) for r, c in pairs)) == best
     assert flip or len(true) <= len(detected)

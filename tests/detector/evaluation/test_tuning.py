@@ -28,5 +28,6 @@ def test_timed_f1_by_hand():
 
 
 def test_the_best_candidate_with_its_lag():
-    found = {"late": at(1030, 1430), "many": at(1000, 1400, 500, 600), "none": at()}
-    assert choose(found, [EDGES], lambda name, _: found[name]) == ("late", pytest.approx(0.3), pytest.approx(1.0))
+    detections = {"late": at(1030, 1430), "many": at(1000, 1400, 500, 600), "none": at()}
+    choice = choose(detections, [EDGES], lambda name, _: detections[name])
+    assert choice == ("late", pytest.approx(0.3), pytest.approx(1.0))

@@ -38,11 +38,11 @@ def test_edges_are_those_of_the_reference_that_steps_through_the_samples(flight)
 
 
 @given(flights(), st.integers(0, 100))
-def test_causal(flight, cut):
+def test_edges_do_not_depend_on_later_samples(flight, length):
     p, armed, alert, settings = flight
-    whole = decode(p, armed, alert, settings)
-    cut = min(cut, len(p))
-    assert decode(p[:cut], armed[:cut], alert[:cut], settings) == [e for e in whole if e.sample < cut]
+    full = decode(p, armed, alert, settings)
+    length = min(length, len(p))
+    assert decode(p[:length], armed[:length], alert[:length], settings) == [e for e in full if e.sample < length]
 
 
 @given(flights())
@@ -60,12 +60,12 @@ def test_edges_are_armed_sure_apart_and_in_turn(flight):
 @given(flights())
 def test_the_filter_only_drops(flight):
     p, armed, alert, settings = flight
-    every = decode(p, armed, None, settings)
-    kept = decode(p, armed, alert, settings)
-    assert [e for e in every if e in kept] == kept
-    for e in every:
+    unfiltered = decode(p, armed, None, settings)
+    filtered = decode(p, armed, alert, settings)
+    assert [e for e in unfiltered if e in filtered] == filtered
+    for e in unfiltered:
         recent = alert[max(e.sample + 1 - settings.alert_hold, 0):e.sample + 1].any()
-        assert (e in kept) == recent
+        assert (e in filtered) == recent
 
 
 def test_a_clean_pass_by_hand():
@@ -92,6 +92,6 @@ def test_equal_to_the_whole_pipeline():
     for physical in (True, False):
         events = edge_pipeline(acc, rng.normal(0, 0.1, (n, 3)), pwm, vehicle.load(), probability=p,
                                config=EdgePipelineConfig(physical_filter=physical))
-        found = decode(p, events.armed, events.alert if physical else None)
-        assert found == detections(events.edge, p)
-        assert found
+        decoded = decode(p, events.armed, events.alert if physical else None)
+        assert decoded == detections(events.edge, p)
+        assert decoded

@@ -28,12 +28,12 @@ def test_shapes_are_those_of_keras(rows, shape):
     graph = graph_of(rows, shape)
     x = keras.Input(shape)
     for layer in graph:
-        made = OPERATIONS[layer.operation].keras(layer)
-        for one in made:
-            x = one(x)
+        keras_layers = OPERATIONS[layer.operation].keras(layer)
+        for keras_layer in keras_layers:
+            x = keras_layer(x)
         outputs = x.shape[1:] if len(x.shape) == 4 else (1, 1, x.shape[1])
         assert tuple(outputs) == layer.output_shape
-        assert tuple(made[-1].weights[0].shape if made[-1].weights else ()) == layer.kernel_shape
+        assert tuple(keras_layers[-1].weights[0].shape if keras_layers[-1].weights else ()) == layer.kernel_shape
 
 
 @needs("tensorflow")

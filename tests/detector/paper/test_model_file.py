@@ -22,10 +22,10 @@ def model() -> model_file.Model:
 
 def test_a_model_comes_back_as_it_was(model: model_file.Model, tmp_path: Path) -> None:
     model.save(tmp_path / "m.npz")
-    again = model_file.load(tmp_path / "m.npz")
-    assert again.digest == model.digest and again.metadata == model.metadata and again.tflite == model.tflite
-    assert all((again.weights[name] == values).all() for name, values in model.weights.items())
-    assert again.to_bytes() == model.to_bytes()
+    reloaded = model_file.load(tmp_path / "m.npz")
+    assert reloaded.digest == model.digest and reloaded.metadata == model.metadata and reloaded.tflite == model.tflite
+    assert all((reloaded.weights[name] == values).all() for name, values in model.weights.items())
+    assert reloaded.to_bytes() == model.to_bytes()
     with pytest.raises(AirTouchError, match="--force"):
         model.save(tmp_path / "m.npz")
 
@@ -53,9 +53,9 @@ def test_any_bytes_give_one_line(data: bytes, zipped: bool) -> None:
 
 
 def test_a_damaged_model_gives_one_line_or_loads_whole(model: model_file.Model) -> None:
-    good, rng = model.to_bytes(), np.random.default_rng(0)
+    undamaged, rng = model.to_bytes(), np.random.default_rng(0)
     for _ in range(120):
-        data = bytearray(good)
+        data = bytearray(undamaged)
         if rng.random() < 0.3:
             data = data[:rng.integers(0, len(data))]
         for place in rng.integers(0, max(len(data), 1), size=rng.integers(1, 5)):
@@ -75,7 +75,7 @@ def arrays_of(model: model_file.Model) -> dict[str, np.ndarray]:
         return {name: file[name] for name in file.files}
 
 
-@pytest.mark.parametrize("name,change,said", [
+@pytest.mark.parametrize("name,change,message", [
     ("conv2.kernel", lambda a: a[:, :, :8], "another shape"),
     ("int8.dense1.weights", lambda a: a[:, :1000], "another shape"),
     ("dense1.bias", lambda a: a * np.nan, "not finite"),
@@ -89,7 +89,7 @@ def arrays_of(model: model_file.Model) -> dict[str, np.ndarray]:
     ("conv1.kernel", None, "no array"),
 ])
 def test_a_wrong_array_is_named(
-    model: model_file.Model, tmp_path: Path, name: str, change: Callable | None, said: str
+    model: model_file.Model, tmp_path: Path, name: str, change: Callable | None, message: str
 ) -> None:
     arrays: dict[str, Any] = dict(arrays_of(model))
     if change is None:
@@ -97,7 +97,7 @@ def test_a_wrong_array_is_named(
     else:
         arrays[name] = change(arrays[name])
     np.savez(tmp_path / "wrong.npz", **arrays)
-    with pytest.raises(AirTouchError, match=said) as error:
+    with pytest.raises(AirTouchError, match=message) as error:
         model_file.load(tmp_path / "wrong.npz")
     assert str(error.value).startswith(str(tmp_path / "wrong.npz")) and "\n" not in str(error.value)
 

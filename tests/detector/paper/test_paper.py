@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import short_flights
-from airtouch import logs, reference, vehicle
+from airtouch import reference, vehicle
 from airtouch.detector import paper, registry
 from airtouch.detector.paper.decoding import detections
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
-from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.parameters import DEFAULT
@@ -48,17 +47,17 @@ def test_edges_are_those_of_the_reference_pipeline(log, model):
 def test_the_filter_drops_edges_and_changes_no_probability(log, model):
     loose = easy(model)
     strict = replace(loose, metadata={**loose.metadata, "physical_filter": True})
-    without, with_it = paper.run(log, loose), paper.run(log, strict)
-    assert set(with_it.edges) <= set(without.edges)
-    assert np.array_equal(without.probability, with_it.probability, equal_nan=True)
+    unfiltered, filtered = paper.run(log, loose), paper.run(log, strict)
+    assert set(filtered.edges) <= set(unfiltered.edges)
+    assert np.array_equal(unfiltered.probability, filtered.probability, equal_nan=True)
 
 
-def test_causal(log, model):
+def test_probabilities_and_edges_do_not_depend_on_later_samples(log, model):
     loose = easy(model)
-    cut = 1200
-    whole, part = paper.run(log, loose), paper.run(log.slice(0, cut), loose)
-    assert np.array_equal(whole.probability[:cut], part.probability, equal_nan=True)
-    assert part.edges == [e for e in whole.edges if e.sample < cut]
+    length = 1200
+    full, part = paper.run(log, loose), paper.run(log.slice(0, length), loose)
+    assert np.array_equal(full.probability[:length], part.probability, equal_nan=True)
+    assert part.edges == [e for e in full.edges if e.sample < length]
 
 
 def test_the_down_range_is_no_input(log, model):
@@ -84,12 +83,14 @@ def test_a_model_of_another_version_is_refused(log, model):
 def test_every_registered_detector_offers_all(log):
     for name in registry.DETECTORS:
         module = registry.get(name)
-        assert all(callable(getattr(module, what)) for what in ("run", "fit", "load", "lag_s", "parameters")), name
+        functions = ("run", "fit", "load", "lag_s", "parameters")
+        assert all(callable(getattr(module, function)) for function in functions), name
     with pytest.raises(AirTouchError, match="known: "):
         registry.get("oracle")
 
 
-def test_baseline_gives_a_trace(log):
+def test_the_baseline_tells_edges_of_no_kind_and_no_probability(log):
     trace = registry.get("baseline").run(log)
-    assert isinstance(trace, Trace) and {e.kind for e in trace.edges} <= {"edge"}
-    assert logs.true_edges(log)
+    assert len(trace.probability) == len(log) and np.isnan(trace.probability).all()
+    assert trace.edges and {e.kind for e in trace.edges} == {"edge"}
+    assert all(0 <= e.sample < len(log) for e in trace.edges)

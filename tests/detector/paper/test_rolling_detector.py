@@ -40,8 +40,8 @@ def test_a_real_flight_has_the_answers_of_its_windows(model, flights: Path):
 
 def test_the_scale_belongs_to_the_file_and_to_the_digest(model, tmp_path: Path):
     model.save(tmp_path / "m.npz")
-    again = rolling.load(tmp_path / "m.npz")
-    assert again.to_bytes() == model.to_bytes() and again.digest == model.digest
+    reloaded = rolling.load(tmp_path / "m.npz")
+    assert reloaded.to_bytes() == model.to_bytes() and reloaded.digest == model.digest
     other = replace(model, scale=normalisation.FixedScale(model.scale.mean + 1, model.scale.deviation))
     assert other.digest != model.digest
 

@@ -38,8 +38,8 @@ def test_the_whole_loss_is_cross_entropy_and_lambda_times_the_force_loss(df_lamb
     expected = (-y * np.log(p) - (1 - y) * np.log(1 - p)
                 + df_lambda * np.where(alert == 1, np.exp(np.abs(p - 1)) - 1, np.exp(np.abs(p)) - 1))
     np.testing.assert_allclose(losses.edge_loss(df_lambda)(target, logits), expected, rtol=1e-5)
-    weighed = losses.edge_loss(df_lambda, (0.5, 4.0))(target, logits)
-    np.testing.assert_allclose(weighed, expected * np.where(y == 1, 4.0, 0.5), rtol=1e-5)
+    with_weights = losses.edge_loss(df_lambda, (0.5, 4.0))(target, logits)
+    np.testing.assert_allclose(with_weights, expected * np.where(y == 1, 4.0, 0.5), rtol=1e-5)
 
 
 def test_the_schedule_rises_from_initial_to_final() -> None:
@@ -52,9 +52,9 @@ def test_the_schedule_rises_from_initial_to_final() -> None:
 @pytest.mark.parametrize("block", [1, 4])
 def test_the_mask_drops_the_smallest(block: int) -> None:
     kernel = np.random.default_rng(0).normal(size=(2208, 16))
-    keep = pruning.keep_mask(kernel, 0.8, block)
-    assert keep.mean() == pytest.approx(0.2, abs=1e-4)
-    blocks = keep.reshape(-1, block, 16)
+    mask = pruning.keep_mask(kernel, 0.8, block)
+    assert mask.mean() == pytest.approx(0.2, abs=1e-4)
+    blocks = mask.reshape(-1, block, 16)
     assert (blocks == blocks[:, :1]).all()
     energy = np.square(kernel).reshape(-1, block, 16).sum(axis=1)
     assert energy[blocks[:, 0] == 0].max() <= energy[blocks[:, 0] == 1].min()
@@ -69,9 +69,9 @@ def test_one_cycle_rises_and_falls() -> None:
 
 def test_flights_are_held_out_whole_and_by_seed() -> None:
     assert len(training.held_out(3, 0)) == 0
-    held = training.held_out(80, 1)
-    assert len(held) == len(set(held)) == 12
-    assert (held == training.held_out(80, 1)).all() and (held != training.held_out(80, 2)).any()
+    hold_out = training.held_out(80, 1)
+    assert len(hold_out) == len(set(hold_out)) == 12
+    assert (hold_out == training.held_out(80, 1)).all() and (hold_out != training.held_out(80, 2)).any()
 
 
 def made_flight(seed: int, n: int = 900) -> FlightLog:
@@ -91,9 +91,9 @@ def made_flight(seed: int, n: int = 900) -> FlightLog:
 @pytest.mark.slow
 def test_training_learns_prunes_and_repeats_to_the_bit() -> None:
     flights = [made_flight(seed) for seed in range(6)]
-    seen: list[tuple[str, int, int]] = []
-    model = training.train_paper(flights, epochs=6, progress=lambda *told: seen.append(told[:3]))
-    assert ("features", 6, 6) in seen and any(stage == "epochs" for stage, _, _ in seen)
+    reports: list[tuple[str, int, int]] = []
+    model = training.train_paper(flights, epochs=6, progress=lambda *told: reports.append(told[:3]))
+    assert ("features", 6, 6) in reports and any(stage == "epochs" for stage, _, _ in reports)
     assert model.metadata["held_out_accuracy"]["int8"] > 0.75
     kernel = model.weights["dense1.kernel"]
     assert (kernel == 0).mean() == pytest.approx(0.8, abs=1e-3)
@@ -105,8 +105,8 @@ def test_training_learns_prunes_and_repeats_to_the_bit() -> None:
 
 
 def test_training_settings_out_of_range_are_refused() -> None:
-    for wrong in ({"epochs": 0}, {"sparsity": 1.0}, {"block": 3}, {"df_lambda": -1.0}):
+    for setting in ({"epochs": 0}, {"sparsity": 1.0}, {"block": 3}, {"df_lambda": -1.0}):
         with pytest.raises(AirTouchError, match="training"):
-            training.train_paper([], **wrong)
+            training.train_paper([], **setting)
     with pytest.raises(AirTouchError, match="no flight"):
         training.train_paper([])

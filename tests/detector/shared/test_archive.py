@@ -54,10 +54,10 @@ def test_a_file_larger_than_any_model_is_not_read(tmp_path):
         archive.read(tmp_path / "absent.npz")
 
 
-@pytest.mark.parametrize("kept", [0, 1, 30, 100, -1])
-def test_a_file_that_was_cut_off_is_refused(kept):
+@pytest.mark.parametrize("part", [0, 1, 30, 100, -1])
+def test_a_file_that_was_cut_off_is_refused(part):
     with pytest.raises(AirTouchError, match="not a model file"):
-        archive.parse(archive.to_bytes(ARRAYS, {})[:kept], "cut.npz")
+        archive.parse(archive.to_bytes(ARRAYS, {})[:part], "cut.npz")
 
 
 def test_another_kind_of_model_is_named():

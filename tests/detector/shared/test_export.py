@@ -58,6 +58,7 @@ int main(void) {
 
 
 def test_the_generated_sources_are_those_of_the_shipped_models() -> None:
+    """`check` raises where a file is stale, edited or foreign."""
     export.check(model_file.load(), MODEL)
     export.check(best.load(None), MODEL)
     export.check(rolling.load(None), MODEL)
@@ -105,9 +106,9 @@ def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path,
     flags = ["-std=c11", "-Os", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", *sanitizers,
              *(f"-I{folder}" for folder in (KERNELS, FIRMWARE, MODEL))]
     sources = [path for folder in (KERNELS, FIRMWARE, MODEL) for path in sorted(folder.glob("*.c"))]
-    made, error = compiled(compiler, flags, sources)
+    objects, error = compiled(compiler, flags, sources)
     assert not error, error
-    subprocess.run([compiler, *flags, str(tmp_path / "main.c"), *made, "-lm", "-o", str(tmp_path / "golden")],
+    subprocess.run([compiler, *flags, str(tmp_path / "main.c"), *objects, "-lm", "-o", str(tmp_path / "golden")],
                    check=True)
     assert subprocess.run([str(tmp_path / "golden")]).returncode == 0
 
@@ -115,8 +116,8 @@ def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path,
 @pytest.mark.parametrize("sparsity", [0.0, 0.9])
 def test_an_export_is_checked(tmp_path: Path, sparsity: float) -> None:
     model, other = random_model(1, sparsity), random_model(2, sparsity)
-    written = export.export(model, tmp_path / "model")
-    assert len(written) == 4
+    files = export.export(model, tmp_path / "model")
+    assert len(files) == 4
     export.check(model, tmp_path / "model")
     export.export(model, tmp_path / "model")  # nothing to change, nothing to refuse
     with pytest.raises(AirTouchError, match="--force"):

@@ -20,12 +20,12 @@ from made_flight import SMALL, made_flight
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
 def test_the_channels_of_a_missing_sensor_are_zero_and_the_others_as_they_were(sensor):
     log = made_flight(3)
-    whole, _ = batches.channels_of(log)
+    complete, _ = batches.channels_of(log)
     x, _ = batches.channels_of(sensors.without(log, (sensor,)))
     silent = list(sensors.CHANNELS_OF[sensor])
-    others = [i for i in range(12) if i not in silent]
-    assert not x[:, silent].any() and whole[:, [i for i in silent if i != 11]].any(axis=0).all()
-    assert np.array_equal(x[:, others], whole[:, others])
+    remaining = [i for i in range(12) if i not in silent]
+    assert not x[:, silent].any() and complete[:, [i for i in silent if i != 11]].any(axis=0).all()
+    assert np.array_equal(x[:, remaining], complete[:, remaining])
 
 
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
@@ -59,9 +59,9 @@ def test_the_rates_alone_tell_flight_from_ground(flights):
     for path in paths:
         log = logs.read(path)
         air = np.flatnonzero(logs.airborne(log))
-        said = sensors.flying(log.stack(GYRO))
-        assert not said[:max(air[0] - 30, 0)].any(), path
-        assert said[air[0] + 100:air[-1]].mean() > 0.999, path
+        airborne = sensors.flying(log.stack(GYRO))
+        assert not airborne[:max(air[0] - 30, 0)].any(), path
+        assert airborne[air[0] + 100:air[-1]].mean() > 0.999, path
 
 
 def test_flight_is_told_causally():
@@ -71,8 +71,8 @@ def test_flight_is_told_causally():
 
 def test_a_sensor_that_no_training_flight_has_is_silent_for_good():
     pytest.importorskip("tensorflow")
-    bare = [sensors.without(made_flight(i), ("acceleration",)) for i in (0, 1)]
-    model = best.fit(bare, recipe=SMALL)
+    logs = [sensors.without(made_flight(i), ("acceleration",)) for i in (0, 1)]
+    model = best.fit(logs, recipe=SMALL)
     assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
     log = made_flight(6)
     assert best.run(log, model).edges == best.run(sensors.without(log, ("acceleration",)), model).edges
@@ -108,8 +108,9 @@ def test_sample_by_sample_is_the_same_as_at_once(sensor):
     pieces = HostDetector(missing=sensors.missing(log))
     for first in range(0, len(log), 7):
         pieces.next({name: values[first:first + 7] for name, values in log.columns.items()})
-    whole = best.run(log)
-    assert np.array_equal(pieces.trace(log).probability, whole.probability) and pieces.trace(log).edges == whole.edges
+    at_once = best.run(log)
+    assert np.array_equal(pieces.trace(log).probability, at_once.probability)
+    assert pieces.trace(log).edges == at_once.edges
     with pytest.raises(AirTouchError, match="no column"):
         HostDetector().next(log.columns)
 
@@ -124,8 +125,8 @@ def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
     log = made_flight(4)
     assert not best.run(log, model).edges and best.run(sensors.without(log, ("motors",)), model).edges
     assert not best.run(sensors.without(log, ("acceleration",)), model).edges
-    wrong = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
-    wrong.save(tmp_path / "w.npz")
+    faulty = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
+    faulty.save(tmp_path / "w.npz")
     with pytest.raises(AirTouchError, match="not numbers"):
         best.load(tmp_path / "w.npz")
 
@@ -138,15 +139,15 @@ def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(s
     deaf = sensors.without(log, ("motors",))
     assert best.model_for(model, deaf) is spare
     with_it = evaluate.evaluate_flight(file, deaf, best, model).score
-    alone = evaluate.evaluate_flight(file, deaf, best, spare).score
-    assert with_it.as_dict() == alone.as_dict()
+    by_spare = evaluate.evaluate_flight(file, deaf, best, spare).score
+    assert with_it.as_dict() == by_spare.as_dict()
 
 
 def test_the_note_has_the_measured_figures():
-    whole, without = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
+    all_sensors, no_acceleration = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
     text = sensor_note.note(("acceleration",))
-    first = text.index(f"{without['missed']:.1%} missed of {without['edges']}")
-    assert first < text.index(f"{whole['missed']:.1%} missed of")
+    first = text.index(f"{no_acceleration['missed']:.1%} missed of {no_acceleration['edges']}")
+    assert first < text.index(f"{all_sensors['missed']:.1%} missed of")
     assert "\n" not in text
     assert not sensor_note.note(())
     assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}

@@ -27,14 +27,14 @@ def test_best_on_the_gap8_gives_the_same_edges_a_sample_later(flight, best_edges
 
 def test_nothing_goes_to_the_gap8_unless_a_detector_asks_for_it(flight, best_edges):
     _, acc, gyro, pwm = flight
-    app, gap8, found = AppCore(have_gap8=True), Gap8Core(), []
+    app, gap8, edges = AppCore(have_gap8=True), Gap8Core(), []
     for i in range(len(acc)):
         kind = app.step(acc[i], gyro[i], pwm[i])
-        found += [(i, kind)] if kind != "none" else []
+        edges += [(i, kind)] if kind != "none" else []
         assert list(app.packets()) == []
         if i % 50 == 0:
             assert gap8.heartbeat(10 * i) == b""
-    assert DETECTORS[int(app.params()["detector"])] == "best" and found == best_edges and app.log.health == 0
+    assert DETECTORS[int(app.params()["detector"])] == "best" and edges == best_edges and app.log.health == 0
     app.set_params(detector=DETECTORS.index("best-gap8"))
     app.step(acc[0], gyro[0], pwm[0])
     assert len(list(app.packets())) == 1
@@ -42,9 +42,9 @@ def test_nothing_goes_to_the_gap8_unless_a_detector_asks_for_it(flight, best_edg
 
 def test_a_third_of_the_packets_lost_delays_edges_and_changes_none(flight, best_edges):
     drone = Drone("best-gap8", loss=0.3, seed=1)
-    found = drone.fly(flight)
-    assert [kind for _, kind in found] == [kind for _, kind in best_edges]
-    assert all(0 <= late - at <= 30 for (late, _), (at, _) in zip(found, best_edges, strict=True))
+    edges = drone.fly(flight)
+    assert [kind for _, kind in edges] == [kind for _, kind in best_edges]
+    assert all(0 <= late - at <= 30 for (late, _), (at, _) in zip(edges, best_edges, strict=True))
     assert drone.app.log.lost == 0
 
 
@@ -60,9 +60,9 @@ def test_a_network_of_features_over_the_link_is_its_pipeline(flight, module):
         probability[i] = drone.app.log.probability
         edges += [(i, kind)] if kind != "none" else []
     expected = module.run(log).probability
-    known = np.flatnonzero(np.isfinite(probability))
-    assert len(known) > 100
-    np.testing.assert_allclose(probability[known], expected[known - 1], rtol=1e-6)  # known one sample later
+    answered = np.flatnonzero(np.isfinite(probability))
+    assert len(answered) > 100
+    np.testing.assert_allclose(probability[answered], expected[answered - 1], rtol=1e-6)  # known one sample later
     settings, physical = paper.decoding(module.load(None))
     later = pipeline(log, settings, np.append(np.nan, expected[:-1]), physical_filter=physical)
     assert edges == [(int(i), ("entry", "exit")[k - 1]) for i, k in enumerate(later.edge) if k]
@@ -147,15 +147,15 @@ def test_world_and_body_axes_come_out_level_with_the_nose_ahead():
     world = turns.apply(body)
     back = Rotation.from_rotvec(np.column_stack([np.zeros((300, 2)), -yaw]))
     level = back.apply(world)
-    plain, of_world, of_body = (AppCore({"detector": 1}) for _ in range(3))
+    of_level, of_world, of_body = (AppCore({"detector": 1}) for _ in range(3))
     for i in range(300):
-        rest = {"gyro": (0.1, 0.2, 0.3), "pwm": (40000.0,) * 4}
-        plain.step(level[i], **rest)
-        of_world.step(world[i], **rest, attitude=turns[i].as_quat())
-        of_body.step(body[i], **rest, attitude=turns[i].as_quat(), acc_in_body=True)
+        other_inputs = {"gyro": (0.1, 0.2, 0.3), "pwm": (40000.0,) * 4}
+        of_level.step(level[i], **other_inputs)
+        of_world.step(world[i], **other_inputs, attitude=turns[i].as_quat())
+        of_body.step(body[i], **other_inputs, attitude=turns[i].as_quat(), acc_in_body=True)
     for core in (of_world, of_body):
-        np.testing.assert_allclose(list(core.log.feature)[0], plain.log.feature[0], rtol=1e-3)
-        np.testing.assert_allclose(list(core.log.logit), list(plain.log.logit), atol=0.8)
+        np.testing.assert_allclose(list(core.log.feature)[0], of_level.log.feature[0], rtol=1e-3)
+        np.testing.assert_allclose(list(core.log.logit), list(of_level.log.logit), atol=0.8)
     axis = (back * turns)[-1].apply([0, 0, 1])  # f_w = m a - Psi R e_z
     force = np.array(list(of_world.log.force))
     np.testing.assert_allclose(np.cross(0.0362 * level[-1] - force, axis), 0, atol=1e-5)
@@ -178,13 +178,13 @@ def test_an_old_tick_is_no_stalled_app(now, last, stalled):
 
 def test_load_and_late_steps_are_logged():
     app = AppCore({"detector": 1})
-    rest = (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.0,) * 4
+    at_rest = (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.0,) * 4
     for microseconds, late in ((120, False), (70_000, True), (90, False)):
-        app.step(*rest)
+        app.step(*at_rest)
         app.time(microseconds, late)
-    app.step(*rest)
+    app.step(*at_rest)
     assert (app.log.load, app.log.loadMax, app.log.late) == (90, 65_535, 1)
     assert app.log.health == HEALTH["late"]
     for _ in range(100):
-        app.step(*rest)
+        app.step(*at_rest)
     assert app.log.health == 0

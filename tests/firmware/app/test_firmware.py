@@ -80,12 +80,12 @@ class Emulated:
         machine.write(self.sample, struct.pack("<3f3f4f5fI", *acc, *gyro, *pwm, *(np.nan,) * 5, 0))
         count += machine.call("appCoreStep", self.core, self.sample).instructions
         for _ in range(2):
-            called = machine.call("appCoreOutgoing", self.core, self.packet)
-            count += called.instructions
-            if called.value == 0:
+            outcome = machine.call("appCoreOutgoing", self.core, self.packet)
+            count += outcome.instructions
+            if outcome.value == 0:
                 break
             count += machine.call("appCoreSent", self.core, 1).instructions
-            reply = gap8.take(machine.read(self.packet, called.value))
+            reply = gap8.take(machine.read(self.packet, outcome.value))
             machine.write(self.packet, reply)
             count += machine.call("appCoreReceive", self.core, self.packet, len(reply)).instructions
         self.instructions.append(count)
@@ -101,18 +101,18 @@ def signals():
 @pytest.mark.parametrize("detector", range(5), ids=DETECTORS)
 def test_the_core_runs_on_a_cortex_m4_within_its_budget(program, signals, detector):
     emulated, desktop = Emulated(program, detector), AppCore({"detector": detector}, have_gap8=True, nonce=7)
-    one, other = Gap8Core(), Gap8Core()
+    link_a, link_b = Gap8Core(), Gap8Core()
     for acc, gyro, pwm in zip(*(s[600:1300] for s in signals), strict=True):
-        log = emulated.step(np.float32(acc), np.float32(gyro), np.float32(pwm), one)
+        log = emulated.step(np.float32(acc), np.float32(gyro), np.float32(pwm), link_a)
         desktop.step(acc, gyro, pwm)
         for packet in desktop.packets():
-            desktop.receive(other.take(packet))
+            desktop.receive(link_b.take(packet))
     expected = desktop.log
     assert list(log.logit) == list(expected.logit) and log.edges == expected.edges
     for name in ("feature", "force", "cfarPower", "threshold"):
-        said, wanted = (getattr(log, name), getattr(expected, name))
-        said, wanted = (said, wanted) if isinstance(said, float) else (list(said), list(wanted))
-        np.testing.assert_allclose(said, wanted, rtol=1e-4)
+        value, truth = (getattr(log, name), getattr(expected, name))
+        value, truth = (value, truth) if isinstance(value, float) else (list(value), list(truth))
+        np.testing.assert_allclose(value, truth, rtol=1e-4)
     steady = np.array(emulated.instructions[300:])
     stack = emulated.machine.stack_used()
     print(f"{DETECTORS[detector]}: {steady.mean():.0f} instructions a step, {steady.max()} at worst, start "
@@ -137,32 +137,32 @@ def undefined(path):
 
 
 def test_no_double_and_no_heap_in_the_cross_compiled_core(program):
-    called = set().union(*(undefined(program.objects[source.name]) for source in SOURCES))
-    assert "expf" in called
-    assert not {name for name in called if name.startswith("__aeabi_d") or "2d" in name or "alloc" in name}
-    assert not {name for name in called if name.startswith("__aeabi_f")}, "single precision must be the processor's own"
+    needed = set().union(*(undefined(program.objects[source.name]) for source in SOURCES))
+    assert "expf" in needed
+    assert not {name for name in needed if name.startswith("__aeabi_d") or "2d" in name or "alloc" in name}
+    assert not {name for name in needed if name.startswith("__aeabi_f")}, "single precision must be the processor's own"
 
 
 def test_log_and_parameter_names_are_those_of_the_virtual_drone():
     kinds = {"LOG_FLOAT": "float", "LOG_UINT8": "uint8_t", "LOG_UINT16": "uint16_t", "LOG_UINT32": "uint32_t"}
     logs = re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\((\w+), (\w+), &(?:core\.log\.)?(\w+)(?:\[(\d)\])?\)", GLUE)
-    found = {name: (kinds[kind], "health" if field == "healthLogger" else field, int(at or -1))
-             for kind, name, field, at in logs}
-    assert found == sitl.LOGS
+    declared = {name: (kinds[kind], "health" if field == "healthLogger" else field, int(at or -1))
+                for kind, name, field, at in logs}
+    assert declared == sitl.LOGS
     fields = dict(ffi.typeof("appLog_t").fields)
-    for kind, field, at in found.values():
+    for kind, field, at in declared.values():
         inner = fields[field].type
         assert (inner.item if at >= 0 else inner).cname == kind
     params = {name: field for _, name, field in re.findall(r"PARAM_ADD\((\w+), (\w+), &wanted\.(\w+)\)", GLUE)}
     assert params == sitl.PARAMS
-    assert {field for _, field, _ in found.values()} == set(fields)
+    assert {field for _, field, _ in declared.values()} == set(fields)
     assert set(params.values()) == {name for name, _ in ffi.typeof("appParams_t").fields}
 
 
 def test_the_build_lists_every_source_that_the_core_needs():
     text = (APP / "Kbuild").read_text()
-    built = {Path(name).stem for name in re.findall(r"[\w./]+\.o", text)}
-    assert {source.stem for source in SOURCES} <= built
+    listed = {Path(name).stem for name in re.findall(r"[\w./]+\.o", text)}
+    assert {source.stem for source in SOURCES} <= listed
 
 
 @pytest.mark.slow
@@ -172,13 +172,13 @@ def test_the_image_links_with_the_firmware(config, platform):
     base = os.environ.get("CRAZYFLIE_BASE")
     if not base or shutil.which("arm-none-eabi-gcc") is None:
         pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc")
-    run = make("firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
-               "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
-    assert run.returncode == 0 and "warning:" not in run.stderr, run.stderr[-3000:]
-    built = Path((ROOT / "build/firmware/image").read_text().strip())
-    assert built.name == platform + config.removeprefix("app-config") + ".bin"
-    assert run.stdout.rstrip().endswith("takes it")
-    assert flash.inspect(ROOT / built).target == "stm32"
+    process = make("firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
+                   "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
+    assert process.returncode == 0 and "warning:" not in process.stderr, process.stderr[-3000:]
+    path = Path((ROOT / "build/firmware/image").read_text().strip())
+    assert path.name == platform + config.removeprefix("app-config") + ".bin"
+    assert process.stdout.rstrip().endswith("takes it")
+    assert flash.inspect(ROOT / path).target == "stm32"
     image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
     assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
     assert firmwares_default(image, "wanted") == defaults()
@@ -198,20 +198,21 @@ def cross_compiler():
 def test_the_image_holds_the_defaults_of_the_parameters(tmp_path):
     # paramGetDefault() of the firmware looks a default up in the image of .data; it takes all else for zero.
     shutil.copy(ROOT / vehicle_header.FOLDER / "crazyflie-2.1-flow.h", tmp_path / "airtouch_vehicle.h")
-    run = subprocess.run([*cross_compiler(), "-std=gnu11", "-Os", "-fdata-sections", "-DCONFIG_PLATFORM_CF2",
-                          f"-I{tmp_path}", f"-I{Path(__file__).parent / 'crazyflie'}", *(f"-I{i}" for i in INCLUDES),
-                          "-c", APP / "airtouch_app.c", "-o", tmp_path / "app.o"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr[:3000]
+    process = subprocess.run([*cross_compiler(), "-std=gnu11", "-Os", "-fdata-sections", "-DCONFIG_PLATFORM_CF2",
+                              f"-I{tmp_path}", f"-I{Path(__file__).parent / 'crazyflie'}",
+                              *(f"-I{i}" for i in INCLUDES), "-c", APP / "airtouch_app.c", "-o", tmp_path / "app.o"],
+                             capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr[:3000]
     section, = (s for s in Elf(tmp_path / "app.o").sections if s.name == ".data.wanted")
     assert fields(section.data) == defaults()
 
 
 def firmwares_default(image, name):
     """What paramGetDefault() finds for the parameters in a variable of this image."""
-    at, start, end, stored = (image.symbols[n].address for n in (name, "_sdata", "_edata", "_sidata"))
+    at, start, end, load_address = (image.symbols[n].address for n in (name, "_sdata", "_edata", "_sidata"))
     assert start <= at <= end, "outside .data the firmware takes a default to be zero"
     data = image.path.with_suffix(".bin").read_bytes()
-    begin = stored + at - start - flash.STM32_FLASH.start
+    begin = load_address + at - start - flash.STM32_FLASH.start
     return fields(data[begin:begin + ffi.sizeof("appParams_t")])
 
 

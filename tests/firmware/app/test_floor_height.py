@@ -30,14 +30,14 @@ def library(tmp_path_factory):
     subprocess.run([compiler, "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
                     "-ffp-contract=off", "-shared",
                     "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all", SOURCE, "-lm", "-o", out], check=True)
-    found = ctypes.CDLL(str(out))
-    found.floorHeightRange.restype = found.floorHeightFlow.restype = ctypes.c_float
-    found.floorHeightRange.argtypes = [ctypes.POINTER(State), ctypes.c_float, ctypes.c_uint32, *[ctypes.c_float] * 3]
-    found.floorHeightFlow.argtypes = [ctypes.POINTER(State), ctypes.c_float]
-    return found
+    floor = ctypes.CDLL(str(out))
+    floor.floorHeightRange.restype = floor.floorHeightFlow.restype = ctypes.c_float
+    floor.floorHeightRange.argtypes = [ctypes.POINTER(State), ctypes.c_float, ctypes.c_uint32, *[ctypes.c_float] * 3]
+    floor.floorHeightFlow.argtypes = [ctypes.POINTER(State), ctypes.c_float]
+    return floor
 
 
-class Flown:
+class Crossing:
     """The C and the reference over the same readings; both must say the same."""
 
     def __init__(self, library):
@@ -49,11 +49,11 @@ class Flown:
         self.ms += ms
         cosine = float(np.float32(np.cos(tilt)))
         values = [float(np.float32(v)) for v in (distance, climb, height)]
-        got = self.library.floorHeightRange(self.state, values[0], self.ms, cosine, *values[1:])
-        wanted = self.reference.range(values[0], self.ms, cosine, *values[1:])
-        assert got == pytest.approx(wanted, abs=2e-5, nan_ok=True) and self.state.steps == self.reference.steps
-        self.passed.append(got)
-        return got
+        height_m = self.library.floorHeightRange(self.state, values[0], self.ms, cosine, *values[1:])
+        expected = self.reference.range(values[0], self.ms, cosine, *values[1:])
+        assert height_m == pytest.approx(expected, abs=2e-5, nan_ok=True) and self.state.steps == self.reference.steps
+        self.passed.append(height_m)
+        return height_m
 
     def fly(self, tops, heights=0.8, noise=0.0, seed=0, **given):
         """Readings over surfaces of these heights; what the estimator gets less the true height."""
@@ -65,8 +65,8 @@ class Flown:
 
 
 @pytest.fixture
-def flown(library):
-    return Flown(library)
+def drone(library):
+    return Crossing(library)
 
 
 def profile(*parts):
@@ -75,131 +75,131 @@ def profile(*parts):
 
 
 @pytest.mark.parametrize("top", [0.1, 0.3, TOP, 0.76])
-def test_a_platform_is_crossed_and_left(flown, top):
-    off = flown.fly(profile((0.0, 40), (top, 80), (0.0, 80)))
+def test_a_platform_is_crossed_and_left(drone, top):
+    off = drone.fly(profile((0.0, 40), (top, 80), (0.0, 80)))
     assert np.abs(off).max() < 0.003
-    assert flown.state.floor == 0.0 and flown.state.steps == 2
+    assert drone.state.floor == 0.0 and drone.state.steps == 2
 
 
 def test_noise_of_the_range_leaves_a_centimetre_that_fades(library):
     """Twenty flights with 4 mm of noise: what is left at the exit is gone within a second."""
     ends = []
     for seed in range(20):
-        flown = Flown(library)
-        off = flown.fly(profile((0.0, 40), (TOP, 80), (0.0, 80)), noise=0.004, seed=seed)
+        drone = Crossing(library)
+        off = drone.fly(profile((0.0, 40), (TOP, 80), (0.0, 80)), noise=0.004, seed=seed)
         assert np.abs(off[:120]).max() < 0.03
-        assert flown.state.floor == 0.0 and flown.state.steps == 2
+        assert drone.state.floor == 0.0 and drone.state.steps == 2
         ends.append(off[-10:].mean())
     assert np.abs(ends).max() < 0.006
 
 
-def test_soft_edges_of_three_readings(flown):
+def test_soft_edges_of_three_readings(drone):
     ramp = [0.24, 0.48]
-    off = flown.fly(np.concatenate([profile((0.0, 40)), ramp, profile((TOP, 80)), ramp[::-1], profile((0.0, 60))]))
-    assert np.abs(off).max() < 0.003 and flown.state.floor == 0.0
+    off = drone.fly(np.concatenate([profile((0.0, 40)), ramp, profile((TOP, 80)), ramp[::-1], profile((0.0, 60))]))
+    assert np.abs(off).max() < 0.003 and drone.state.floor == 0.0
 
 
-def test_a_climb_is_no_step(flown):
+def test_a_climb_is_no_step(drone):
     heights = np.concatenate([np.full(20, 0.3), np.linspace(0.3, 1.5, 48), np.full(40, 1.5)])  # 1 m/s
-    off = flown.fly(np.zeros(len(heights)), heights)
-    assert np.abs(off).max() < 1e-6 and flown.state.steps == 0
+    off = drone.fly(np.zeros(len(heights)), heights)
+    assert np.abs(off).max() < 1e-6 and drone.state.steps == 0
 
 
-def test_a_climb_over_a_platform_is_told_from_its_edge(flown):
+def test_a_climb_over_a_platform_is_told_from_its_edge(drone):
     heights = np.concatenate([np.full(40, 0.8), np.linspace(0.8, 1.2, 40), np.full(60, 1.2)])
-    off = flown.fly(profile((0.0, 50), (TOP, 60), (0.0, 30)), heights)
-    assert np.abs(off).max() < 0.01 and flown.state.steps == 2
+    off = drone.fly(profile((0.0, 50), (TOP, 60), (0.0, 30)), heights)
+    assert np.abs(off).max() < 0.01 and drone.state.steps == 2
 
 
-def test_a_slow_ramp_is_followed_as_the_firmware_does(flown):
+def test_a_slow_ramp_is_followed_as_the_firmware_does(drone):
     """A metre of floor in four seconds."""
     tops = np.linspace(0.0, 0.5, 80)
-    off = flown.fly(tops)
+    off = drone.fly(tops)
     np.testing.assert_allclose(off, -tops, atol=1e-6)
-    assert flown.state.steps == 0
+    assert drone.state.steps == 0
 
 
 @pytest.mark.parametrize("degrees", [5, 15, 25])
-def test_edges_under_tilt(flown, degrees):
+def test_edges_under_a_tilt_leave_the_height_as_it_is(drone, degrees):
     tilt = np.deg2rad(degrees)
     tops = profile((0.0, 40), (TOP, 60), (0.0, 60))
-    got = np.array([flown.read((0.8 - top) / np.cos(tilt), 0.8, tilt=tilt) * np.cos(tilt) for top in tops])
-    assert np.abs(got - 0.8).max() < 0.003 and flown.state.floor == 0.0
+    heights = np.array([drone.read((0.8 - top) / np.cos(tilt), 0.8, tilt=tilt) * np.cos(tilt) for top in tops])
+    assert np.abs(heights - 0.8).max() < 0.003 and drone.state.floor == 0.0
 
 
-def test_coming_out_of_a_tilt_is_no_step(flown):
+def test_coming_out_of_a_tilt_is_no_step(drone):
     for degrees in [0, 5, 10, 15, 20, 25, 20, 15, 10, 5, 0] * 3:
         tilt = np.deg2rad(degrees)
-        flown.read(0.8 / np.cos(tilt), 0.8, tilt=tilt)
-    assert flown.state.steps == 0 and flown.state.floor == 0.0
+        drone.read(0.8 / np.cos(tilt), 0.8, tilt=tilt)
+    assert drone.state.steps == 0 and drone.state.floor == 0.0
 
 
-def test_steeper_than_thirty_degrees_teaches_nothing(flown):
-    flown.fly(profile((0.0, 20)))
-    assert flown.read(0.08 / np.cos(0.7), 0.8, tilt=0.7) == pytest.approx(0.08 / np.cos(0.7), abs=1e-6)
-    assert flown.state.steps == 0
+def test_steeper_than_thirty_degrees_teaches_nothing(drone):
+    drone.fly(profile((0.0, 20)))
+    assert drone.read(0.08 / np.cos(0.7), 0.8, tilt=0.7) == pytest.approx(0.08 / np.cos(0.7), abs=1e-6)
+    assert drone.state.steps == 0
 
 
-def test_a_single_wrong_reading_passes_by(flown):
-    flown.fly(profile((0.0, 20)))
-    flown.read(1.9, 0.8)
-    off = flown.fly(profile((0.0, 40)))
-    assert np.abs(off).max() < 0.003 and flown.state.floor == 0.0
+def test_a_single_wrong_reading_passes_by(drone):
+    drone.fly(profile((0.0, 20)))
+    drone.read(1.9, 0.8)
+    off = drone.fly(profile((0.0, 40)))
+    assert np.abs(off).max() < 0.003 and drone.state.floor == 0.0
 
 
 @pytest.mark.parametrize("lost", [3, 20])
-def test_a_dropout_over_the_platform_keeps_the_height(flown, lost):
-    flown.fly(profile((0.0, 40), (TOP, 40)))
-    assert flown.read(0.08, 0.8, ms=MS * lost) == pytest.approx(0.8, abs=0.003)
-    off = flown.fly(profile((TOP, 20), (0.0, 60)))
+def test_a_dropout_over_the_platform_keeps_the_height(drone, lost):
+    drone.fly(profile((0.0, 40), (TOP, 40)))
+    assert drone.read(0.08, 0.8, ms=MS * lost) == pytest.approx(0.8, abs=0.003)
+    off = drone.fly(profile((TOP, 20), (0.0, 60)))
     assert np.abs(off).max() < 0.003
 
 
-def test_after_a_dropout_with_another_floor_it_is_the_firmware_again(flown):
-    flown.fly(profile((0.0, 40), (TOP, 40)))
-    assert flown.read(0.8, 0.8, ms=1000) == pytest.approx(0.8)
-    assert flown.state.floor == 0.0
-    flown.fly(profile((0.0, 20)))
-    assert flown.read(0.08, 0.8, ms=1000) == pytest.approx(0.08), "an entry that nobody saw: as without"
+def test_after_a_dropout_with_another_floor_it_is_the_firmware_again(drone):
+    drone.fly(profile((0.0, 40), (TOP, 40)))
+    assert drone.read(0.8, 0.8, ms=1000) == pytest.approx(0.8)
+    assert drone.state.floor == 0.0
+    drone.fly(profile((0.0, 20)))
+    assert drone.read(0.08, 0.8, ms=1000) == pytest.approx(0.08), "an entry that nobody saw: as without"
 
 
-def test_from_a_table_to_the_floor(flown):
-    off = flown.fly(profile((0.0, 40), (-0.7, 60), (0.0, 60)))
-    assert np.abs(off).max() < 0.003 and flown.state.floor == 0.0
+def test_from_a_table_to_the_floor(drone):
+    off = drone.fly(profile((0.0, 40), (-0.7, 60), (0.0, 60)))
+    assert np.abs(off).max() < 0.003 and drone.state.floor == 0.0
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
-def test_what_is_no_number_is_passed_on(flown, value):
-    flown.fly(profile((0.0, 20)))
-    got = flown.read(value, 0.8)
-    assert got == value or np.isnan(got)
-    assert flown.state.steps == 0
-    assert flown.read(0.8, np.nan) == pytest.approx(0.8) and flown.read(0.8, 0.8, climb=np.inf) == pytest.approx(0.8)
+def test_what_is_no_number_is_passed_on(drone, value):
+    drone.fly(profile((0.0, 20)))
+    height = drone.read(value, 0.8)
+    assert height == value or np.isnan(height)
+    assert drone.state.steps == 0
+    assert drone.read(0.8, np.nan) == pytest.approx(0.8) and drone.read(0.8, 0.8, climb=np.inf) == pytest.approx(0.8)
 
 
-def test_a_sum_beyond_belief_ends(flown):
-    flown.fly(profile((0.0, 20)))
+def test_a_sum_beyond_belief_ends(drone):
+    drone.fly(profile((0.0, 20)))
     for _ in range(4):
         for distance in (0.8, 3.9):
-            flown.read(distance, 0.8)
-    assert abs(flown.state.floor) <= 2.5
+            drone.read(distance, 0.8)
+    assert abs(drone.state.floor) <= 2.5
 
 
 def test_any_readings_leave_finite_numbers(library):
     rng = np.random.default_rng(5)
-    flown = Flown(library)
+    drone = Crossing(library)
     for _ in range(3000):
-        flown.read(rng.choice([0.0, 0.08, 0.8, 4.0, 1e30, np.nan, rng.uniform(0, 4)]),
+        drone.read(rng.choice([0.0, 0.08, 0.8, 4.0, 1e30, np.nan, rng.uniform(0, 4)]),
                    rng.choice([0.8, 1e30, rng.uniform(-1, 3)]),
                    rng.choice([0.0, -1.0, 1.0, 1e30]), rng.choice([0.0, 0.3, 1.5, 3.0]), int(rng.choice([1, 25, 200])))
-        assert np.isfinite(flown.state.floor) and abs(flown.state.floor) <= 2.5
+        assert np.isfinite(drone.state.floor) and abs(drone.state.floor) <= 2.5
 
 
-def test_flow_is_scaled_to_the_platform(flown):
+def test_flow_is_scaled_to_the_platform(drone):
     def flow(height):
-        return flown.library.floorHeightFlow(flown.state, height)
+        return drone.library.floorHeightFlow(drone.state, height)
 
     assert flow(0.8) == 1.0
-    flown.fly(profile((0.0, 40), (0.5, 40)))
-    assert flow(0.8) == pytest.approx(0.3 / 0.8, abs=1e-3) == flown.reference.flow(0.8)
+    drone.fly(profile((0.0, 40), (0.5, 40)))
+    assert flow(0.8) == pytest.approx(0.3 / 0.8, abs=1e-3) == drone.reference.flow(0.8)
     assert flow(0.52) == pytest.approx(0.08 / 0.52, abs=1e-3) and flow(0.0) == 1.0

@@ -11,7 +11,7 @@ from airtouch.detector.paper.features import pipeline
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import LINK, PARAM_TYPES, PARAMS, AppCore
 from airtouch.kernels.library import ffi, lib
-from firmware.drone import Drone, said
+from firmware.drone import Drone, edges_and_rows
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMid": (1e9, 48.0),
                 "bandWidth": (50.0, 2.0), "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99),
@@ -23,15 +23,15 @@ OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMi
 def test_a_parameter_out_of_range_is_put_right_counted_and_logged(flight, name):
     _, acc, gyro, pwm = flight
     drone = Drone("best")
-    asked, given = OUT_OF_RANGE[name]
-    assert drone.app.set_params(**{name: asked}) == 1
-    assert drone.app.params()[name] == pytest.approx(given, rel=1e-5)
+    value, corrected = OUT_OF_RANGE[name]
+    assert drone.app.set_params(**{name: value}) == 1
+    assert drone.app.params()[name] == pytest.approx(corrected, rel=1e-5)
     drone.step(acc[0], gyro[0], pwm[0])
     assert "parameter clamped" in drone.health and drone.app.log.paramErrors == 1
-    if not isinstance(given, int):
-        usual = AppCore().params()[name]
+    if not isinstance(corrected, int):
+        default = AppCore().params()[name]
         assert drone.app.set_params(**{name: np.nan}) == 1
-        assert drone.app.params()[name] == pytest.approx(usual)
+        assert drone.app.params()[name] == pytest.approx(default)
 
 
 def test_an_unknown_parameter_is_refused():
@@ -68,24 +68,24 @@ def test_decoding_as_shipped_is_that_of_the_detector_in_force(recorded):
 
 def test_settings_are_compared_field_by_field_and_nothing_between_them_counts():
     size = ffi.sizeof("appParams_t")
-    one, other = ffi.new("appParams_t *"), ffi.new("appParams_t *")
-    ffi.memmove(one, b"\x00" * size, size)
-    ffi.memmove(other, b"\xff" * size, size)  # what lies between the fields differs
+    settings, same_settings = ffi.new("appParams_t *"), ffi.new("appParams_t *")
+    ffi.memmove(settings, b"\x00" * size, size)
+    ffi.memmove(same_settings, b"\xff" * size, size)  # what lies between the fields differs
     for name in PARAMS:
-        setattr(one, name, 1)
-        setattr(other, name, 1)
-    assert lib.appHostSame(one, other)
+        setattr(settings, name, 1)
+        setattr(same_settings, name, 1)
+    assert lib.appHostSame(settings, same_settings)
     for name, kind in PARAM_TYPES.items():
-        setattr(other, name, 2)
-        assert not lib.appHostSame(one, other), name
-        setattr(other, name, 1)
+        setattr(same_settings, name, 2)
+        assert not lib.appHostSame(settings, same_settings), name
+        setattr(same_settings, name, 1)
         if kind == "float":  # else what was put right is never written back, and counts again each step
-            setattr(one, name, np.nan)
-            setattr(other, name, np.nan)
-            assert lib.appHostSame(one, other), name
-            setattr(one, name, 1)
-            assert not lib.appHostSame(one, other), name
-            setattr(other, name, 1)
+            setattr(settings, name, np.nan)
+            setattr(same_settings, name, np.nan)
+            assert lib.appHostSame(settings, same_settings), name
+            setattr(settings, name, 1)
+            assert not lib.appHostSame(settings, same_settings), name
+            setattr(same_settings, name, 1)
 
 
 def test_another_band_is_another_power(flight):
@@ -104,53 +104,53 @@ CHANGES = {300: {"pFa": 1e-3}, 420: {"bandMid": 3.0}, 640: {"bandWidth": 1.0}, 7
                                             ("best-gap8", {"answers": False}), ("best-gap8", {"have_gap8": False})],
                          ids=["stm32", "stm32-no-deck", "gap8", "silent-gap8", "no-gap8"])
 def test_band_and_false_alarms_change_nothing_of_best(flight, best_edges, detector, gap8):
-    edges, rows = said(Drone(detector, **gap8), flight, CHANGES)
-    usual, usual_rows = said(Drone(detector, **gap8), flight, {})
-    assert edges == usual and [kind for _, kind in edges] == [kind for _, kind in best_edges]
-    np.testing.assert_array_equal(rows[:, :5], usual_rows[:, :5])
+    edges, rows = edges_and_rows(Drone(detector, **gap8), flight, CHANGES)
+    default_edges, default_rows = edges_and_rows(Drone(detector, **gap8), flight, {})
+    assert edges == default_edges and [kind for _, kind in edges] == [kind for _, kind in best_edges]
+    np.testing.assert_array_equal(rows[:, :5], default_rows[:, :5])
 
 
 def test_another_false_alarm_probability_is_in_force_at_once(flight):
-    changed = said(Drone("cfar"), flight, {900: {"pFa": 1e-3}})[1]
-    before, after = said(Drone("cfar"), flight, {})[1], said(Drone("cfar"), flight, {0: {"pFa": 1e-3}})[1]
-    np.testing.assert_array_equal(changed[:900, 5:], before[:900, 5:])
-    np.testing.assert_array_equal(changed[900:, 5:], after[900:, 5:])
+    switched = edges_and_rows(Drone("cfar"), flight, {900: {"pFa": 1e-3}})[1]
+    before, after = (edges_and_rows(Drone("cfar"), flight, changes)[1] for changes in ({}, {0: {"pFa": 1e-3}}))
+    np.testing.assert_array_equal(switched[:900, 5:], before[:900, 5:])
+    np.testing.assert_array_equal(switched[900:, 5:], after[900:, 5:])
     assert np.all(after[100:, 5] < before[100:, 5])
 
 
 def test_another_band_leaves_the_threshold_alone(flight):
     changes = {at: change for at, change in CHANGES.items() if "pFa" not in change}
-    changed, usual = (said(Drone("cfar"), flight, c)[1] for c in (changes, {}))
-    np.testing.assert_array_equal(changed[:, 5:], usual[:, 5:])
+    switched, default = (edges_and_rows(Drone("cfar"), flight, c)[1] for c in (changes, {}))
+    np.testing.assert_array_equal(switched[:, 5:], default[:, 5:])
 
 
 @pytest.mark.parametrize("detector", ["paper-gap8", "paper-stream-gap8"])
 def test_another_band_begins_the_paper_pipeline_anew_and_false_alarms_do_not(flight, detector):
-    usual = said(Drone(detector), flight, {})[1][:, 3]
-    np.testing.assert_array_equal(said(Drone(detector), flight, {900: {"pFa": 1e-3}})[1][:, 3], usual)
-    changed = said(Drone(detector), flight, {900: {"bandMid": 5.0}})[1][:, 3]
+    default = edges_and_rows(Drone(detector), flight, {})[1][:, 3]
+    np.testing.assert_array_equal(edges_and_rows(Drone(detector), flight, {900: {"pFa": 1e-3}})[1][:, 3], default)
+    switched = edges_and_rows(Drone(detector), flight, {900: {"bandMid": 5.0}})[1][:, 3]
     later = tuple(x[900:] for x in flight[1:])
-    fresh = said(Drone(detector), (None, *later), {0: {"bandMid": 5.0}})[1][:, 3]
-    np.testing.assert_array_equal(changed[:900], usual[:900])
-    assert np.isnan(changed[900:900 + 290]).all() and np.isfinite(changed[900 + 310:]).all()
-    known = np.isfinite(changed[900:]) & np.isfinite(fresh)
-    assert known.sum() > 100
-    np.testing.assert_allclose(changed[900:][known], fresh[known], atol=0.02)
+    fresh = edges_and_rows(Drone(detector), (None, *later), {0: {"bandMid": 5.0}})[1][:, 3]
+    np.testing.assert_array_equal(switched[:900], default[:900])
+    assert np.isnan(switched[900:900 + 290]).all() and np.isfinite(switched[900 + 310:]).all()
+    answered = np.isfinite(switched[900:]) & np.isfinite(fresh)
+    assert answered.sum() > 100
+    np.testing.assert_allclose(switched[900:][answered], fresh[answered], atol=0.02)
 
 
 def test_a_change_in_a_recorded_flight_with_a_silent_gap8_loses_no_edge(recorded):
     flight, edges = recorded[0]
     first = edges[0][0]
     changes = {first - 200: {"pFa": 1e-5}, first - 100: {"bandMid": 6.0}}
-    assert len(edges) >= 2 and said(Drone("best-gap8", answers=False), flight, changes)[0] == edges
+    assert len(edges) >= 2 and edges_and_rows(Drone("best-gap8", answers=False), flight, changes)[0] == edges
 
 
 def test_switched_off_it_sends_and_finds_nothing_and_comes_back(flight):
     drone = Drone("best-gap8")
     drone.fly(flight, stop=500)
     drone.app.set_params(enable=0)
-    sent = drone.sent
-    assert drone.fly(flight) == [] and drone.sent == sent
+    packets_sent = drone.sent
+    assert drone.fly(flight) == [] and drone.sent == packets_sent
     drone.app.set_params(enable=1)
     drone.fly(flight, stop=500)
     assert LINK[drone.app.log.link] == "up"

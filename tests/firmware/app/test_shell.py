@@ -56,16 +56,16 @@ def shells(headers, tmp_path_factory):
     core, error = objects.compiled(compiler, command[1:], CORE)
     assert not error, error[:3000]
     for name, (flags, sources) in BUILDS.items():
-        done = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core, "-lm",
-                               "-o", folder / name], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr[:3000]
+        process = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core,
+                                  "-lm", "-o", folder / name], capture_output=True, text=True)
+        assert process.returncode == 0, process.stderr[:3000]
     return {name: folder / name for name in BUILDS}
 
 
 def run(program, *arguments):
-    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S)
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+    process = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S)
+    assert process.returncode == 0, process.stderr[-3000:]
+    return process.stdout
 
 
 @pytest.mark.parametrize("name", BUILDS)
@@ -90,8 +90,8 @@ def test_the_tap_gives_means(shells, story):
 
 
 def test_the_virtual_crazyflie_has_the_same_defaults(shells):
-    said = [line.split() for line in run(shells["app-config"], "tables").splitlines()]
-    params = {name.split(".")[1]: float.fromhex(value) for what, name, _, value in (w for w in said if w[0] == "param")}
+    lines = [line.split() for line in run(shells["app-config"], "tables").splitlines()]
+    params = {words[1].split(".")[1]: float.fromhex(words[3]) for words in lines if words[0] == "param"}
     virtual = Drone(scenario.draw_flight(scenario.load("paper-9cm"), 0, 0), vehicles.load(), 0, 0, [], ai_deck=True)
     assert params and {p.name.split(".")[1]: p.default for p in virtual.app.parameters()} == params
 
@@ -105,5 +105,5 @@ def test_names_are_no_longer_than_the_firmware_takes(shells):
 
 @pytest.mark.parametrize("name", ["app-config", "app-config-tap"])
 def test_shipped_configurations_leave_cpx_out(name):
-    said = (APP.parent / name).read_text().splitlines()
-    assert {"# CONFIG_DECK_AI is not set", "# CONFIG_ENABLE_CPX is not set"} <= set(said)
+    lines = (APP.parent / name).read_text().splitlines()
+    assert {"# CONFIG_DECK_AI is not set", "# CONFIG_ENABLE_CPX is not set"} <= set(lines)

@@ -39,45 +39,45 @@ def compiled(tmp_path, name, platform):
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     (tmp_path / "print.c").write_text(PRINT.format(name=name))
-    run = subprocess.run([compiler, "-Wall", "-Wextra", "-Werror", f"-DCONFIG_PLATFORM_{platform}", f"-I{HEADERS}",
-                          f"-I{ROOT / 'firmware/kernels'}", tmp_path / "print.c", "-o", tmp_path / "print"],
-                         capture_output=True, text=True)
-    return run, tmp_path / "print"
+    process = subprocess.run([compiler, "-Wall", "-Wextra", "-Werror", f"-DCONFIG_PLATFORM_{platform}", f"-I{HEADERS}",
+                              f"-I{ROOT / 'firmware/kernels'}", tmp_path / "print.c", "-o", tmp_path / "print"],
+                             capture_output=True, text=True)
+    return process, tmp_path / "print"
 
 
 def test_the_headers_are_those_of_the_vehicle_files():
     for name in vehicle_header.SHIPPED:
         vehicle_header.check(vehicles.load(name), HEADERS)
-    flown = {f.stem for f in (ROOT / "host/airtouch/vehicles").glob("*.toml") if vehicles.load(f.stem).platform}
-    assert set(vehicle_header.SHIPPED) == flown
+    buildable = {f.stem for f in (ROOT / "host/airtouch/vehicles").glob("*.toml") if vehicles.load(f.stem).platform}
+    assert set(vehicle_header.SHIPPED) == buildable
 
 
 @pytest.mark.parametrize("name", vehicle_header.SHIPPED)
 def test_a_header_has_the_numbers_of_its_file(name, tmp_path):
     text = (ROOT / "host/airtouch/vehicles" / f"{name}.toml").read_text()
     file = tomllib.loads(text)
-    run, program = compiled(tmp_path, name, file["platform"].upper())
-    assert run.returncode == 0, run.stderr
-    said = [float.fromhex(word) for word in subprocess.run([program], capture_output=True, text=True).stdout.split()]
-    wanted = [file["mass_kg"], file["gravity_mps2"], *file["thrust_of_pwm_n"], file.get("nominal_voltage_v", 0.0),
-              file.get("arm_pwm", 15000.0)]
-    assert said == [float(np.float32(value)) for value in wanted]
+    process, program = compiled(tmp_path, name, file["platform"].upper())
+    assert process.returncode == 0, process.stderr
+    numbers = [float.fromhex(word) for word in subprocess.run([program], capture_output=True, text=True).stdout.split()]
+    expected = [file["mass_kg"], file["gravity_mps2"], *file["thrust_of_pwm_n"], file.get("nominal_voltage_v", 0.0),
+                file.get("arm_pwm", 15000.0)]
+    assert numbers == [float(np.float32(value)) for value in expected]
 
 
 def test_a_header_refuses_another_platform(tmp_path):
-    run, _ = compiled(tmp_path, "crazyflie-2.1-brushless", "CF2")
-    assert run.returncode != 0 and "is flown by platform cf21bl: make firmware PLATFORM=cf21bl" in run.stderr
+    process, _ = compiled(tmp_path, "crazyflie-2.1-brushless", "CF2")
+    assert process.returncode != 0 and "is flown by platform cf21bl: make firmware PLATFORM=cf21bl" in process.stderr
 
 
 def test_armed_at_one_pwm_everywhere():
-    flown = vehicles.load()
-    assert flown.arm_pwm == DEFAULT.arm_pwm == MotionConfig().arm_pwm
+    vehicle = vehicles.load()
+    assert vehicle.arm_pwm == DEFAULT.arm_pwm == MotionConfig().arm_pwm
     brushless = vehicles.load("crazyflie-2.1-brushless")
 
     def share(v):
         return float(4 * v.thrust(v.arm_pwm) / (v.mass_kg * v.gravity_mps2))
 
-    assert share(brushless) == pytest.approx(share(flown), abs=0.01)
+    assert share(brushless) == pytest.approx(share(vehicle), abs=0.01)
     assert brushless.arm_pwm > 7000 + 2000  # what the firmware lets armed brushless motors idle at
 
 
@@ -109,8 +109,8 @@ def test_an_own_vehicle_that_cannot_be_built_for_is_refused(tmp_path, change, wo
     source = (ROOT / "host/airtouch/vehicles/crazyflie-2.1.toml").read_text()
     assert change[0] in source
     (tmp_path / "mine.toml").write_text(source.replace(*change))
-    refused = export("--vehicle", tmp_path / "mine.toml", "--out", tmp_path / "headers")
-    assert isinstance(refused.exception, AirTouchError) and words in str(refused.exception)
+    result = export("--vehicle", tmp_path / "mine.toml", "--out", tmp_path / "headers")
+    assert isinstance(result.exception, AirTouchError) and words in str(result.exception)
     assert not (tmp_path / "headers").exists()
 
 
@@ -125,7 +125,7 @@ def hover(vehicle):
     return np.full(4, (-c1 + np.sqrt(c1 * c1 + 4 * c2 * (each - c0))) / (2 * c2))
 
 
-def flown(app, pwm, steps=300):
+def last_log(app, pwm, steps=300):
     for step in range(steps):
         app.step((1e-3 * (step % 2), 0, 9.81), (0, 0, 0), pwm)
     return app.log
@@ -134,16 +134,16 @@ def flown(app, pwm, steps=300):
 @pytest.mark.parametrize("name", vehicle_header.SHIPPED)
 def test_in_hover_no_force_is_left_to_explain(name):
     vehicle = vehicles.load(name)
-    log = flown(AppCore(vehicle=vehicle), hover(vehicle))
+    log = last_log(AppCore(vehicle=vehicle), hover(vehicle))
     assert abs(log.force[2]) < 1e-3 * vehicle.mass_kg * vehicle.gravity_mps2
-    wrong = flown(AppCore(vehicle=replace(vehicle, mass_kg=1.1 * vehicle.mass_kg)), hover(vehicle))
-    assert wrong.force[2] == pytest.approx(0.1 * vehicle.mass_kg * vehicle.gravity_mps2, rel=0.02)
+    heavier = last_log(AppCore(vehicle=replace(vehicle, mass_kg=1.1 * vehicle.mass_kg)), hover(vehicle))
+    assert heavier.force[2] == pytest.approx(0.1 * vehicle.mass_kg * vehicle.gravity_mps2, rel=0.02)
 
 
 def test_networks_run_on_the_vehicle_that_they_were_trained_for():
     heavy = replace(vehicles.load(), mass_kg=0.040)  # the network does not see the mass
     for vehicle in (None, vehicles.load(), vehicles.load("crazyflie-2.1"), heavy):
-        log = flown(AppCore({"detector": 1}, vehicle=vehicle), hover(vehicle or vehicles.load()))
+        log = last_log(AppCore({"detector": 1}, vehicle=vehicle), hover(vehicle or vehicles.load()))
         assert DETECTORS[log.detector] == "best" and log.health == 0 and log.answers > 0
 
 
@@ -153,11 +153,11 @@ def test_networks_run_on_the_vehicle_that_they_were_trained_for():
 def test_on_another_vehicle_fr_cfar_runs_alone_and_health_says_so(detector, change):
     vehicle = replace(vehicles.load(), **change)
     app = AppCore({"detector": detector}, have_gap8=True, vehicle=vehicle)
-    log = flown(app, hover(vehicle))
+    log = last_log(app, hover(vehicle))
     assert DETECTORS[log.detector] == "cfar" and log.answers == 0 and list(app.packets()) == []
     assert log.health == (HEALTH["other vehicle"] if detector else 0)
     app.set_params(detector=0)
-    assert flown(app, hover(vehicle), 1).health == 0
+    assert last_log(app, hover(vehicle), 1).health == 0
 
 
 def edges(vehicle, pwm):

@@ -26,26 +26,26 @@ FLOAT32 = np.array([np.nan, np.inf, -np.inf, 0, -0.0, 1e-45, 1e-38, 3.4e38, -3.4
 
 @pytest.fixture(scope="module")
 def compiler():
-    found = shutil.which(os.environ.get("CC", "cc"))
-    if found is None:
+    path = shutil.which(os.environ.get("CC", "cc"))
+    if path is None:
         pytest.skip("no C compiler on this machine")
-    return found
+    return path
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
 def test_compiles_with_the_firmwares_flags(compiler, source, tmp_path):
-    run = subprocess.run([compiler, *FIRMWARE_FLAGS, "-ffreestanding", *INCLUDES, "-c", source, "-o",
-                          tmp_path / "kernel.o"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    process = subprocess.run([compiler, *FIRMWARE_FLAGS, "-ffreestanding", *INCLUDES, "-c", source, "-o",
+                              tmp_path / "kernel.o"], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
 
 
 @pytest.mark.parametrize("header", sorted(KERNELS.glob("*.h")), ids=lambda path: path.name)
-def test_headers_stand_alone(compiler, header, tmp_path):
+def test_each_header_compiles_by_itself(compiler, header, tmp_path):
     unit = tmp_path / "unit.c"
     unit.write_text(f'#include "{header.name}"\n#include "{header.name}"\nint unused;\n')
-    run = subprocess.run([compiler, *FIRMWARE_FLAGS, "-Wno-unused-function", *INCLUDES, "-fsyntax-only", unit],
-                         capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    process = subprocess.run([compiler, *FIRMWARE_FLAGS, "-Wno-unused-function", *INCLUDES, "-fsyntax-only", unit],
+                             capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
 
 
 @pytest.mark.parametrize("path", SOURCES + sorted(KERNELS.glob("*.h")), ids=lambda path: path.name)
@@ -88,6 +88,6 @@ def test_sanitizers_find_nothing_in_any_bytes(compiler, tmp_path):
                            capture_output=True, text=True)
     assert build.returncode == 0, build.stderr
     files = byte_files(tmp_path)
-    run = subprocess.run([driver, *files], capture_output=True, text=True, timeout=HANG_S)
-    assert run.returncode == 0, run.stderr[-3000:]
-    assert run.stdout == f"{len(files)} files\n"
+    process = subprocess.run([driver, *files], capture_output=True, text=True, timeout=HANG_S)
+    assert process.returncode == 0, process.stderr[-3000:]
+    assert process.stdout == f"{len(files)} files\n"

@@ -35,18 +35,18 @@ def compiler(request):
 def test_band_power_has_the_bits_of_the_package(compiler, flags, tmp_path, monkeypatch):
     """tests/kernels holds the package's bits against the definition."""
     out = tmp_path / "band_power.so"
-    built = subprocess.run([*compiler, *FLAGS, *flags, "-shared", "-fPIC", f"-I{KERNELS}", KERNELS / "band_power.c",
-                            HOST / "band_power_batch.c", "-lm", "-o", out], capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr
+    process = subprocess.run([*compiler, *FLAGS, *flags, "-shared", "-fPIC", f"-I{KERNELS}", KERNELS / "band_power.c",
+                              HOST / "band_power_batch.c", "-lm", "-o", out], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
     rng = np.random.default_rng(1)
     signals = (rng.normal(size=(900, 3)) * [1.0, 1e4, 1e-3] + [9.81, 4e4, 0.0]).astype(np.float32)
     signals[[40, 300, 301], [0, 1, 1]] = np.nan, np.inf, 1e15
     settings = [{}, {"window": 64, "band_hz": (3.0, 30.0)}, {"window": 150, "hop": 7}]
     expected = [band_power(signals, **s) for s in settings]
     monkeypatch.setattr(library, "lib", library.ffi.dlopen(str(out)))
-    for setting, right in zip(settings, expected, strict=True):
-        made = band_power(signals, **setting)
-        assert np.isfinite(made).any() and made.tobytes() == right.tobytes()
+    for setting, reference in zip(settings, expected, strict=True):
+        power = band_power(signals, **setting)
+        assert np.isfinite(power).any() and power.tobytes() == reference.tobytes()
 
 
 @pytest.mark.parametrize("source", sorted(KERNELS.glob("*.c")), ids=lambda path: path.name)
@@ -54,8 +54,8 @@ def test_plain_c_is_c11_and_nothing_else(source, tmp_path):
     command = COMPILERS["cc"]
     if not command[0]:
         pytest.skip("no C compiler on this machine")
-    used = [*KERNELS.glob("*.[ch]"), *GAP8.glob("*.h")]
-    for header in re.findall(r"#include <(.*?)>", "".join(path.read_text() for path in used)):
+    sources = [*KERNELS.glob("*.[ch]"), *GAP8.glob("*.h")]
+    for header in re.findall(r"#include <(.*?)>", "".join(path.read_text() for path in sources)):
         (tmp_path / header).write_text("")  # so that none of the C library's own words are there
     text = subprocess.run([*command, "-std=c11", "-nostdinc", f"-I{tmp_path}", f"-I{KERNELS}", f"-I{GAP8}", PLAIN, "-E",
                            "-P", source], capture_output=True, text=True, check=True).stdout

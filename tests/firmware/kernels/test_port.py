@@ -29,9 +29,9 @@ PUBLIC = sorted(path for tree in TREES for path in (ROOT / tree).glob("*.h") if 
 
 
 def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+    process = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr[-3000:]
+    return process.stdout
 
 
 def test_the_page_lists_every_kernel_once_or_more():
@@ -51,13 +51,13 @@ def test_a_list_builds_alone_for_a_cortex_m0(title, tmp_path):
     for i, source in enumerate(LISTS[title]):
         objects.append(tmp_path / f"{i}.o")
         run("arm-none-eabi-gcc", *core, "-Os", *FLAGS, "-c", ROOT / source, "-o", objects[-1])
-    whole = tmp_path / "whole.o"
-    run("arm-none-eabi-gcc", *core, "-nostdlib", "-r", *objects, "-o", whole)
-    missing = {line.split()[-1] for line in run("arm-none-eabi-nm", "--undefined-only", whole).splitlines()}
+    linked = tmp_path / "whole.o"
+    run("arm-none-eabi-gcc", *core, "-nostdlib", "-r", *objects, "-o", linked)
+    missing = {line.split()[-1] for line in run("arm-none-eabi-nm", "--undefined-only", linked).splitlines()}
     missing = {name for name in missing if not name.startswith(("__aeabi_", "__gnu_"))}
     assert missing <= LIBRARY, missing - LIBRARY
-    written = [line for line in run("arm-none-eabi-nm", whole).splitlines() if line.split()[-2] in "bBdDcC"]
-    assert written == [], "no globals that are written"
+    variables = [line for line in run("arm-none-eabi-nm", linked).splitlines() if line.split()[-2] in "bBdDcC"]
+    assert variables == [], "no globals that are written"
 
 
 def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
@@ -74,15 +74,15 @@ def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
         ROOT / "tests/firmware/kernels/port/example.cpp", *objects, "-lm", "-o", program)
     log = fly(scenario.load("paper-4cm"), vehicle.load(), seed=3)
     table = np.column_stack([log.stack(ACC_WORLD), log.stack(GYRO), log.stack(PWM)]).astype(np.float32)
-    said = subprocess.run([program], input=table.tobytes(), capture_output=True, check=True).stdout.decode().split("\n")
-    rows = [line.split() for line in said if line]
+    output = subprocess.run([program], input=table.tobytes(), capture_output=True, check=True).stdout.decode()
+    rows = [line.split() for line in output.split("\n") if line]
     model = best.load(None)
-    wanted = kernels.stream_detector(table[:, :3], table[:, 3:6], table[:, 6:], model.int8, model.recipe.motion,
-                                     model.decoder_without(()))
+    expected = kernels.stream_detector(table[:, :3], table[:, 3:6], table[:, 6:], model.int8, model.recipe.motion,
+                                       model.decoder_without(()))
     logits = np.array([[int(word, 16) for word in row[1:4]] for row in rows], np.uint32).view(np.float32)
-    np.testing.assert_array_equal(logits, wanted.logits)
+    np.testing.assert_array_equal(logits, expected.logits)
     edges = np.array([int(row[4]) for row in rows])
-    np.testing.assert_array_equal(edges, wanted.edge)
+    np.testing.assert_array_equal(edges, expected.edge)
     assert edges.any()
 
 
@@ -94,9 +94,9 @@ def test_a_public_header_says_what_it_needs_and_is_cpp(header, tmp_path):
     cpp = shutil.which("c++")
     if cpp is None:
         pytest.skip("no C++ compiler on this machine")
-    alone = tmp_path / "alone.cpp"
-    alone.write_text(f'#include "{header.name}"\n')
-    run(cpp, "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *INCLUDES, alone)
+    unit = tmp_path / "alone.cpp"
+    unit.write_text(f'#include "{header.name}"\n')
+    run(cpp, "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *INCLUDES, unit)
     code = re.sub(r"/\*.*?\*/|//[^\n]*", "", text, flags=re.S)
     functions = re.search(r"^[a-z][\w *]*\([^;{]*\)\s*[;{]", code, re.M)
     assert bool(functions) <= ('extern "C"' in code)

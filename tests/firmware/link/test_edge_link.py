@@ -17,30 +17,30 @@ STEP = {"acc": (0.0, 0.0, 9.81), "gyro": (0.0, 0.0, 0.0), "pwm": (40000.0,) * 4}
 
 def packets_of(detector, steps):
     app = AppCore({"detector": detector}, have_gap8=True)
-    gap8, sent, replies = Gap8Core(), [], []
+    gap8, packets, replies = Gap8Core(), [], []
     for _ in range(steps):
         app.step(**STEP)
         for packet in app.packets():
-            sent.append(packet)
+            packets.append(packet)
             replies.append(gap8.take(packet))
             app.receive(replies[-1])
-    return sent, replies
+    return packets, replies
 
 
 @pytest.mark.parametrize("detector", [2, 3])
 def test_packets_fit_and_end_with_the_published_crc(detector):
-    sent, replies = packets_of(detector, 700)
-    assert len(sent) > 400
-    for packet in sent + replies:
+    packets, replies = packets_of(detector, 700)
+    assert len(packets) > 400
+    for packet in packets + replies:
         assert 10 <= len(packet) <= 98
         assert packet[0] == 0xA1 and packet[2] == len(packet)
         assert int.from_bytes(packet[-2:], "little") == binascii.crc_hqx(packet[:-2], 0xFFFF)
 
 
 def test_a_sample_is_sent_once_where_nothing_is_lost():
-    sent, _ = packets_of(2, 700)
-    features = [packet for packet in sent if packet[1] == 2]
-    assert max(packet[10] for packet in features[60:]) == 1  # count
+    packets, _ = packets_of(2, 700)
+    feature_packets = [packet for packet in packets if packet[1] == 2]
+    assert max(packet[10] for packet in feature_packets[60:]) == 1  # count
 
 
 def test_any_bytes_change_nothing():
@@ -68,15 +68,15 @@ def result(session, sequence, expected, flags):
 
 def test_another_model_on_the_gap8_is_refused_and_said():
     app = AppCore({"detector": 2}, have_gap8=True)
-    asked = 0
+    requests = 0
     for _ in range(500):
         app.step(**STEP)
         for packet in app.packets():
             assert packet[1] == 1, "nothing but a reset is sent to a GAP8 with another model"
-            asked += 1
+            requests += 1
             app.receive(result(packet[3], int.from_bytes(packet[4:8], "little"), 0, 8))
     assert LINK[app.log.link] == "refused" and app.log.health & HEALTH["model refused"]
-    assert asked <= 6, "once a second"
+    assert requests <= 6, "once a second"
     assert DETECTORS[app.log.detector] == "best" and app.log.answers > 0, "the STM32 does it"
 
 

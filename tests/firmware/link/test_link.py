@@ -25,9 +25,9 @@ def driver(tmp_path_factory):
         for number, script in enumerate(scripts):
             files.append(folder / f"{number}.script")
             files[-1].write_bytes(script)
-        done = subprocess.run([program, *files], capture_output=True, text=True, timeout=HANG_S)
-        assert done.returncode == 0, done.stderr[-3000:]
-        return int(re.fullmatch(r"\d+ scripts, answers after at most (\d+) packets\n", done.stdout)[1])
+        process = subprocess.run([program, *files], capture_output=True, text=True, timeout=HANG_S)
+        assert process.returncode == 0, process.stderr[-3000:]
+        return int(re.fullmatch(r"\d+ scripts, answers after at most (\d+) packets\n", process.stdout)[1])
 
     return run
 
@@ -62,9 +62,9 @@ def test_a_burst_of_lost_packets_costs_nothing_but_time(driver, algorithm):
 
 def test_corrupted_lengths_and_lost_power_in_the_midst_of_flight(driver):
     longer = bytes([13, 7, 1]) * 200
-    cut = bytes([9, 40]) * 200
+    truncated = bytes([9, 40]) * 200
     lost_power = bytes([PASS] * 40 + [RESET] + [PASS] * 80 + [RESET, DROP, DROP] + [PASS] * 5)
-    driver([bytes([a]) + s for a in range(6) for s in (longer, cut, lost_power)])
+    driver([bytes([a]) + s for a in range(6) for s in (longer, truncated, lost_power)])
 
 
 def test_packets_that_look_right_and_say_anything_break_nothing(driver):

@@ -22,9 +22,9 @@ def driver(tmp_path_factory):
     program = build(Path(__file__).with_name("packet_driver.c"), tmp_path_factory.mktemp("packets") / "driver")
 
     def run(*words):
-        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
-        assert done.returncode == 0, done.stderr[-3000:]
-        return tuple(map(int, re.fullmatch(r"(\d+) packets read, (\d+) refused\n", done.stdout).groups()))
+        process = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
+        assert process.returncode == 0, process.stderr[-3000:]
+        return tuple(map(int, re.fullmatch(r"(\d+) packets read, (\d+) refused\n", process.stdout).groups()))
 
     return run
 
@@ -62,9 +62,9 @@ def test_a_packet_without_a_body_is_refused(driver, tmp_path, kind):
 
 
 def test_every_type_length_and_count_is_read_within_its_bytes(driver):
-    read, refused = driver("counts")
+    accepted, rejected = driver("counts")
     # RESET and HEARTBEAT have no count, so each is met with all 256; FEATURES has 7 counts, RESULT 8.
-    assert (read, refused) == (2 * 256 + 7 + 8, 10 * 140 * 256 - (2 * 256 + 7 + 8))
+    assert (accepted, rejected) == (2 * 256 + 7 + 8, 10 * 140 * 256 - (2 * 256 + 7 + 8))
 
 
 def bodies(kind):
@@ -90,5 +90,5 @@ PACKETS = st.one_of(
 def test_packets_are_read_as_they_are_documented_and_no_byte_further(driver, tmp_path_factory, packets):
     file = tmp_path_factory.mktemp("drawn") / "packets"
     file.write_bytes(records(packets))
-    good = sum(map(is_packet, packets))
-    assert driver(file) == (good, len(packets) - good)
+    valid = sum(map(is_packet, packets))
+    assert driver(file) == (valid, len(packets) - valid)

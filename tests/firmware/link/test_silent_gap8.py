@@ -34,14 +34,14 @@ def test_paper_without_answers_knows_no_probability(flight):
 def test_the_gap8_loses_power_and_the_link_for_five_seconds(flight):
     _, acc, gyro, pwm = flight
     drone, reference = Drone("best-gap8", beats=True), Drone("best")
-    logits, link, said, lag = [], [], [], []
+    logits, link, shown_logits, lag = [], [], [], []
     for i in range(1700):
         drone.answers = drone.beats = not 800 <= i < 1300
         if i == 500:
             drone.gap8.reset()
         drone.step(acc[i], gyro[i], pwm[i])
         link.append(LINK[drone.app.log.link])
-        said.append(list(drone.app.log.logit))
+        shown_logits.append(list(drone.app.log.logit))
         lag.append(drone.app.log.lag)
         reference.step(acc[i], gyro[i], pwm[i])
         logits.append(list(reference.app.log.logit))
@@ -51,8 +51,8 @@ def test_the_gap8_loses_power_and_the_link_for_five_seconds(flight):
     assert back[1] <= 50 + WINDOW, "after its next heartbeat"
     assert link[852:1300] == ["down"] * 448, "the log says that the link is down"
     for first, last in ((300, 500), (600, 800), (1400, 1700)):
-        assert said[first:last] == logits[first - 1:last - 1] and set(lag[first:last]) == {0}
-    assert said[870:1300] == logits[870:1300], "the STM32 runs the network meanwhile"
+        assert shown_logits[first:last] == logits[first - 1:last - 1] and set(lag[first:last]) == {0}
+    assert shown_logits[870:1300] == logits[870:1300], "the STM32 runs the network meanwhile"
     assert drone.health == set()
 
 
@@ -89,10 +89,10 @@ def tries(steps):
 
 
 def test_a_gap8_that_is_not_there_is_asked_ever_less_often():
-    sent = hover(Drone("best-gap8", answers=False), 6000)
+    steps = hover(Drone("best-gap8", answers=False), 6000)
     expected = tries(6000)
-    assert len(sent) == len(expected) == 50  # in a minute
-    np.testing.assert_allclose(sent, expected, atol=2)
+    assert len(steps) == len(expected) == 50  # in a minute
+    np.testing.assert_allclose(steps, expected, atol=2)
 
 
 @pytest.mark.parametrize("detector", ["best-gap8", "paper-gap8", "paper-stream-gap8"])
@@ -101,9 +101,9 @@ def test_a_gap8_that_dies_in_flight_is_asked_ever_less_often(detector):
     hover(drone, 700)
     assert LINK[drone.app.log.link] == "up"
     drone.answers = drone.beats = False
-    sent = np.array(hover(drone, 6000))
-    assert (sent < 15).sum() <= 10 and (sent >= HISTORY + 20).sum() <= 22
-    assert np.diff(sent).max() <= LONGEST
+    steps = np.array(hover(drone, 6000))
+    assert (steps < 15).sum() <= 10 and (steps >= HISTORY + 20).sum() <= 22
+    assert np.diff(steps).max() <= LONGEST
 
 
 @pytest.mark.parametrize("beats", [True, False], ids=["heartbeats", "no-heartbeat"])
@@ -134,13 +134,13 @@ def test_a_gap8_that_returns_is_found_in_a_bounded_time(detector, reset, beats):
 
 def test_heartbeats_alone_bring_two_packets_a_second():
     drone, other = Drone("best-gap8", answers=False), Drone("best-gap8")
-    sent = []
+    counts = []
     for i in range(2000):
-        sent.append(len(hover(drone, 1)))
+        counts.append(len(hover(drone, 1)))
         hover(other, 1)
         if i % 50 == 0:  # those of a GAP8 that another one speaks to
             drone.app.receive(other.gap8.heartbeat(10 * i))
-    assert drone.app.log.gap8Uptime == 19_500 and sum(sent[1000:]) <= 24
+    assert drone.app.log.gap8Uptime == 19_500 and sum(counts[1000:]) <= 24
 
 
 def test_a_gap8_says_nothing_before_it_is_spoken_to_and_falls_silent_after_ten_seconds():
@@ -154,12 +154,12 @@ def test_a_gap8_says_nothing_before_it_is_spoken_to_and_falls_silent_after_ten_s
 
 def test_a_gap8_that_knows_no_session_is_not_flooded():
     drone = Drone("best-gap8", answers=False)
-    sent = 0
+    packets = 0
     for _ in range(500):
         drone.app.step(*HOVER)
         for packet in drone.app.packets():
-            sent += 1
+            packets += 1
             for flags, expected in ((1, 0), (0, 1 << 20)):  # unknown; and it confirms what was never sent
                 body = struct.pack("<BBBBI", 0xA1, 3, 16, packet[3], 0) + struct.pack("<IBB", expected, flags, 0)
                 drone.app.receive(body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF)))
-    assert sent <= 51
+    assert packets <= 51

@@ -9,10 +9,10 @@ from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import less
 from airtouch.gap.signatures.candidates import terms
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 
-def read(name, x, covariance, reading):
+def combined(name, x, covariance, reading):
     """Values and 90 % intervals of an effect's parameters with a reading, from scaled ones."""
     term = next(t for t in terms(name) if len(t.free) == len(x))
     return term.quantities(*with_reading(term, np.array(x), np.array(covariance), reading))
@@ -20,7 +20,7 @@ def read(name, x, covariance, reading):
 
 def mass(value, deviation, reading):
     step = terms("mass")[0].step("fraction")
-    return read("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
+    return combined("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
 
 
 def test_a_reading_is_weighted_by_its_precision():
@@ -39,8 +39,8 @@ def test_an_interval_is_wider_where_replay_and_reading_disagree():
 def test_what_the_replay_knows_as_a_sum_stays_a_sum():
     """Of x + y the replay is sure, of either alone it is not: a reading of x moves y by as much the other way."""
     term = terms("com_offset")[0]
-    both = read("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
-                {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
+    both = combined("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
+                    {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
     assert both["x"].value == pytest.approx(0.5 * term.step("x"), rel=0.01)
     assert both["y"].value == pytest.approx(1.5 * term.step("y"), rel=0.01)
 
@@ -52,12 +52,12 @@ def test_a_parameter_without_a_reading_stays():
 def test_a_fit_goes_on_until_it_stands_still(study):
     """A battery's strength, charge and capacity lie along a bent valley; from its bottom nothing more is gained."""
     true = {"strength": 1.3, "charge": 0.7, "capacity": 1.0}
-    data = Data(study, [less(f, VEHICLE, ("vbat_V",)) for f in flown(1, 912, (("battery_sag", true),))])
-    whole, term = whole_of(data), terms("battery_sag")[0].refined()
-    begun = fit(data, whole, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
-    found = converged(data, whole, begun)
-    again = fit(data, whole, found.terms, found.scaled)
-    level = judge(data, whole, found.terms)
-    assert level > judge(data, whole, begun.terms) + 1.0  # else this flight tests nothing
-    assert judge(data, whole, again.terms) < level + SETTLED
-    assert level > judge(data, whole, [term.fitted(term.scaled(true))]) - SETTLED
+    data = Data(study, [less(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
+    blocks, term = whole_of(data), terms("battery_sag")[0].refined()
+    start = fit(data, blocks, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
+    result = converged(data, blocks, start)
+    refit = fit(data, blocks, result.terms, result.scaled)
+    level = judge(data, blocks, result.terms)
+    assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
+    assert judge(data, blocks, refit.terms) < level + SETTLED
+    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED

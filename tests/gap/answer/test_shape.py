@@ -6,12 +6,12 @@ from airtouch.gap.answer.named_effects import best_shape
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.signatures import candidates
-from gap_flights import flown
+from gap_flights import fly
 
 
 @pytest.mark.parametrize("fade", [0.0, 0.06])
 def test_the_shape_that_was_flown_is_found_whichever_was_taken_before(study, fade):
-    data = Data(study, flown(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
-    for taken in candidates.terms("ground_effect"):
-        found = best_shape(data, whole_of(data), [taken], None).terms[0].values
-        assert found["fade"] == fade
+    data = Data(study, fly(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
+    for start in candidates.terms("ground_effect"):
+        values = best_shape(data, whole_of(data), [start], None).terms[0].values
+        assert values["fade"] == fade

@@ -18,94 +18,94 @@ from made_diagnosis import VEHICLE, cell, diagnosis, of_flights
 
 
 @pytest.fixture(scope="module")
-def flown():
-    return made_diagnosis.flown()
+def pushed_flights():
+    return made_diagnosis.fly_pushed()
 
 
 def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
     cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
-    said = words.sentences(diagnosis(cells, effects=(Found("motor_noise", {}),)))
-    assert said[1] == "The effect named, motor noise (probability 93%), does not close this cell."
-    assert "500 to 475 times the floor" in said[2].replace("  ", " ")
+    sentences = words.sentences(diagnosis(cells, effects=(Found("motor_noise", {}),)))
+    assert sentences[1] == "The effect named, motor noise (probability 93%), does not close this cell."
+    assert "500 to 475 times the floor" in sentences[2].replace("  ", " ")
 
 
 def test_rotors_are_told_apart():
     weak = [Found("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
-    said = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
-    assert said == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
+    sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
+    assert sentence == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
 
 
 def test_what_got_worse_is_said():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
              cell("force_y", "ground", 2.6, after=8.8)]
-    said = words.sentences(diagnosis(cells))[2]
-    assert "2 of 3 cells still stand out, mostly on the ground in sideways force" in said
-    assert "(26 to 88 times the floor)" in said
-    assert said.endswith("and 2 got worse.")
+    sentence = words.sentences(diagnosis(cells))[2]
+    assert "2 of 3 cells still stand out, mostly on the ground in sideways force" in sentence
+    assert "(26 to 88 times the floor)" in sentence
+    assert sentence.endswith("and 2 got worse.")
     ground = next(p for p in summary.phases(cells) if p.name == "ground")
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
 
 
 def test_headline_and_ranking_cannot_disagree():
     first, beside = Found("motor_noise", {}), Found("weak_motor", {})
-    said = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],
-                                     effects=(first, beside)))
-    assert said[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
-    good = diagnosis()
-    for wrong in ({"effects": (beside, first)}, {"verdict": "none"}, {"verdict": "unknown"}, {"effects": ()},
-                  {"ranking": good.ranking[::-1]}):
+    sentences = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],
+                                          effects=(first, beside)))
+    assert sentences[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
+    consistent = diagnosis()
+    for contradiction in ({"effects": (beside, first)}, {"verdict": "none"}, {"verdict": "unknown"}, {"effects": ()},
+                          {"ranking": consistent.ranking[::-1]}):
         with pytest.raises(ValueError, match="ranking begins with"):
-            replace(good, **wrong)
+            replace(consistent, **contradiction)
 
 
 def test_a_diagnosis_prints_as_one_line():
     cells = [cell("force_z", "hover", 1.0, after=0.1)]
-    two = diagnosis(cells, effects=(Found("motor_noise", {}), Found("weak_motor", {})))
-    assert repr(two) == str(two) == ("Diagnosis(effect; motor_noise, weak_motor; probability 93%; "
-                                     "gap 4 before, 1.3 after (floor 1))")
+    two_effects = diagnosis(cells, effects=(Found("motor_noise", {}), Found("weak_motor", {})))
+    assert repr(two_effects) == str(two_effects) == ("Diagnosis(effect; motor_noise, weak_motor; probability 93%; "
+                                                     "gap 4 before, 1.3 after (floor 1))")
     none = replace(diagnosis(cells, "none", ()), ranking=(), gap={})
     assert str(none) == "Diagnosis(none)"
 
 
 def test_probabilities_agree_with_the_verdict():
     chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
-    made = agreeing(chance, "unknown")
-    assert made == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5} and agreeing(chance, "mass") == chance
+    adjusted = agreeing(chance, "unknown")
+    assert adjusted == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5} and agreeing(chance, "mass") == chance
     # one that was found in stretches of time alone
     assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}
 
 
-def test_closing_figures_are_one(flown, tmp_path):
+def test_closing_figures_are_one(pushed_flights, tmp_path):
     """Sentence, JSON and page have one share and one before and after;
     the calibrated arm, which is the same, is not told again."""
-    found = of_flights(flown)
-    same = {"before": 4.0, "after": 1.3, "shrink": found.shrink.plain()}
-    found = replace(found, arms={"declared": {"before": 5.0, "after": 2.0, "shrink": Quantity(0.7).plain()},
-                                 "calibrated": same})
-    plain = found.plain()
-    assert plain["shrink"] == plain["ranking"][0]["shrink"] and plain["gap"]["before"] == 4.0
-    assert "from 4 to 1.3 times the floor" in words.sentences(found)[2]
-    rows = gap_tables.how_far(found)["rows"]
+    result = of_flights(pushed_flights)
+    same = {"before": 4.0, "after": 1.3, "shrink": result.shrink.plain()}
+    result = replace(result, arms={"declared": {"before": 5.0, "after": 2.0, "shrink": Quantity(0.7).plain()},
+                                   "calibrated": same})
+    fields = result.plain()
+    assert fields["shrink"] == fields["ranking"][0]["shrink"] and fields["gap"]["before"] == 4.0
+    assert "from 4 to 1.3 times the floor" in words.sentences(result)[2]
+    rows = gap_tables.how_far(result)["rows"]
     assert [r["name"] for r in rows] == ["imu_bias", "wrong effect: wind", "imu_bias, vehicle as declared"]
     # the row that starts from another gap says why
     assert [r["why"] for r in rows] == ["", "", gap_tables.OTHER_START]
     page = tmp_path / "gap.html"
-    gap_report.write_diagnosis(page, found, command="x")
+    gap_report.write_diagnosis(page, result, command="x")
     assert page.read_text().count(gap_tables.OTHER_START) == 1
 
 
-def test_json_has_headline_map_and_steps(flown):
-    plain = of_flights(flown).plain()
-    assert plain["headline"] in plain["map"] and len(plain["map"]) > len(plain["where"])
-    assert plain["next"] == [{"text": "Weigh the <vehicle>.", "command": "airtouch collect --mission hover"}]
+def test_json_has_headline_map_and_steps(pushed_flights):
+    fields = of_flights(pushed_flights).plain()
+    assert fields["headline"] in fields["map"] and len(fields["map"]) > len(fields["where"])
+    assert fields["next"] == [{"text": "Weigh the <vehicle>.", "command": "airtouch collect --mission hover"}]
 
 
-def test_terminal_says_what_the_page_says(flown, capsys, monkeypatch):
+def test_terminal_says_what_the_page_says(pushed_flights, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
-    found = of_flights(flown)
-    gap_show.diagnosis(scores.console(), found)
+    result = of_flights(pushed_flights)
+    gap_show.diagnosis(scores.console(), result)
     out = " ".join(capsys.readouterr().out.split())
-    for part in (*words.sentences(found), "another fits better", "Weigh the <vehicle>.",
+    for part in (*words.sentences(result), "another fits better", "Weigh the <vehicle>.",
                  "airtouch collect --mission hover"):
         assert part in out, part
 
@@ -118,8 +118,9 @@ def test_advised_commands_can_be_given():
         values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high
                                    and not p.integer else p.default, unit=p.unit) for p in effect.parameters}
         line = advice.switched_on([Found(name, values)], VEHICLE.name)
-        given = registry.parse(line.split("--effect ")[1].strip("'"))
-        assert given[0] == name and given[1] == pytest.approx({k: q.value for k, q in values.items()}, rel=1e-3)
+        parsed_effect = registry.parse(line.split("--effect ")[1].strip("'"))
+        expected = {k: q.value for k, q in values.items()}
+        assert parsed_effect[0] == name and parsed_effect[1] == pytest.approx(expected, rel=1e-3)
     for name in (*advice.MISSIONS.values(), *(m for _, m in advice.SEPARATES.values() if m)):
         assert mission.load(name).legs
 

@@ -16,32 +16,32 @@ NOMINAL = Reference(np.zeros(6), np.array(BELIEFS.between) ** 2, np.zeros(2))  #
 UNCORRECTED = (-9.0, -9.0)
 
 
-def told(thrusts: np.ndarray) -> np.ndarray:
+def corrections(thrusts: np.ndarray) -> np.ndarray:
     """The pattern (8,) of commanded thrusts (4,), each over its nominal one; as steady as nominal flights."""
-    mixed = MIX @ thrusts
-    return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0]), 0.0, 0.0, *UNCORRECTED])
+    moments = MIX @ thrusts
+    return np.array([np.log(moments[0]), *(moments[1:] / moments[0]), 0.0, 0.0, *UNCORRECTED])
 
 
 def best(pattern: np.ndarray) -> tuple:
-    every = hypotheses(FLOWN)
-    logs, weights = evidence(pattern, NOMINAL, every)
+    explanations = hypotheses(FLOWN)
+    logs, weights = evidence(pattern, NOMINAL, explanations)
     i = int(np.argmax(logs))
-    return every[i], weights[i]
+    return explanations[i], weights[i]
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_a_rotor_that_needs_more_by_itself_is_weak(rotor):
     thrusts = np.ones(4)
     thrusts[rotor - 1] = 1.0 / (1.0 - 0.2)
-    found, weight = best(told(thrusts))
-    assert [(name, int(v["rotor"][0])) for name, v in found.effects] == [("weak_motor", rotor)]
-    assert weight @ found.effects[0][1]["thrust_loss"] == pytest.approx(0.2, abs=0.03)
+    explanation, weight = best(corrections(thrusts))
+    assert [(name, int(v["rotor"][0])) for name, v in explanation.effects] == [("weak_motor", rotor)]
+    assert weight @ explanation.effects[0][1]["thrust_loss"] == pytest.approx(0.2, abs=0.03)
 
 
 def test_two_rotors_across_from_each_other():
     thrusts = np.array([1.0, 1.0 / 0.8, 1.0, 1.0 / 0.8])
-    found, _ = best(told(thrusts))
-    assert [int(v["rotor"][0]) for _, v in found.effects] == [2, 4]
+    explanation, _ = best(corrections(thrusts))
+    assert [int(v["rotor"][0]) for _, v in explanation.effects] == [2, 4]
 
 
 def test_a_weight_in_front_keeps_yaw():
@@ -49,17 +49,17 @@ def test_a_weight_in_front_keeps_yaw():
     half = FLOWN.arm_m / np.sqrt(2.0)
     front = share * forward / half  # the front pair carries the weight's moment
     thrusts = 1.0 + share + np.array([front, -front, -front, front])
-    found, weight = best(told(thrusts))
-    assert [name for name, _ in found.effects] == ["mass", "com_offset"]
-    assert weight @ found.effects[0][1]["fraction"] == pytest.approx(share, abs=0.03)
-    assert weight @ found.effects[1][1]["x"] == pytest.approx(share / (1.0 + share) * forward, abs=0.0006)
+    explanation, weight = best(corrections(thrusts))
+    assert [name for name, _ in explanation.effects] == ["mass", "com_offset"]
+    assert weight @ explanation.effects[0][1]["fraction"] == pytest.approx(share, abs=0.03)
+    assert weight @ explanation.effects[1][1]["x"] == pytest.approx(share / (1.0 + share) * forward, abs=0.0006)
 
 
 def test_nominal_is_none_and_nonsense_is_unknown():
-    found, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0, *UNCORRECTED]))
-    assert found.name == "none"
-    found, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3, *UNCORRECTED]))
-    assert found.name == "unknown"
+    explanation, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0, *UNCORRECTED]))
+    assert explanation.name == "none"
+    explanation, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3, *UNCORRECTED]))
+    assert explanation.name == "unknown"
 
 
 def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
@@ -105,33 +105,33 @@ def nominal(pad):
     ("cut_M2_3.5mm_3.0mm_40.5mm_M1_3.0mm_3.0mm_41mm_E9_log00", [1, 2]),
 ])
 def test_cut_rotors_are_named(pad, nominal, name, rotors):
-    found = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
-    assert found.verdict == "effect"
-    assert [e.name for e in found.effects] == ["weak_motor"] * len(rotors)
-    assert [int(e.parameters["rotor"].value) for e in found.effects] == rotors
-    assert found.gap["after"] < 0.6 * found.gap["before"]
-    assert sum(r.probability for r in found.ranking) == pytest.approx(1.0)
+    result = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
+    assert result.verdict == "effect"
+    assert [e.name for e in result.effects] == ["weak_motor"] * len(rotors)
+    assert [int(e.parameters["rotor"].value) for e in result.effects] == rotors
+    assert result.gap["after"] < 0.6 * result.gap["before"]
+    assert sum(r.probability for r in result.ranking) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("name", "first"), [
     ("add_weight_W1_near_M3_M4_E8_log00", "mass"), ("weight_on_string_W2_near_M3_E8_log00", "slung_load")])
 def test_weights_are_named(pad, nominal, name, first):
-    found = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
-    assert found.effects[0].name == first
+    result = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
+    assert result.effects[0].name == first
     if first == "mass":  # near rotors 3 and 4, on the left
-        assert found.effects[1].parameters["y"].low > 0.0
+        assert result.effects[1].parameters["y"].low > 0.0
 
 
 def test_a_further_normal_flight_is_none(pad, nominal):
-    found = diagnose([pad("normal_flight_E9_log02")], FLOWN, nominal["E9"])
-    assert (found.verdict, found.effects, found.ranking[0].name) == ("none", (), "none")
+    result = diagnose([pad("normal_flight_E9_log02")], FLOWN, nominal["E9"])
+    assert (result.verdict, result.effects, result.ranking[0].name) == ("none", (), "none")
 
 
 def test_a_normal_flight_whose_position_was_measured_badly_is_none(pad, nominal):
-    found = diagnose([pad("normal_flight_E8_log03")], FLOWN, nominal["E8"][:3])  # 18 times their corrections
-    assert (found.verdict, found.effects) == ("none", ())
+    result = diagnose([pad("normal_flight_E8_log03")], FLOWN, nominal["E8"][:3])  # 18 times their corrections
+    assert (result.verdict, result.effects) == ("none", ())
 
 
 def test_flights_of_one_condition_together(pad, nominal):
-    found = diagnose([pad(f"cut_propeller_M3_3mm_E8_log0{i}") for i in (1, 2, 3)], FLOWN, nominal["E8"])
-    assert [(e.name, e.parameters["rotor"].value) for e in found.effects] == [("weak_motor", 3.0)]
+    result = diagnose([pad(f"cut_propeller_M3_3mm_E8_log0{i}") for i in (1, 2, 3)], FLOWN, nominal["E8"])
+    assert [(e.name, e.parameters["rotor"].value) for e in result.effects] == [("weak_motor", 3.0)]

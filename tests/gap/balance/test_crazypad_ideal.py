@@ -34,9 +34,9 @@ def test_slope_and_scatter_are_found_again():
                                                  strict=True)]
     scatter = np.array([0.013, 0.008, 0.008, 0.024])
     means = np.array([balance.change(c, 0.03, 1.2) for c in cuts]) + scatter * generator.standard_t(4, (400, 4))
-    found, left = balance.fitted(means, cuts)
-    assert found == pytest.approx([0.03, 1.2], rel=0.1)
-    assert balance.worked_on(left, np.full((400, 4), 1e-8), 4.0) == pytest.approx(scatter, rel=0.2)
+    coefficients, residuals = balance.fitted(means, cuts)
+    assert coefficients == pytest.approx([0.03, 1.2], rel=0.1)
+    assert balance.worked_on(residuals, np.full((400, 4), 1e-8), 4.0) == pytest.approx(scatter, rel=0.2)
 
 
 @pytest.mark.parametrize("learner", ideal.LEARNERS)
@@ -44,8 +44,8 @@ def test_learners_tell_what_is_apart_and_not_what_is_not(learner):
     generator = np.random.default_rng(2)
     names = ["normal_flight", "cut_propeller_M3_3mm", "add_weight_W1_near_M3", "weight_on_string_W2_near_M3"]
     rows = [{"drone": "E8", "condition": n} for n in names for _ in range(12)]
-    apart = np.repeat(np.eye(4), 12, axis=0)
+    separate = np.repeat(np.eye(4), 12, axis=0)
     folds = [np.arange(48) % 12 == i for i in range(12)]
-    sure = ideal.judged(ideal.Table(rows, 10.0 * apart + generator.normal(size=(48, 4))), folds, learner)
+    sure = ideal.judged(ideal.Table(rows, 10.0 * separate + generator.normal(size=(48, 4))), folds, learner)
     chance = ideal.judged(ideal.Table(rows, generator.normal(size=(48, 4))), folds, learner)
     assert pad.balanced(sure) > 0.95 and pad.balanced(chance) < 0.6

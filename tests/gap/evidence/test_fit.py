@@ -9,17 +9,17 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures import candidates
-from gap_flights import flown
+from gap_flights import fly
 
 
 @pytest.mark.parametrize("start", [0.05, 3.0])
 def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start):
-    given = {"strength": 1.0, "turbulence": 0.3}
-    data = Data(study, flown(1, 53, {"ground_effect": given}))
+    truth = {"strength": 1.0, "turbulence": 0.3}
+    data = Data(study, fly(1, 53, {"ground_effect": truth}))
     (mean,) = candidates.terms("ground_effect")[:1]
     terms = (mean, candidates.random_part_of("ground_effect"))
-    whole = whole_of(data)
-    free, begun = fit(data, whole, terms), fit(data, whole, terms, np.array([start]))
+    blocks = whole_of(data)
+    free, begun = fit(data, blocks, terms), fit(data, blocks, terms, np.array([start]))
     assert begun.gained == pytest.approx(free.gained, abs=1.0)
     assert begun.scaled == pytest.approx(free.scaled, rel=0.03)
     assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
@@ -27,7 +27,7 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
 
 def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(study):
     """Beside a random effect the commands' floor is less certain: a changed gain, seen in them alone, gains less."""
-    data = Data(study, flown(1, 54, {"controller_gain": {"height": 0.5}}))
+    data = Data(study, fly(1, 54, {"controller_gain": {"height": 0.5}}))
     on = judging.trial_of(data)
     gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
     chosen = judging.crossed(on, "controller_gain", (gain,), None, 0.0)

@@ -21,7 +21,7 @@ WEIGHT = VEHICLE.mass_kg * VEHICLE.gravity_mps2
 UPPER_GUESS = 0.01  #: rad s/m: the effect's default
 
 
-def flown(count, effects, seed):
+def fly(count, effects, seed):
     off = [e for e in scenario.load(SCENARIO).table.get("effects", {}) if e not in effects]
     logs = simulated(SCENARIO, count, vehicle=VEHICLE, effects=effects, without=off, seed=seed, workers=1)
     return [flight.ready(log, VEHICLE) for log in logs]
@@ -29,7 +29,7 @@ def flown(count, effects, seed):
 
 @pytest.fixture(scope="module")
 def study():
-    return calibrate.declared(VEHICLE, flown(5, {}, 31))
+    return calibrate.declared(VEHICLE, fly(5, {}, 31))
 
 
 def test_one_force_while_thrust_is_steady():
@@ -46,16 +46,16 @@ def test_one_force_while_thrust_is_steady():
     np.testing.assert_allclose(flapping, drag * np.sqrt(ratio)[:, None], atol=1e-15)
 
 
-@pytest.mark.parametrize(("tilt", "apart"), [(UPPER_GUESS, 40.0), (2.0 * UPPER_GUESS, 110.0)])
-def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, apart):
+@pytest.mark.parametrize(("tilt", "most_nats"), [(UPPER_GUESS, 40.0), (2.0 * UPPER_GUESS, 110.0)])
+def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, most_nats):
     """Log likelihood: 50 and 134 for a push against the speed, 32 and 87 for the moment of 15 mm of lever."""
-    data = Data(study, flown(1, {"blade_flapping": {"tilt": tilt}}, 32))
-    whole = whole_of(data)
-    none = fit.fit(data, whole, ()).gained
-    flapping, drag = (fit.fit(data, whole, candidates.terms(name)).gained - none
+    data = Data(study, fly(1, {"blade_flapping": {"tilt": tilt}}, 32))
+    blocks = whole_of(data)
+    none = fit.fit(data, blocks, ()).gained
+    flapping, drag = (fit.fit(data, blocks, candidates.terms(name)).gained - none
                       for name in ("blade_flapping", "rotor_drag"))
     assert min(flapping, drag) > 40.0
-    assert abs(flapping - drag) < apart
+    assert abs(flapping - drag) < most_nats
     assert candidates.names_alike("rotor_drag")[0] == candidates.names_alike("blade_flapping")[0]
 
 

@@ -21,57 +21,58 @@ from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 FROM_S, TO_S = 9.0, 15.0
 
 
 @pytest.fixture(scope="module")
-def quiet():
-    return flown(1, 62)[0]
+def nominal_flight():
+    return fly(1, 62)[0]
 
 
-def pushed(one, share):
+def pushed(nominal, share):
     """A flight that something presses down between FROM_S and TO_S, by a share of its weight."""
-    t = np.arange(len(one)) * flight.PERIOD_S
-    force = one.acceleration.copy()
+    t = np.arange(len(nominal)) * flight.PERIOD_S
+    force = nominal.acceleration.copy()
     force[(t >= FROM_S) & (t < TO_S), 2] -= share * VEHICLE.gravity_mps2
-    return replace(one, acceleration=force)
+    return replace(nominal, acceleration=force)
 
 
-def test_a_wake_is_found_with_its_seconds(study, quiet):
-    data = Data(study, [pushed(quiet, 0.1)])
-    found = max(gates.gated(data).values(), key=lambda g: g.gain)
-    assert found.gain > 100.0
-    acts = inside(found.fitted.terms[0].gate, quiet)
-    t = np.arange(len(quiet)) * flight.PERIOD_S
+def test_a_wake_is_found_with_its_seconds(study, nominal_flight):
+    data = Data(study, [pushed(nominal_flight, 0.1)])
+    strongest = max(gates.gated(data).values(), key=lambda g: g.gain)
+    assert strongest.gain > 100.0
+    acts = inside(strongest.fitted.terms[0].gate, nominal_flight)
+    t = np.arange(len(nominal_flight)) * flight.PERIOD_S
     true = (t >= FROM_S) & (t < TO_S)
     assert (acts & true).sum() > 0.7 * true.sum()
     assert (acts & ~true).sum() * flight.PERIOD_S < 3.0  # blocks last 2.56 s
 
 
-def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, quiet):
-    for name, found in gates.gated(Data(study, [quiet])).items():
-        rate = found.gain / (len(quiet) * flight.PERIOD_S)
-        assert found.gain < LEAST_GAIN or study.scatter.unusual(name, size_of(rate, found.strength)) < 0.0
+def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight):
+    for name, gated in gates.gated(Data(study, [nominal_flight])).items():
+        rate = gated.gain / (len(nominal_flight) * flight.PERIOD_S)
+        assert gated.gain < LEAST_GAIN or study.scatter.unusual(name, size_of(rate, gated.strength)) < 0.0
 
 
-def test_the_diagnosis_says_when(study, quiet):
-    told = brief(study, [pushed(quiet, 0.03)])
-    assert told.verdict == "effect"
-    assert told.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
-    stretches = [s for e in told.effects for s in e.seconds]
-    assert stretches and all(name == quiet.name for name, _, _ in stretches)
-    plain = next(e for e in told.plain()["effects"] if "seconds" in e)
-    assert FROM_S - 2.0 < plain["seconds"][0]["from_s"] < plain["seconds"][-1]["to_s"] < TO_S + 2.0
+def test_the_diagnosis_says_when(study, nominal_flight):
+    diagnosis = brief(study, [pushed(nominal_flight, 0.03)])
+    assert diagnosis.verdict == "effect"
+    assert diagnosis.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
+    stretches = [s for e in diagnosis.effects for s in e.seconds]
+    assert stretches and all(name == nominal_flight.name for name, _, _ in stretches)
+    fields = next(e for e in diagnosis.plain()["effects"] if "seconds" in e)
+    assert FROM_S - 2.0 < fields["seconds"][0]["from_s"] < fields["seconds"][-1]["to_s"] < TO_S + 2.0
 
 
-def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and_goes(study, quiet):
+def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and_goes(study, nominal_flight):
     """Its random force cannot be seen in the commands, so nothing may be gained by being less sure of their floor."""
     calm = replace(study, controller=replace(study.controller, floor=0.2 * study.controller.floor))
-    t = np.arange(len(quiet)) * flight.PERIOD_S
+    t = np.arange(len(nominal_flight)) * flight.PERIOD_S
     burst = ((t >= FROM_S) & (t < FROM_S + 2.0)) * np.random.default_rng(4).normal(size=len(t))
-    data = Data(calm, [replace(quiet, acceleration=quiet.acceleration + burst[:, None] * [0.0, 0.0, 0.5])])
+    acceleration = nominal_flight.acceleration + burst[:, None] * [0.0, 0.0, 0.5]
+    data = Data(calm, [replace(nominal_flight, acceleration=acceleration)])
     level = [judge(data, whole_of(data), (), wide) for wide in (False, True)]
     assert level[1] - level[0] > 100.0  # else this flight tests nothing
     assert gates.gated(data)["gust"].gain < 12.0  # it pushes sideways, the burst upwards
@@ -79,42 +80,42 @@ def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and
 
 def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
     wake = {"strength": 0.03, "width": 0.0, "turbulence": 1.0, "turbulence_time": 0.02, "swirl": 0.01}
-    assert brief(study, flown(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
+    assert brief(study, fly(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
     noise = {"rms": 0.02, "time": 0.02, "fast": 0.0, "fast_time": 0.01}
-    found = brief(study, flown(1, 904, (("motor_noise", noise),))).effects[0]
-    assert found.name == "motor_noise"
-    assert found.parameters["rms"].value == pytest.approx(0.02, rel=0.1)
+    effect = brief(study, fly(1, 904, (("motor_noise", noise),))).effects[0]
+    assert effect.name == "motor_noise"
+    assert effect.parameters["rms"].value == pytest.approx(0.02, rel=0.1)
 
 
-def test_what_adds_most_to_the_others_is_told_first(study, quiet):
-    both = pushed(quiet, 0.06)
+def test_what_adds_most_to_the_others_is_told_first(study, nominal_flight):
+    both = pushed(nominal_flight, 0.06)
     both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
-    found = select(Data(study, [both]), candidates.all_candidates())
-    shares = {s.name: s.share for s in found.named}
+    selection = select(Data(study, [both]), candidates.all_candidates())
+    shares = {s.name: s.share for s in selection.named}
     assert set(shares) == {"downwash", "imu_bias"}
-    assert [s.name for s in found.named] == sorted(shares, key=lambda n: -shares[n])
+    assert [s.name for s in selection.named] == sorted(shares, key=lambda n: -shares[n])
     assert all(share > 12.0 for share in shares.values())
 
 
-def test_samples_in_which_legs_may_touch_are_nobodys(quiet):
+def test_samples_in_which_legs_may_touch_are_nobodys(nominal_flight):
     n = 800
     z = np.r_[np.full(100, 0.05), np.linspace(0.05, 0.4, 100), np.full(600, 0.4)]
     z[500:510] = 0.052
     log = FlightLog({"t_s": np.arange(n) * 0.01, **{m: np.where(z > 0.0501, 40000.0, 0.0) for m in PWM},
                      "acc_x_mps2": np.zeros(n), "acc_y_mps2": np.zeros(n), "acc_z_mps2": np.full(n, 9.81), "z_m": z},
                     {"source": "made"})
-    made = flight.ready(log, VEHICLE)
-    assert list(np.flatnonzero(made.touching[300:])) == list(range(195, 215))
-    assert not made.touching[:90].any()
+    landed = flight.ready(log, VEHICLE)
+    assert list(np.flatnonzero(landed.touching[300:])) == list(range(195, 215))
+    assert not landed.touching[:90].any()
 
 
-def test_outside_its_gate_an_effect_changes_nothing(quiet):
+def test_outside_its_gate_an_effect_changes_nothing(nominal_flight):
     effect = effects.get("downwash")
     values = effect.values({"strength": 0.3, "width": 0.0, "turbulence": 0.0})
-    gated = Active(effect, values, ((quiet.name, FROM_S, TO_S),))
-    before, after = (residual(quiet, VEHICLE, a) for a in ((), (gated,)))
-    always = residual(quiet, VEHICLE, (Active(effect, values),))
-    on = inside(gated.gate, quiet)
+    gated = Active(effect, values, ((nominal_flight.name, FROM_S, TO_S),))
+    before, after = (residual(nominal_flight, VEHICLE, a) for a in ((), (gated,)))
+    always = residual(nominal_flight, VEHICLE, (Active(effect, values),))
+    on = inside(gated.gate, nominal_flight)
     np.testing.assert_array_equal(after[~on], before[~on])
     np.testing.assert_allclose(after[on], always[on], atol=1e-9)
     assert np.abs(after[on, 2] - before[on, 2]).min() > 0.2 * VEHICLE.gravity_mps2
@@ -138,17 +139,17 @@ def test_every_gated_effect_is_one_of_the_registry():
     assert "wind" not in candidates.gated(["wind"])
 
 
-def test_what_stays_open_is_shown_with_its_seconds(study, quiet):
+def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
     rng = np.random.default_rng(3)
-    t = np.arange(len(quiet)) * flight.PERIOD_S
+    t = np.arange(len(nominal_flight)) * flight.PERIOD_S
     on = (t >= FROM_S) & (t < TO_S)
-    force = quiet.acceleration.copy()
+    force = nominal_flight.acceleration.copy()
     force[on, 1] += 1.5 * np.sin(2.0 * np.pi * 4.0 * t[on]) + 0.1 * rng.normal(size=on.sum())
-    odd = replace(quiet, acceleration=force)
-    found = select(Data(study, [odd]), {}, without=tuple(candidates.GATED))
+    odd = replace(nominal_flight, acceleration=force)
+    selection = select(Data(study, [odd]), {}, without=tuple(candidates.GATED))
     cell = Cell("force_y", (2.0, 6.0), "cruise", 0.5, 0.1, "m/s^2")
-    first, = unexplained(study, [odd], found, [cell])
-    assert (first["channel"], first["flight"]) == ("force_y", quiet.name)
+    first, = unexplained(study, [odd], selection, [cell])
+    assert (first["channel"], first["flight"]) == ("force_y", nominal_flight.name)
     assert FROM_S - 2.0 < first["from_s"] < first["to_s"] < TO_S + 2.0
     assert first["over_floor"] > 3.0
 
@@ -164,11 +165,11 @@ def test_words_say_when_and_what_is_open():
         == "lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of b.csv; follows height and speed"
 
 
-def test_nothing_comes_and_goes_in_take_off_and_landing(study, quiet):
-    ends = np.isin(quiet.phase, gates.ENDS)
+def test_nothing_comes_and_goes_in_take_off_and_landing(study, nominal_flight):
+    ends = np.isin(nominal_flight.phase, gates.ENDS)
     assert ends.sum() * flight.PERIOD_S > 1.0
-    force = quiet.acceleration.copy()
+    force = nominal_flight.acceleration.copy()
     force[ends, 2] -= 0.1 * VEHICLE.gravity_mps2
-    for found in gates.gated(Data(study, [replace(quiet, acceleration=force)])).values():
-        acts = inside(found.fitted.terms[0].gate, quiet)
+    for gated in gates.gated(Data(study, [replace(nominal_flight, acceleration=force)])).values():
+        acts = inside(gated.fitted.terms[0].gate, nominal_flight)
         assert (acts & ends).sum() <= 0.5 * acts.sum()

@@ -57,11 +57,11 @@ def test_a_parameter_at_its_bound_stays_and_the_others_are_best_beside_it(system
 def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(system):
     columns, values, weights, prior, rows, aim = system
     rng = np.random.default_rng(1)
-    more, far = rng.normal(size=(8, 3)), rng.normal(size=8)
+    jacobian, misfit = rng.normal(size=(8, 3)), rng.normal(size=8)
     free = np.full(3, -9.0), np.full(3, 9.0)
     step, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free,
-                           (more.T @ far, more.T @ more))
-    both = np.linalg.lstsq(np.vstack([rows, more]), np.concatenate([aim, np.zeros(3), far]), rcond=None)[0]
+                           (jacobian.T @ misfit, jacobian.T @ jacobian))
+    both = np.linalg.lstsq(np.vstack([rows, jacobian]), np.concatenate([aim, np.zeros(3), misfit]), rcond=None)[0]
     np.testing.assert_allclose(step, both, rtol=1e-9)
     damped, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free, NOTHING, damping=1.0)
     normal = rows.T @ rows

@@ -9,11 +9,11 @@ from gap_flights import VEHICLE, flight
 
 def test_all_blocks_of_some_flights_are_flattened_once(monkeypatch):
     """A long-lived set of flights, judged a thousand times, else kept a thousand copies of them."""
-    made = []
-    monkeypatch.setattr(problem, "Problem", lambda data, part: made.append(part) or Problem(data, part))
+    problems = []
+    monkeypatch.setattr(problem, "Problem", lambda data, part: problems.append(part) or Problem(data, part))
     data = Data(calibrate.declared(VEHICLE, ()), [flight(20.0), flight(20.0, name="other")])
-    whole = whole_of(data)
-    assert {i for i, _, _ in whole.pieces} == {0, 1} and all(chosen.all() for _, _, chosen in whole.pieces)
-    assert whole_of(data) is whole and problem_of(data, whole_of(data)) is problem_of(data, whole)
+    blocks = whole_of(data)
+    assert {i for i, _, _ in blocks.pieces} == {0, 1} and all(chosen.all() for _, _, chosen in blocks.pieces)
+    assert whole_of(data) is blocks and problem_of(data, whole_of(data)) is problem_of(data, blocks)
     assert {i for i, _, _ in whole_of(data, [1]).pieces} == {1}
-    assert made == [whole]
+    assert problems == [blocks]

@@ -13,7 +13,7 @@ VEHICLE = vehicles.load("crazyflie-2.1-flow")
 
 @pytest.fixture(scope="module")
 def log():
-    return gap_flights.flown(1, 31)[0].log
+    return gap_flights.fly(1, 31)[0].log
 
 
 def without(log, *rows):

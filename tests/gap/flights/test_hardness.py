@@ -28,7 +28,7 @@ class Rolling:
         return 512
 
 
-def drawn(slope, blocks, seed=0):
+def draw_swings(slope, blocks, seed=0):
     """Exponential powers (blocks, bins, 2) whose mean goes with hardness to a slope in the first channel, 0 in the
     other."""
     rng = np.random.default_rng(seed)
@@ -39,21 +39,21 @@ def drawn(slope, blocks, seed=0):
 
 @pytest.mark.parametrize("slope", [0.0, 1.0, 2.0])
 def test_slope_is_that_of_the_law_drawn(slope):
-    found = slopes_of(*drawn(slope, 200), FREQUENCY).slope
+    slopes = slopes_of(*draw_swings(slope, 200), FREQUENCY).slope
     wide = FREQUENCY >= BANDS_HZ[2]  # the bands with many bins
-    assert found[wide, 0] == pytest.approx(slope, abs=0.15)
-    assert found[wide, 1] == pytest.approx(0.0, abs=0.15)
+    assert slopes[wide, 0] == pytest.approx(slope, abs=0.15)
+    assert slopes[wide, 1] == pytest.approx(0.0, abs=0.15)
 
 
 def test_prior_decides_where_all_blocks_are_flown_alike():
-    power, _ = drawn(0.0, 40)
+    power, _ = draw_swings(0.0, 40)
     slopes = slopes_of(power, np.full(40, 1.3), FREQUENCY)
     assert slopes.slope == pytest.approx(1.0)  # its mean: errors are a share of what is flown
     assert slopes.level(np.full(3, 1.3)) == pytest.approx(1.0)
 
 
 def test_level_divides_out_hardness_within_the_trusted_range_only():
-    power, hardness = drawn(2.0, 400)
+    power, hardness = draw_swings(2.0, 400)
     slopes = slopes_of(power, hardness, FREQUENCY)
     even = power / slopes.level(hardness)
     wide = FREQUENCY >= BANDS_HZ[2]
@@ -65,16 +65,16 @@ def test_level_divides_out_hardness_within_the_trusted_range_only():
 
 
 def test_a_flight_flown_unlike_its_baseline_is_said_so():
-    calm, hard, usual = ((name, Rolling(np.radians(swing)))
-                         for name, swing in (("calm", 1.0), ("hard", 30.0), ("usual", 10.0)))
+    calm, hard, nominal = ((name, Rolling(np.radians(swing)))
+                           for name, swing in (("calm", 1.0), ("hard", 30.0), ("usual", 10.0)))
     slopes = Slopes(np.zeros((129, 13)), hardness_of(Rolling(np.radians(5.0)), FIRST, 256).min(),
                     1.5, hardness_of(Rolling(np.radians(15.0)), FIRST, 256).max())
     study = SimpleNamespace(floor=SimpleNamespace(slopes=slopes))
-    for name, flight in (calm, hard, usual):
+    for name, flight in (calm, hard, nominal):
         flight.name = name
-        said = measure.flown_unlike(study, [flight])
-        assert bool(said) == (name != "usual")
-        assert name == "usual" or {"calm": "calmer", "hard": "harder"}[name] in said[0]
+        notes = measure.flown_unlike(study, [flight])
+        assert bool(notes) == (name != "usual")
+        assert name == "usual" or {"calm": "calmer", "hard": "harder"}[name] in notes[0]
 
 
 def test_hardness_is_the_logarithm_of_how_much_tilt_varies():

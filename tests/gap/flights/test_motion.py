@@ -19,9 +19,9 @@ def test_holes_are_filled_by_straight_lines():
     np.testing.assert_allclose(held(table), [[1.0, 1.0], [1.0, 2.0], [2.0, 3.0], [3.0, 3.0]])
     np.testing.assert_allclose(held(np.array([np.nan, 2.0, np.nan, 4.0])), [2.0, 2.0, 3.0, 4.0])
     assert (held(np.full((3, 2), np.nan)) == 0.0).all()
-    kept = np.array([1.0, np.nan])
-    held(kept)
-    assert np.isnan(kept[1]), "the log itself stays as it is"
+    original = np.array([1.0, np.nan])
+    held(original)
+    assert np.isnan(original[1]), "the log itself stays as it is"
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
@@ -32,17 +32,17 @@ def test_tilt_is_that_of_what_pushes_over_ground(yaw):
     turn = Rotation.from_euler("ZYX", [yaw, pitch, roll])
     force = turn.apply([0.0, 0.0, 10.0])
     columns = {f"acc_world_{a}_mps2": np.full(n, force[i]) for i, a in enumerate("xyz")}
-    found = attitude(log_of(**columns, yaw_rad=np.full(n, yaw)), PERIOD_S)
+    angles = attitude(log_of(**columns, yaw_rad=np.full(n, yaw)), PERIOD_S)
     # roll is told over the horizontal push, not within the pitched plane: 2 % off at these angles
-    np.testing.assert_allclose(found, np.tile([roll, pitch, yaw], (n, 1)), atol=0.004)
+    np.testing.assert_allclose(angles, np.tile([roll, pitch, yaw], (n, 1)), atol=0.004)
 
 
 def test_logged_angles_are_taken_as_they_are_and_yaw_is_the_gyros_where_none_is():
     n = 400
     turning = {f"gyro_{a}_radps": np.full(n, w) for a, w in zip("xyz", (0.0, 0.0, 0.5), strict=True)}
-    found = attitude(log_of(**turning, roll_rad=np.linspace(0.0, 0.3, n)), PERIOD_S)
-    np.testing.assert_allclose(found[:, 0], np.linspace(0.0, 0.3, n))
-    np.testing.assert_allclose(found[:, 2], 0.5 * PERIOD_S * np.arange(n), atol=1e-12)
+    angles = attitude(log_of(**turning, roll_rad=np.linspace(0.0, 0.3, n)), PERIOD_S)
+    np.testing.assert_allclose(angles[:, 0], np.linspace(0.0, 0.3, n))
+    np.testing.assert_allclose(angles[:, 2], 0.5 * PERIOD_S * np.arange(n), atol=1e-12)
 
 
 def test_fast_tilts_come_from_the_gyro():
@@ -50,8 +50,8 @@ def test_fast_tilts_come_from_the_gyro():
     t = np.arange(n) * PERIOD_S
     rate = 0.3 * 2.0 * np.pi * 3.0 * np.cos(2.0 * np.pi * 3.0 * t)
     still = {f"acc_world_{a}_mps2": np.full(n, GRAVITY * (a == "z")) for a in "xyz"}
-    found = attitude(log_of(**still, gyro_x_radps=rate, gyro_y_radps=np.zeros(n), gyro_z_radps=np.zeros(n)), PERIOD_S)
-    np.testing.assert_allclose(found[300:-300, 0], 0.3 * np.sin(2.0 * np.pi * 3.0 * t)[300:-300], atol=0.04)
+    angles = attitude(log_of(**still, gyro_x_radps=rate, gyro_y_radps=np.zeros(n), gyro_z_radps=np.zeros(n)), PERIOD_S)
+    np.testing.assert_allclose(angles[300:-300, 0], 0.3 * np.sin(2.0 * np.pi * 3.0 * t)[300:-300], atol=0.04)
 
 
 def test_the_edge_passes_under_each_rotor_when_it_is_there():

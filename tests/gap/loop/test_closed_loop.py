@@ -28,7 +28,7 @@ step = [{ do = "wait", time_s = 0.5 }, { do = "take-off", height_m = 0.8 }, { do
 """
 
 
-def flown(scene, count, effects=(), seed=0):
+def fly(scene, count, effects=(), seed=0):
     off = scenario.load(scene).table.get("effects", {}) if isinstance(scene, str) else ()
     off = [e for e in off if e not in dict(effects)]
     logs = list(simulated(scene, count, vehicle=VEHICLE, effects=effects, without=off, seed=seed, workers=1))
@@ -37,10 +37,10 @@ def flown(scene, count, effects=(), seed=0):
 
 @pytest.fixture(scope="module")
 def study():
-    return calibrate.declared(VEHICLE, flown("paper-mixed", 6, seed=9))
+    return calibrate.declared(VEHICLE, fly("paper-mixed", 6, seed=9))
 
 
-def found(study, flights, name):
+def held_out_gain(study, flights, name):
     """Held-out gain and the mean of the two halves' fitted values, of the effect's best variant."""
     data = Data(study, flights)
     halves = judging.halves(data)
@@ -48,9 +48,9 @@ def found(study, flights, name):
     for term in terms(name):
         gain, values = 0.0, []
         for train, test in (halves, halves[::-1]):
-            fitted = fit.fit(data, train, (term,))
-            gain += fit.judge(data, test, fitted.terms) - fit.judge(data, test, ())
-            values.append(fitted.terms[0].values)
+            result = fit.fit(data, train, (term,))
+            gain += fit.judge(data, test, result.terms) - fit.judge(data, test, ())
+            values.append(result.terms[0].values)
         best = max(best, (gain, {k: np.mean([v[k] for v in values]) for k in values[0]}), key=lambda b: b[0])
     return best
 
@@ -63,8 +63,8 @@ def nominal():
 def spectrum(effects):
     total = 0.0
     for log in simulated(scenario.parse(LONG, "long hover"), 8, vehicle=VEHICLE, effects=effects, workers=1):
-        told = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ command_spectra.MIX.T
-        f, power = welch(told[500:6000, :3], 100.0, nperseg=command_spectra.LENGTH, axis=0)
+        commands = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ command_spectra.MIX.T
+        f, power = welch(commands[500:6000, :3], 100.0, nperseg=command_spectra.LENGTH, axis=0)
         total = total + power
     return total[np.isin(f, command_spectra.frequencies())]
 
@@ -74,58 +74,59 @@ def spectrum(effects):
     {"controller_gain": {"rate": 0.7}}, {"controller_gain": {"rate": 1.0, "height": 1.5}},
     {"motor_lag": {"factor": 1.5}}, {"inertia": {"fraction": 0.4}}, {"mass": {"fraction": 0.13}}])
 def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
-    row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
-    seen = spectrum(effects)
+    row, with_effects = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
+    measured = spectrum(effects)
     for i, axis in enumerate(controller.AXES):
         strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
         f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
         expected = command_spectra.through_window(
-            strengths @ noise_spectra.noise_power(controller.firmware(changed, axis), changed, axis, fine))
+            strengths @ noise_spectra.noise_power(controller.firmware(with_effects, axis), with_effects, axis, fine))
         expected /= command_spectra.through_window(
             strengths @ noise_spectra.noise_power(controller.firmware(row, axis), row, axis, fine))
-        error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
+        error = 10.0 * np.log10(measured[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
 
 
 def test_latency_is_found_with_its_value(study):
-    gain, values = found(study, flown("paper-mixed", 1, {"sensor_latency": {"delay": 0.008}}, seed=1), "sensor_latency")
+    late = fly("paper-mixed", 1, {"sensor_latency": {"delay": 0.008}}, seed=1)
+    gain, values = held_out_gain(study, late, "sensor_latency")
     assert gain > 50.0
     assert values["delay"] == pytest.approx(0.008, rel=0.25)
 
 
 def test_lower_rate_gain_is_found_and_is_no_latency(study):
-    flights = flown("paper-mixed", 2, {"controller_gain": {"rate": 0.7}}, seed=1)
-    gain, values = found(study, flights, "controller_gain")
+    flights = fly("paper-mixed", 2, {"controller_gain": {"rate": 0.7}}, seed=1)
+    gain, values = held_out_gain(study, flights, "controller_gain")
     assert gain > 12.0
     assert values["rate"] == pytest.approx(0.7, rel=0.15)
-    assert found(study, flights, "sensor_latency")[0] < gain
+    assert held_out_gain(study, flights, "sensor_latency")[0] < gain
 
 
 def test_range_step_is_found_at_edges(study):
-    flights = flown("paper-mixed", 8, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
-    gain, values = found(study, flights, "range_step")
+    flights = fly("paper-mixed", 8, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
+    gain, values = held_out_gain(study, flights, "range_step")
     assert gain > 12.0
     assert values["kick"] == pytest.approx(0.05, rel=0.3)
     assert values["residual"] == pytest.approx(0.02, rel=0.5)
 
 
 def test_flow_scale_is_found_at_edges(study):
-    flights = flown("paper-mixed", 8, {"flow_scale": {"share": 0.0, "transient": 0.3}}, seed=2)
-    assert found(study, flights, "flow_scale")[0] > 6.0
+    flights = fly("paper-mixed", 8, {"flow_scale": {"share": 0.0, "transient": 0.3}}, seed=2)
+    assert held_out_gain(study, flights, "flow_scale")[0] > 6.0
 
 
 @pytest.mark.parametrize("name", ["sensor_latency", "controller_gain", "range_step", "flow_scale"])
 def test_nominal_flights_give_nothing(study, name):
     for k in range(3):
-        assert found(study, flown("paper-mixed", 1, seed=20 + k), name)[0] < judging.FIRST_GAIN
+        assert held_out_gain(study, fly("paper-mixed", 1, seed=20 + k), name)[0] < judging.FIRST_GAIN
 
 
 def test_without_edges_range_step_changes_nothing(study):
-    flights = flown("hover", 1)
+    flights = fly("hover", 1)
     assert edge_response.edges_of(flights[0]) == []
     assert any("edge" in reason for reason in flights[0].cannot)
-    assert found(study, flights, "range_step")[0] == pytest.approx(0.0, abs=1e-6)
+    assert held_out_gain(study, flights, "range_step")[0] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_controller_of_the_firmware_is_recognised(study):
@@ -147,11 +148,11 @@ def test_ratio_and_share_follow_whatever_an_effect_sets_in_the_plant(study, fiel
 
     base = activate({"inertia": {"fraction": 0.0}})[0].effect
     factor = replace(base.parameters[0], name="factor", default=1.5, low=0.5, high=2.0, neutral=1.0)
-    made = replace(base, name="own", parameters=(factor,), settings=settings, wrench=None)
+    own = replace(base, name="own", parameters=(factor,), settings=settings, wrench=None)
     law = study.controller
     assert law.ratio(()) == pytest.approx(1.0)
-    assert np.abs(np.log(law.ratio((Active(made, {"factor": 1.5}),)))).max() > 0.01
-    assert law.ratio((Active(made, {"factor": 1.0}),)) == pytest.approx(1.0)
+    assert np.abs(np.log(law.ratio((Active(own, {"factor": 1.5}),)))).max() > 0.01
+    assert law.ratio((Active(own, {"factor": 1.0}),)) == pytest.approx(1.0)
 
 
 def leaves(table):
@@ -169,22 +170,23 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
     plant, f = prepare(VEHICLE, ())[0].copy(), np.array([0.7, 2.0, 9.0, 31.0])
     row, strengths = plant[0], np.ones(5)
 
-    def seen(axis):
+    def spectra_of(axis):
         c = controller.firmware(row, axis)
-        whole = [noise_spectra.noise_power(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
+        spectra = [noise_spectra.noise_power(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
         if axis != "thrust":
-            whole += [turning.turning_per_command(c, row, axis, strengths, f),
-                      loop_model.torque_per_command(row, axis, f)]
-        return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in whole])
+            spectra += [turning.turning_per_command(c, row, axis, strengths, f),
+                        loop_model.torque_per_command(row, axis, f)]
+        return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in spectra])
 
-    before, others = {axis: seen(axis) for axis in controller.AXES}, 0
+    before, different = {axis: spectra_of(axis) for axis in controller.AXES}, 0
     for number in leaves(plant):
-        kept = number.copy()
-        number[...] = ~kept if number.dtype == bool else (1.07 * kept + 1e-3 if number.dtype.kind == "f" else kept + 1)
-        for axis, (key, made) in before.items():
-            changed, now = seen(axis)
-            others += changed != key
-            if changed == key:
-                np.testing.assert_array_equal(now, made)
-        number[...] = kept
-    assert others > 50  # else nothing was changed
+        original = number.copy()
+        another = 1.07 * original + 1e-3 if number.dtype.kind == "f" else original + 1
+        number[...] = ~original if number.dtype == bool else another
+        for axis, (key, earlier) in before.items():
+            group, now = spectra_of(axis)
+            different += group != key
+            if group == key:
+                np.testing.assert_array_equal(now, earlier)
+        number[...] = original
+    assert different > 50  # else nothing was changed

@@ -25,20 +25,21 @@ def spectra():
     noise = get("motor_noise")
     both = [list(batch.flights("diagnosis", range(FLIGHTS), vehicle=VEHICLE, effects=effects, workers=1))
             for effects in ((), [Active(noise, noise.values({"rms": RMS, "time": TIME_S}))])]
-    turned, commanded = [], []
+    turns, commanded = [], []
     for pair in zip(*both, strict=True):
         assert all(isinstance(log, FlightLog) for log in pair)
         calm, rough = measure.usable(pair, VEHICLE, [])
         n = min(len(calm), len(rough))
         first = starts(rough, AIR)
         first = first[first + 2 * blocks(np.zeros((n, 1)), first[:1], AIR).shape[1] <= n]
-        measured, left = ([f(one)[:n] for one in (rough, calm)] for f in (angular_acceleration, _torque_left))
-        turned.append(blocks(measured[0] - measured[1], first, AIR))
-        commanded.append(turned[-1] - blocks(left[0] - left[1], first, AIR))
-    return np.concatenate(turned), np.concatenate(commanded)
+        measured, unmodelled = ([f(flight)[:n] for flight in (rough, calm)]
+                                for f in (angular_acceleration, unmodelled_torque))
+        turns.append(blocks(measured[0] - measured[1], first, AIR))
+        commanded.append(turns[-1] - blocks(unmodelled[0] - unmodelled[1], first, AIR))
+    return np.concatenate(turns), np.concatenate(commanded)
 
 
-def _torque_left(flight):
+def unmodelled_torque(flight):
     return np.nan_to_num(residual(flight, VEHICLE))[:, TORQUE]
 
 
@@ -54,12 +55,12 @@ def test_commands_answer_a_turn_as_the_loop_says(spectra, axis, band):
 
     roll and pitch, three times in yaw.
     """
-    turned, commanded = (x[:, in_band(*band), axis] for x in spectra)
+    turns, commanded = (x[:, in_band(*band), axis] for x in spectra)
     row = prepare(VEHICLE, ())[0][0]
-    said = disturbed(firmware_of(row), row, frequencies(AIR))
-    expected = (said.measured / said.commanded)[in_band(*band), axis]
-    found = (turned * commanded.conj()).sum(axis=0) / (np.abs(commanded) ** 2).sum(axis=0)
-    off = np.log(found / expected)
+    loop = disturbed(firmware_of(row), row, frequencies(AIR))
+    expected = (loop.measured / loop.commanded)[in_band(*band), axis]
+    ratio = (turns * commanded.conj()).sum(axis=0) / (np.abs(commanded) ** 2).sum(axis=0)
+    off = np.log(ratio / expected)
     assert abs(np.mean(off.real)) < 0.15
     assert abs(np.mean(off.imag)) < np.radians(12.0)
 
@@ -73,6 +74,6 @@ def test_the_vehicle_turns_as_the_loop_says(spectra, axis, band):
     arms = row["rotor_y" if axis == 0 else "rotor_x"]
     torque = 4.0 * TIME_S * each ** 2 * (arms ** 2).sum() / row["inertia"][axis] ** 2 \
         / (1.0 + (2.0 * np.pi * TIME_S * f) ** 2)
-    said = torque * np.abs(disturbed(firmware_of(row), row, f).measured[:, axis]) ** 2
-    found = (np.abs(spectra[0][:, :, axis]) ** 2).mean(axis=0)
-    assert found[in_band(*band)].sum() == pytest.approx(said[in_band(*band)].sum(), rel=0.25)
+    predicted = torque * np.abs(disturbed(firmware_of(row), row, f).measured[:, axis]) ** 2
+    simulated = (np.abs(spectra[0][:, :, axis]) ** 2).mean(axis=0)
+    assert simulated[in_band(*band)].sum() == pytest.approx(predicted[in_band(*band)].sum(), rel=0.25)

@@ -36,20 +36,20 @@ CHANGES = {
 CLOSE, LATE = 0.1, 0.2
 
 
-def flown(active, numbers, vehicle=None):
+def fly(active, numbers, vehicle=None):
     vehicle = vehicle or vehicles.load(VEHICLE)
     logs = list(batch.flights("diagnosis", numbers, vehicle=vehicle, effects=active, workers=1))
     return list(measure.usable(logs, vehicle, []))
 
 
-def changed(name):
+def active_effects(name):
     effect, values = get(CHANGES[name][0]), CHANGES[name][1]
     return [Active(effect, effect.scaled(effect.values(), 0.0) | values)]
 
 
 @cache
 def nominal():
-    return declared(vehicles.load(VEHICLE), flown([], BASELINE))
+    return declared(vehicles.load(VEHICLE), fly([], BASELINE))
 
 
 @cache
@@ -57,13 +57,13 @@ def spectra(name):
     """S_yw, S_ww and S_yy of pitch in blocks without and with a step of the set-point, each (2, bins)."""
     cross, power = np.zeros((2, len(frequencies(AIR))), complex), np.zeros((2, len(frequencies(AIR))))
     turning, count = np.zeros_like(power), np.zeros((2, 1))
-    for flight in flown(changed(name) if name else [], PAIRED):
+    for flight in fly(active_effects(name) if name else [], PAIRED):
         first = starts(flight, AIR)
-        turned = blocks(angular_acceleration(flight), first, AIR)
-        made = turned - blocks(np.nan_to_num(residual(flight, nominal().vehicle)), first, AIR)[:, :, TORQUE]
-        quiet = nominal().response.quiet(made)[:, 1]
-        for k, chosen in enumerate((quiet, ~quiet)):
-            y, w = turned[chosen, :, 1], made[chosen, :, 1]
+        turns = blocks(angular_acceleration(flight), first, AIR)
+        modelled = turns - blocks(np.nan_to_num(residual(flight, nominal().vehicle)), first, AIR)[:, :, TORQUE]
+        steady_blocks = nominal().response.quiet(modelled)[:, 1]
+        for k, chosen in enumerate((steady_blocks, ~steady_blocks)):
+            y, w = turns[chosen, :, 1], modelled[chosen, :, 1]
             cross[k] += (y * w.conj()).sum(axis=0)
             power[k] += (np.abs(w) ** 2).sum(axis=0)
             turning[k] += (np.abs(y) ** 2).sum(axis=0)
@@ -93,11 +93,11 @@ def in_bands(x):
 def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
     f = frequencies(AIR)
     law = (nominal().response.steady, nominal().response.stepped)[stepped]
-    told = law.ratio(nominal().controller.torque_change(changed(name), f), stepped)[:, 1]
-    seen = shares(name)[stepped] / shares(None)[stepped]
-    judged = (f > low) & (f < high)
-    told, seen = (in_bands(x[judged]) for x in (told, seen))
-    off = np.abs(told - seen) / np.maximum(np.abs(seen), 1.0)
+    predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f), stepped)[:, 1]
+    simulated = shares(name)[stepped] / shares(None)[stepped]
+    band = (f > low) & (f < high)
+    predicted, simulated = (in_bands(x[band]) for x in (predicted, simulated))
+    off = np.abs(predicted - simulated) / np.maximum(np.abs(simulated), 1.0)
     np.testing.assert_array_less(off, LATE if name == "late sensors" else CLOSE)
 
 
@@ -105,36 +105,36 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
 def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flights(name):
     """Once taken for the same in every loop: late sensors then left noise that no effect explained."""
     f = frequencies(AIR)
-    before, after = nominal().controller.torque_change(changed(name), f).unexplained[:, :, 1]
-    judged = (f > 2.0) & (f < 45.0)
-    told, seen = (in_bands(x[judged]) for x in (after / before, beside(name) / beside(None)))
-    np.testing.assert_allclose(told, seen, rtol=0.2)
+    before, after = nominal().controller.torque_change(active_effects(name), f).unexplained[:, :, 1]
+    band = (f > 2.0) & (f < 45.0)
+    predicted, simulated = (in_bands(x[band]) for x in (after / before, beside(name) / beside(None)))
+    np.testing.assert_allclose(predicted, simulated, rtol=0.2)
 
 
 def test_what_the_commands_do_not_tell_of_the_torque_is_noise_of_the_loop():
     f = frequencies(AIR)
-    told = nominal().controller.torque_change(changed("late sensors"), f).unexplained[0, :, 1]
-    judged = (f > 2.0) & (f < 25.0)
-    told, seen = (in_bands(x[judged]) for x in (told, beside(None)))
-    np.testing.assert_allclose(told, seen, rtol=0.25)
+    predicted = nominal().controller.torque_change(active_effects("late sensors"), f).unexplained[0, :, 1]
+    band = (f > 2.0) & (f < 25.0)
+    predicted, simulated = (in_bands(x[band]) for x in (predicted, beside(None)))
+    np.testing.assert_allclose(predicted, simulated, rtol=0.25)
 
 
 def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     """Share of the roll commands' power that noise of the gyro makes: flights with that noise alone."""
     vehicle = vehicles.load(VEHICLE)
-    alone = replace(calm(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
-    spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in flown([], BASELINE, v)])
-               for v in (vehicle, alone)]
-    every, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
+    gyro_only = replace(calm(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
+    spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in fly([], BASELINE, v)])
+               for v in (vehicle, gyro_only)]
+    all_sensors, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
     law, row = nominal().controller, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
     fine = command_spectra.fine_frequencies()
-    made = command_spectra.through_window(noise_spectra.noise_power(roll, row, "roll", fine))
-    told = law.strengths[1][0] * made[0] / (law.strengths[1] @ made)
+    by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, row, "roll", fine))
+    predicted = law.strengths[1][0] * by_sensor[0] / (law.strengths[1] @ by_sensor)
     f = command_spectra.frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):
         band = (f > low) & (f < high)
-        np.testing.assert_allclose(told[band].mean(), (gyro / every)[band].mean(), atol=0.12)
+        np.testing.assert_allclose(predicted[band].mean(), (gyro / all_sensors)[band].mean(), atol=0.12)
 
 
 def test_an_attitude_gain_is_named_with_its_strength(study):
@@ -142,8 +142,8 @@ def test_an_attitude_gain_is_named_with_its_strength(study):
 
     The position's gain acts before it, so that one flight knows their product best.
     """
-    found = diagnose.brief(study, gap_flights.flown(1, 97, {"controller_gain": {"attitude": 0.55}}))
-    assert [e.name for e in found.effects] == ["controller_gain"]
-    gain, position = (found.effects[0].parameters[name] for name in ("attitude", "position"))
+    diagnosis = diagnose.brief(study, gap_flights.fly(1, 97, {"controller_gain": {"attitude": 0.55}}))
+    assert [e.name for e in diagnosis.effects] == ["controller_gain"]
+    gain, position = (diagnosis.effects[0].parameters[name] for name in ("attitude", "position"))
     assert gain.low < 0.55 < gain.high
     assert gain.value * position.value == pytest.approx(0.55, rel=0.2)

@@ -10,7 +10,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import all_candidates
-from gap_flights import flown
+from gap_flights import fly
 
 #: those that were taken for one of a pair, and the pairs' own
 CANDIDATES = ("actuator_delay", "com_offset", "controller_gain", "imu_bias", "imu_noise", "inertia", "motor_lag",
@@ -25,7 +25,7 @@ CANDIDATES = ("actuator_delay", "com_offset", "controller_gain", "imu_bias", "im
 ])
 def test_both_effects_are_named_and_nothing_else(study, effects):
     """Each was missed beside the other once: by the fit, by the first look, by what the first must leave."""
-    chosen = select(Data(study, flown(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
+    chosen = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
     assert {s.name for s in chosen.named} == set(effects)
     assert chosen.free_after < chosen.allowed
 
@@ -34,19 +34,19 @@ def test_both_effects_are_named_and_nothing_else(study, effects):
 def delayed(study):
     """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
     recorded = replace(study, scatter=replace(study.scatter, exact=False))
-    data = Data(recorded, flown(1, 93, {"actuator_delay": {"delay": 0.005}}))
+    data = Data(recorded, fly(1, 93, {"actuator_delay": {"delay": 0.005}}))
     return recorded, data, select(data, all_candidates())
 
 
 @pytest.mark.parametrize("closes", [True, False])
 def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(delayed, monkeypatch, closes):
     """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
-    recorded, data, selected = delayed
-    asked = []
-    monkeypatch.setattr(diagnose, "select", lambda *of, **_: asked.append(of[0]) or selected)  # it looks at no gap
+    recorded, data, selection = delayed
+    requests = []
+    monkeypatch.setattr(diagnose, "select", lambda *of, **_: requests.append(of[0]) or selection)  # it looks at no gap
     if not closes:
         monkeypatch.setattr(diagnose, "shrink_of", lambda *_: Shrink(1.4, 1.36, Quantity(0.1)))
-    found = diagnose.brief(recorded, data.flights, data=data)
-    assert asked == [data]
-    assert [e.name for e in found.effects] == (["actuator_delay"] if closes else [])
-    assert (found.verdict == "effect") == closes
+    diagnosis = diagnose.brief(recorded, data.flights, data=data)
+    assert requests == [data]
+    assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])
+    assert (diagnosis.verdict == "effect") == closes

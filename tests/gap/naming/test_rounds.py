@@ -1,4 +1,4 @@
-"""A round of the selection by hand: given what each hypothesis gains, which of them stands for its candidate."""
+"""A round of the selection on made hovers: which hypothesis stands for a candidate, and which are fitted in full."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,121 +6,95 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.fit import Fit
-from airtouch.gap.naming import rounds, select
-from airtouch.gap.naming.judging import LEAST_GAIN, PRICE, covariance_among_all
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming import judging, select
+from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, crossed
+from airtouch.gap.naming.rounds import HOPELESS, round_of
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.signatures.candidates import all_candidates, free_of, terms
-from hovers import chosen
-
-SCREEN = SimpleNamespace(shows=lambda term: True)
-STUDY = SimpleNamespace(scatter=None, controller=None)
-BENCH = SimpleNamespace(data=SimpleNamespace(study=STUDY), parts=(), screen=SCREEN)  #: no flight: gains are given
-CHOSEN = Judged("mass", (terms("mass")[0],), 30.0)
+from airtouch.gap.signatures.candidates import all_candidates, terms
+from gap_flights import VEHICLE
+from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, with_a_push
 
 
-def by_hand(monkeypatch, gain_of=None, look_of=None, first=None):
-    """`round_of` where a full fit of terms gains gain_of(terms), and looks say what they are given; the full fits."""
-    fits = []
-
-    def crossed(on, name, new, before, choice):
-        fits.append((name, new))
-        return Judged(name, (*(before.terms if before else ()), *new), gain_of(new), choice=choice,
-                      strength=np.zeros(len(free_of(new[0].effect))))
-
-    monkeypatch.setattr(rounds, "crossed", crossed)
-    monkeypatch.setattr(rounds, "random_look", lambda screen, parts, left, power, term: (look_of(term), np.ones(1)))
-    monkeypatch.setattr(rounds, "first_order", lambda screen, parts, left, power, new, held: first(new))
-    return fits
+def trial(*flights):
+    return judging.trial_of(Data(FLOOR, list(flights), slow=True))
 
 
-def test_of_variants_with_as_many_terms_the_best_is_taken_however_little_it_gains_more(monkeypatch):
-    gains = {t[0].free: 20.0 + k for k, t in enumerate(all_candidates()["controller_gain"])}
-    by_hand(monkeypatch, lambda new: gains[new[0].free])
-    best = rounds.round_of(BENCH, chosen(["controller_gain"]), None)["controller_gain"]
-    assert best.gain == 24.0 and best.terms[0].free == ("height",)
-    assert best.evidence == 24.0, "nothing is known of nominal flights"
+def test_of_variants_with_as_many_terms_the_best_is_taken():
+    on = trial(weak(r3=0.005))
+    best = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
+    by_rotor = [crossed(on, "weak_motor", variant, None, np.log(4.0)) for variant in all_candidates()["weak_motor"]]
+    assert best.full and best.terms[0].values["rotor"] == 3.0
+    assert best.gain == max(j.gain for j in by_rotor) and best.choice == np.log(4.0)
+    assert best.evidence == best.gain, "nothing is known of nominal flights"
 
 
-@pytest.mark.parametrize(("more", "with_drag"), [(LEAST_GAIN - 1.0, False), (LEAST_GAIN + 1.0, True)])
-def test_a_companion_must_earn_its_place_beside_the_effect(monkeypatch, more, with_drag):
-    fits = by_hand(monkeypatch, lambda new: 40.0 + more * (len(new) - 1), lambda t: 5.0 + (t.values["length"] == 0.5))
-    best = rounds.round_of(BENCH, chosen(["gust"]), CHOSEN)["gust"]
-    assert [t.name for t in best.terms] == ["mass", "gust"] + ["rotor_drag"] * with_drag
-    # the first look chooses the variant; of that one, alone and with its companion, and of no other a fit is made
-    assert [[t.name for t in new] for _, new in fits] == [["gust"], ["gust", "rotor_drag"]]
-    assert {new[0].values["length"] for _, new in fits} == {0.5}
+@pytest.mark.parametrize(("drag", "names"), [(0.001, ["gust"]), (0.0015, ["gust", "rotor_drag"])])
+def test_a_companion_must_earn_its_place_beside_the_effect(drag, names):
+    """Drag beside a faint gust adds some 9 nats, which is less than LEAST_GAIN, or some 22."""
+    on = trial(swaying(drag, 0.02))
+    best = round_of(on, candidates_of(["gust"]), None)["gust"]
+    length = best.terms[0].values["length"]
+    alone, both = (crossed(on, "gust", variant, None, np.log(3.0)) for variant in all_candidates()["gust"]
+                   if variant[0].values["length"] == length)
+    assert both.gain > alone.gain and (both.gain - alone.gain > LEAST_GAIN) == (len(names) == 2)
+    assert [t.name for t in best.terms] == names and best.gain == (both if len(names) == 2 else alone).gain
 
 
-@pytest.mark.parametrize(("drag", "left"), [(75.0, 75.0 - LEAST_GAIN), (80.0 - LEAST_GAIN, 80.0), (5.0, 80.0)])
-def test_where_its_companion_alone_gains_as_much_it_is_that_which_gains(monkeypatch, drag, left):
-    """A gust with drag gains 80 over all; drag alone 75, or 68, which leaves it just what it must add, or 5."""
-    gains = {("gust",): 10.0, ("gust", "rotor_drag"): 80.0, ("rotor_drag",): drag}
-    by_hand(monkeypatch, lambda new: gains[tuple(t.name for t in new)], lambda t: 5.0,
-            lambda new: (drag + PRICE, np.zeros((2, 2)), np.ones((2, 2))))
-    best = rounds.round_of(BENCH, chosen(["gust", "rotor_drag"]), None)
-    assert best["rotor_drag"].gain == drag and len(best["gust"].terms) == 2
-    assert best["gust"].gain == pytest.approx(left)
+def test_where_its_companion_alone_gains_as_much_it_is_that_which_gains():
+    on = trial(swaying(drag=0.005))
+    best = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
+    assert best["rotor_drag"].terms[0].values["horizontal"] == pytest.approx(0.005, rel=0.1)
+    assert len(best["gust"].terms) == 2 and best["gust"].gain == best["rotor_drag"].gain - LEAST_GAIN
 
 
-def test_a_first_look_has_the_mean_of_both_halves_and_their_spread(monkeypatch):
-    """Halves that say 1 and 3 steps of x, and 5 of y both; variance 4 of each parameter on one half, none on the other.
-
-    The variance of the mean is a quarter of the sum, and no less than half the difference squared.
-    """
-    by_hand(monkeypatch, first=lambda new: (2.0, [(1.0, 5.0), (7.0, 5.0)], [(4.0, 8.0), (0.0, 0.0)]))
-    best = rounds.round_of(BENCH, chosen(["com_offset"]), None)["com_offset"]
-    assert best.full is False, "too little for a fit"
-    assert best.strength.tolist() == [4.0, 5.0]
-    assert best.variance.tolist() == [9.0, 2.0]
-    assert best.gain == pytest.approx(2.0 - PRICE)
+def test_where_gusts_blow_as_well_their_companion_leaves_them_their_gain():
+    on = trial(swaying(drag=0.02, gust_mps2=0.1))
+    best = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
+    (gust, drag), most = best["gust"].terms, best["rotor_drag"].gain
+    assert drag.values["horizontal"] == pytest.approx(0.02, rel=0.1) and gust.values["rms"] > 0.0
+    # the ready model: drag 0.0147 N/(m/s) of a gust's speed
+    assert gust.values["rms"] * gust.values["drag"] / VEHICLE.mass_kg == pytest.approx(0.1, rel=0.35)
+    assert best["gust"].gain > most + LEAST_GAIN
 
 
-def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are(monkeypatch):
-    tried = []
-
-    def first(new):
-        tried.append(new[0].values["rotor"])
-        return 0.0, np.zeros((2, 1)), np.ones((2, 1))
-
-    by_hand(monkeypatch, first=first)
-    rounds.round_of(BENCH, chosen(["weak_motor"]), Judged("weak_motor", (terms("weak_motor")[2],), 30.0))
-    assert tried == [1, 2, 4]
+def test_a_first_look_has_the_mean_of_both_halves_and_their_spread():
+    """Pushes of the same size up in one half of the flights and down in the other: 0 in the mean, 1 step either way."""
+    flights = [hover(7 + k, (0.0, 0.0, 0.1 if k % 2 else -0.1), length_s=10.0) for k in range(4)]
+    best = round_of(trial(*flights), candidates_of(["imu_bias"]), None)["imu_bias"]
+    assert best.full is False, "what one half says is wrong on the other: too little for a fit"
+    assert best.strength[2] == pytest.approx(0.0, abs=0.1)
+    assert best.variance[2] == pytest.approx(1.0, rel=0.1), "half the difference, squared"
 
 
-def test_each_half_is_looked_at_as_the_hypothesis_fitted_on_the_other_leaves_it(monkeypatch):
-    asked, seen = [], []
-    problem = SimpleNamespace(power=np.array([1.0]))
-
-    def left_over(data, part, fitted):
-        asked.append((part, fitted))
-        return problem, np.array([len(asked)]), np.array([1.0 + len(asked)])
-
-    def first(new):
-        return 0.0, np.zeros((2, 1)), np.ones((2, 1))
-
-    by_hand(monkeypatch, first=first)
-    monkeypatch.setattr(rounds, "left_over", left_over)
-    monkeypatch.setattr(rounds, "first_order", lambda screen, parts, left, power, new, held:
-                        (seen.append((left, power)), first(new))[1])
-    fits = tuple(Fit(CHOSEN.terms, np.array([k]), np.eye(1), np.zeros(0), 0.0) for k in range(2))
-    one, two = (replace(f, terms=(f"fit {k}",)) for k, f in enumerate(fits))
-    on = SimpleNamespace(**{**vars(BENCH), "parts": ("first half", "second half")})
-    rounds.round_of(on, chosen(["inertia"]), replace(CHOSEN, fits=(one, two)))
-    assert asked == [("first half", ("fit 1",)), ("second half", ("fit 0",))]
-    assert seen == [([1, 2], [1.0, 2.0])]
+def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are():
+    on = trial(weak(r3=0.005))
+    third = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
+    same_rotor = [variant for variant in all_candidates()["weak_motor"] if variant[0].values["rotor"] == 3.0]
+    assert round_of(on, {"weak_motor": same_rotor}, third) == {}
+    beside = round_of(on, candidates_of(["weak_motor"]), third)["weak_motor"]
+    assert beside.terms[0].values["rotor"] == 3.0 != beside.terms[1].values["rotor"]
 
 
-@pytest.mark.parametrize(("gain", "fitted"), [(rounds.HOPELESS, False), (rounds.HOPELESS + 1e-6, True)])
-def test_a_random_effect_that_promises_little_is_looked_at_and_not_fitted(monkeypatch, gain, fitted):
-    by_hand(monkeypatch, lambda new: 9.0, lambda t: gain)
-    best = rounds.round_of(BENCH, chosen(["imu_noise"]), None)["imu_noise"]
-    assert best.full is fitted and best.gain == (9.0 if fitted else 0.0)
+def test_each_half_is_looked_at_as_the_hypothesis_fitted_on_the_other_leaves_it():
+    """Of a push in one half of the flights the other half's fit leaves something in both, and its own nothing."""
+    on = trial(*(hover(20 + k, (0.0, 0.0, 0.0 if k % 2 else -DOWN), length_s=10.0) for k in range(4)))
+    mass = crossed(on, "mass", terms("mass"), None, 0.0)
+    with_own_fits = replace(mass, fits=mass.fits[::-1])
+    crosswise, own = (round_of(on, candidates_of(["imu_bias"]), before)["imu_bias"] for before in (mass, with_own_fits))
+    assert crosswise.gain < mass.gain - 100.0 < mass.gain - 20.0 < own.gain
+
+
+@pytest.mark.parametrize(("louder", "full"), [(1.0, False), (1.03, False), (1.05, True)])
+def test_a_random_effect_that_promises_little_is_looked_at_and_not_fitted(louder, full):
+    on = trial(hover(7, louder=louder))
+    best = round_of(on, candidates_of(["imu_noise"]), None)["imu_noise"]
+    assert best.full is full and bool(best.gain > HOPELESS) is full
 
 
 def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
-    _, *alone = all_candidates()["controller_gain"]
-    (attitude,) = next(t for t in alone if t[0].free == ("attitude",))
+    _, *variants = all_candidates()["controller_gain"]
+    (attitude,) = next(t for t in variants if t[0].free == ("attitude",))
     expected = np.diag([np.inf, 2.0, np.inf, np.inf])
     np.testing.assert_array_equal(covariance_among_all(attitude, np.array([[2.0]])), expected)
     offset = terms("com_offset")[0]
@@ -128,33 +102,33 @@ def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
     np.testing.assert_array_equal(covariance_among_all(offset, both), both)
 
 
-@pytest.mark.parametrize("explained", [True, False])
-def test_where_the_relations_of_signals_explain_the_flights_they_decide_alone(monkeypatch, explained):
-    """They are asked with what was judged; what they leave unexplained is selected by the spectra."""
-    answer, inference, candidates, asked = SimpleNamespace(explained=explained), object(), chosen(["mass"]), []
-    alone = {"mass": Judged("mass", CHOSEN.terms, 3.0)}
+def by_relations(monkeypatch, explained):
+    """A selection as of a library of relations that holds for the flights, and the judgements that it is asked with."""
+    answer, inference, judgements = SimpleNamespace(explained=explained), object(), []
 
-    def related(*arguments):
-        asked.append(arguments)
+    def related(on, candidates, alone, given, progress):
+        assert given is inference
+        judgements.append(alone)
         return answer
 
-    class Reached(Exception):
-        """The spectra are asked."""
-
-    def spectra(*arguments):
-        raise Reached
-
-    def progress(name):
-        raise AssertionError(name)
-
-    monkeypatch.setattr(select, "trial_of", lambda data: BENCH)
-    monkeypatch.setattr(select, "round_of", lambda on, some, before, say: alone)
-    monkeypatch.setattr(select, "inference_of", lambda data, names: inference if names == ["mass"] else None)
+    monkeypatch.setattr(select, "inference_of", lambda data, names: inference)
     monkeypatch.setattr(select, "related", related)
-    monkeypatch.setattr(select, "_passing", spectra)
-    if explained:
-        assert select.select(BENCH.data, candidates, progress) is answer
-    else:
-        with pytest.raises(Reached):
-            select.select(BENCH.data, candidates, progress)
-    assert asked == [(BENCH, candidates, alone, inference, progress)]
+    return answer, judgements
+
+
+@pytest.mark.parametrize("explained", [True, False])
+def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatch, explained):
+    """They are asked with what was judged; what acts all along is not selected by the spectra anew."""
+    answer, judgements = by_relations(monkeypatch, explained)
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
+    assert select.select(data, candidates_of(["mass"])) is answer
+    (judged_alone,) = judgements
+    assert isinstance(judged_alone["mass"], Judged) and judged_alone["mass"].gain > 100.0
+
+
+def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):
+    data = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True)
+    answer, _ = by_relations(monkeypatch, explained=True)
+    assert select.select(data, candidates_of(["mass"])) is answer
+    by_relations(monkeypatch, explained=False)
+    assert [s.name for s in select.select(data, candidates_of(["mass"])).named] == ["downwash"]

@@ -10,30 +10,31 @@ from airtouch.gap.answer.unexplained import fails
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.gates import TOLD
 from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
-from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
 from airtouch.gap.naming.selection import Judged, probabilities
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.nominal_scatter import Scatter, size_of
 from gap_flights import VEHICLE
-from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, chosen, found, made, own_gain, scattered
+from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
 
 @pytest.fixture(scope="module")
 def heavy():
-    return found([made(1, (0.0, 0.0, -DOWN))], ("mass", "thrust_coefficient", "imu_bias", "rotor_drag", "weak_motor"))
+    names = ("mass", "thrust_coefficient", "imu_bias", "rotor_drag", "weak_motor")
+    return select_from([hover(1, (0.0, 0.0, -DOWN))], names)
 
 
 def test_where_nothing_is_nothing_is_found():
-    said = []
+    names_reported = []
     names = ("mass", "imu_bias", "rotor_drag", "wind", "imu_noise", "weak_motor")
-    selection, _ = found([made(1)], names, progress=said.append)
+    selection, _ = select_from([hover(1)], names, progress=names_reported.append)
     assert selection.steps == () and selection.chosen is None and selection.explained
-    assert set(said) == set(selection.singles) == set(names) == set(selection.least)
+    assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least)
     assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
     assert selection.free_before == selection.free_after < 12.0
     assert not any(j.full for j in selection.singles.values())
@@ -65,7 +66,7 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
 
 
 def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_beside_what_is_named():
-    selection, _ = found([made(2, (0.0, 0.0, -DOWN), louder=2.0)], ("mass", "imu_noise"), scattered(mass=[3.0]))
+    selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=2.0)], ("mass", "imu_noise"), scattered(mass=[3.0]))
     assert [(s.name, s.named) for s in selection.steps] == [("imu_noise", True), ("mass", False)]
     assert selection.steps[1].evidence < 1.0 < judging.LEAST_GAIN < selection.steps[1].gain - selection.steps[0].gain
     assert [s.name for s in selection.named] == ["imu_noise"]
@@ -73,22 +74,22 @@ def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_besid
     assert selection.chosen.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
     assert [t.name for t in selection.chosen.terms] == ["imu_noise"]
     assert {t.name for t in selection.whole.terms} == {"imu_noise", "mass"} and selection.assumed
-    alone, _ = found([made(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
-    assert [s.named for s in alone.steps] == [False] and alone.chosen is None and alone.explained
-    assert alone.usual == pytest.approx(12.0), "of a rate of 0"
+    push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
+    assert [s.named for s in push_only.steps] == [False] and push_only.chosen is None and push_only.explained
+    assert push_only.usual == pytest.approx(12.0), "of a rate of 0"
 
 
 def test_of_two_that_gain_nearly_as_much_the_rarer_in_nominal_flights_is_named():
-    one = [made(1, (0.0, 0.0, -DOWN))]
-    selection, _ = found(one, ("mass", "imu_bias"), scattered(mass=[3.0], imu_bias=[0.001] * 6))
+    flights = [hover(1, (0.0, 0.0, -DOWN))]
+    selection, _ = select_from(flights, ("mass", "imu_bias"), scattered(mass=[3.0], imu_bias=[0.001] * 6))
     assert [s.name for s in selection.named] == ["imu_bias"]
     assert selection.singles["mass"].gain > selection.singles["imu_bias"].gain
-    selection, _ = found(one, ("mass", "imu_bias"), scattered(mass=[0.001], imu_bias=[0.001] * 6))
+    selection, _ = select_from(flights, ("mass", "imu_bias"), scattered(mass=[0.001], imu_bias=[0.001] * 6))
     assert [s.name for s in selection.named] == ["mass"]
 
 
 def test_an_effect_at_its_bound_stands_in_for_another_and_is_not_named():
-    selection, _ = found([made(3, (0.0, 0.0, -8.0))], ("mass",))
+    selection, _ = select_from([hover(3, (0.0, 0.0, -8.0))], ("mass",))
     (step,) = selection.steps
     assert step.terms[0].values["fraction"] == 1.0 and step.evidence == 0.0 and not step.named
     assert selection.chosen is None and not selection.explained
@@ -106,95 +107,126 @@ def test_bounds_are_approached_from_within_on_both_sides():
 def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
     """Noise of twice the rms; one row in ten lost; and a push: three effects, each found beside the others."""
     lost = np.random.default_rng(0).random(3000) < 0.1
-    one = replace(made(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)
+    flight = replace(hover(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)
     names = ("mass", "imu_noise", "packet_loss")
-    selection, data = found([one], names)
+    selection, data = select_from([flight], names)
     assert {s.name for s in selection.named} == set(names) and selection.named[-1].name == "packet_loss"
     share = next(t for t in selection.whole.terms if t.name == "packet_loss").values["share"]
     assert share == pytest.approx(lost.mean(), rel=0.1)
     by_name = {s.name: s.share for s in selection.named}
-    lost_alone = clock_gain(data, chosen(["packet_loss"])["packet_loss"][0][0])[1]
+    lost_alone = clock_gain(data, candidates_of(["packet_loss"])["packet_loss"][0][0])[1]
     assert by_name["packet_loss"] == pytest.approx(lost_alone, rel=1e-3)
     gains = [s.gain for s in selection.steps]
     assert gains == sorted(gains)
     assert by_name["mass"] > 100.0 and by_name["imu_noise"] > 500.0
-    without = own_gain(data, [t for t in selection.whole.terms if t.name == "imu_noise"])
+    noise_only = own_gain(data, [t for t in selection.whole.terms if t.name == "imu_noise"])
     of_clock = by_name["packet_loss"]
-    assert by_name["mass"] == pytest.approx(gains[-1] - of_clock - without, rel=0.02)
+    assert by_name["mass"] == pytest.approx(gains[-1] - of_clock - noise_only, rel=0.02)
 
 
 def test_no_more_than_so_many_effects_are_named(monkeypatch):
     assert MOST_EFFECTS == 3
     monkeypatch.setattr("airtouch.gap.naming.select.MOST_EFFECTS", 2)
     lost = np.random.default_rng(0).random(3000) < 0.1
-    selection, _ = found([replace(made(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
-                         ("mass", "imu_noise", "packet_loss"))
+    selection, _ = select_from([replace(hover(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
+                               ("mass", "imu_noise", "packet_loss"))
     assert {s.name for s in selection.named} == {"imu_noise", "packet_loss"}, "the two that gain most"
 
 
 def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
-    one = made(6)
-    t = np.arange(len(one)) * PERIOD_S
-    force = one.acceleration.copy()
-    force[(t >= 9.0) & (t < 15.0), 2] -= 1.0
-    pushed = [replace(one, acceleration=force, name="pushed")]
-    selection, data = found(pushed, ("mass",), scattered(), ())
+    pushed = [with_a_push(9.0, 15.0)]
+    selection, data = select_from(pushed, ("mass",), scattered(), ())
     assert [s.name for s in selection.named] == ["downwash"]
     ((name, since, until),) = selection.steps[0].terms[0].gate
     assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
     assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
-    alone = selection.singles["downwash"]
-    without_price = judge(data, whole_of(data), alone.terms) - judge(data, whole_of(data), (), True)
-    assert alone.choice > 0.0 and alone.gain == pytest.approx(without_price - alone.choice)
+    single = selection.singles["downwash"]
+    without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
+    assert single.choice > 0.0 and single.gain == pytest.approx(without_price - single.choice)
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
-        other, _ = found(pushed, ("mass",), study, without)
+        other, _ = select_from(pushed, ("mass",), study, without)
         assert "downwash" not in other.singles
 
 
+@pytest.mark.parametrize(("size", "named"), [((0.0, 0.0), True), ((0.5, 0.1), True), ((3.0, 0.5), False)])
+def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have(size, named):
+    """size: mean and standard deviation of `size_of` in nominal flights."""
+    study = scattered()
+    study = replace(study, scatter=replace(study.scatter, passing={"downwash": size}))
+    selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
+    for step in selection.steps:
+        beyond = study.scatter.unusual("downwash", size_of(step.gain / seconds(data), step.strength))
+        assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
+
+
+@pytest.mark.parametrize(("names", "usual", "mps2", "named"), [
+    (("mass",), {}, 0.5, ["mass"]), (("mass",), {"mass": [3.0]}, 0.5, ["downwash"]), (("imu_noise",), {}, 0.15, [])])
+def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, usual, mps2, named):
+    """A push for 25 of 30 s: its mass gains more; a mass that nominal flights have as well does not count, what
+
+    follows the flight's own height does.
+    """
+    pushed = with_a_push(0.0 if mps2 == 0.5 else 2.0, 25.0, mps2=mps2)
+    selection, _ = select_from([pushed], names, scattered(**usual), ())
+    assert [s.name for s in selection.named] == named
+    assert ("downwash" in selection.singles) == ("downwash" in named)
+
+
+@pytest.mark.parametrize(("overhead", "key", "since_s"), [((9.0, 12.0), TOLD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
+def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
+    """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
+    study = replace(scattered(), overhead=(("pushed", *overhead),))
+    selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    (step,) = selection.named
+    assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
+    assert (step.choice == 0.0) == (key == TOLD)
+
+
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
-    data = Data(FLOOR, [made(7)], slow=True)
+    data = Data(FLOOR, [hover(7)], slow=True)
     for thorough in (False, True):
-        judged = rounds.round_of(judging.trial_of(data), chosen(["imu_noise", "mass"]), None, thorough=thorough)
-        assert judged["imu_noise"].full == thorough
-        assert judged["imu_noise"].gain < rounds.HOPELESS and judged["imu_noise"].strength[0] < 0.05
+        best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
+        assert best["imu_noise"].full == thorough
+        assert best["imu_noise"].gain < rounds.HOPELESS and best["imu_noise"].strength[0] < 0.05
 
 
 def test_halves_share_no_block_and_leave_none_out():
-    few = Data(FLOOR, [made(8), made(9), made(10, length_s=3.0)], slow=True)
-    first, second = judging.halves(few)
-    for (i, regime, one), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
-        assert (i, regime) == (j, of) and len(one) == len(few.first[i][regime]) and (one ^ other).all()
-    (_, _, one), *_, (_, _, short) = first.pieces
-    assert one[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
+    three = Data(FLOOR, [hover(8), hover(9), hover(10, length_s=3.0)], slow=True)
+    first, second = judging.halves(three)
+    for (i, regime, blocks), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
+        assert (i, regime) == (j, of) and len(blocks) == len(three.first[i][regime]) and (blocks ^ other).all()
+    (_, _, blocks), *_, (_, _, short) = first.pieces
+    assert blocks[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
     assert 0 < short.sum() <= len(short), "a short flight is in both halves where it can be"
-    many = Data(FLOOR, [made(k) for k in range(5)], slow=True)
-    first, second = ({i for i, _, chosen in part.pieces if chosen.all()} for part in judging.halves(many))
+    five = Data(FLOOR, [hover(k) for k in range(5)], slow=True)
+    first, second = ({i for i, _, candidates_of in part.pieces if candidates_of.all()} for part in judging.halves(five))
     assert (first, second) == ({0, 2, 4}, {1, 3})
-    assert all(chosen.dtype == bool for part in judging.halves(many) for _, _, chosen in part.pieces)
-    assert {r for _, r, _ in judging.halves(few)[0].pieces} == {AIR}
+    assert all(candidates_of.dtype == bool for part in judging.halves(five) for _, _, candidates_of in part.pieces)
+    assert {r for _, r, _ in judging.halves(three)[0].pieces} == {AIR}
 
 
 def test_flights_last_as_long_as_their_samples():
-    assert seconds(Data(FLOOR, [made(1), made(2, length_s=10.0)], slow=True)) == pytest.approx(40.0)
+    assert seconds(Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True)) == pytest.approx(40.0)
 
 
 def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
-    data = Data(FLOOR, [made(1, (0.0, 0.0, -DOWN))], slow=True)
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
     on = judging.trial_of(data)
-    candidates = chosen(["mass", "thrust_coefficient", "weak_motor", "imu_noise"])
-    held = rounds.round_of(on, candidates, None)["mass"]
-    beside = rounds.round_of(on, candidates, held)
+    candidates = candidates_of(["mass", "thrust_coefficient", "weak_motor", "imu_noise"])
+    mass = rounds.round_of(on, candidates, None)["mass"]
+    beside = rounds.round_of(on, candidates, mass)
     assert set(beside) == {"weak_motor", "imu_noise"}
-    for judged in beside.values():
-        assert judged.terms[0].name == "mass" and judged.gain < held.gain + 12.0
-        assert judged.evidence == pytest.approx(judged.gain - held.gain)
-    again = judging.crossed(on, "mass", held.terms, None, 0.5)
-    assert again.gain == pytest.approx(held.gain - 0.5) and again.choice == 0.5
-    motor = chosen(["weak_motor"])["weak_motor"][0]
-    both = judging.crossed(on, "weak_motor", motor, again, 0.25)
+    for candidate in beside.values():
+        assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
+        assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
+    dearer = judging.crossed(on, "mass", mass.terms, None, 0.5)
+    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice == 0.5
+    motor = candidates_of(["weak_motor"])["weak_motor"][0]
+    both = judging.crossed(on, "weak_motor", motor, dearer, 0.25)
     assert both.choice == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
-    gain = own_gain(data, [*again.terms, *motor], [np.append(f.scaled, 0.0) for f in again.fits])
+    gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
 
 
@@ -206,31 +238,31 @@ def simulated(**rms):
 def pushed_in_the_air_alone(seed):
     """At rest for 4 s, then 26 s of hover in which something pushes."""
     push = np.where(np.arange(3000)[:, None] < 400, 0.0, [0.0, 0.0, -DOWN])
-    return made(seed, push, resting_s=4.0)
+    return hover(seed, push, resting_s=4.0)
 
 
 def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there():
     """A bias of the accelerometer would stand at rest as well, and a push does not: its loss there is known."""
-    selection, data = found([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
+    selection, data = select_from([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
     (step,) = selection.steps
     on = judging.trial_of(data)
-    lost, worst = contradicted(on, selection.chosen)
+    loss, worst = contradicted(on, selection.chosen)
     assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
     resting = [Part(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
     by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
                   for train, test in ((0, 1), (1, 0)))
-    assert lost == pytest.approx(by_hand, rel=0.1) and lost > 30.0
+    assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0
     assert selection.contradicted == (0.0, ""), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
-    exact = replace(selection, simulated=True, nominal=6, contradicted=(lost, worst), steps=(weaker,), free_after=1.0)
-    assert exact.unlike == pytest.approx(lost / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
+    exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,), free_after=1.0)
+    assert exact.unlike == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
-    assert fails(exact, selection.singles["imu_bias"]).startswith(f"it loses {lost:.0f} nats where") \
+    assert fails(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
         and worst in fails(exact, selection.singles["imu_bias"])
 
 
 def test_a_right_effect_is_not_contradicted():
-    selection, data = found([pushed_in_the_air_alone(7)], ("mass", "thrust_coefficient"), scattered(mass=[1e-3]))
+    selection, data = select_from([pushed_in_the_air_alone(7)], ("mass", "thrust_coefficient"), scattered(mass=[1e-3]))
     assert contradicted(judging.trial_of(data), selection.chosen)[0] < 2.0 < 100.0 < selection.chosen.gain
 
 
@@ -240,10 +272,10 @@ def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gain
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
     gains[at_rest + forward] = -8.0
-    lost = losses(gains)
-    assert lost[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
-    assert lost[forward] == pytest.approx(0.0 + 4.0 + 2.0) and lost[at_rest + forward] == pytest.approx(7.0)
-    assert np.count_nonzero(lost) == 3
+    loss = losses(gains)
+    assert loss[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
+    assert loss[forward] == pytest.approx(0.0 + 4.0 + 2.0) and loss[at_rest + forward] == pytest.approx(7.0)
+    assert np.count_nonzero(loss) == 3
 
 
 @pytest.mark.parametrize(("exact", "by_firmware", "same"),
@@ -255,13 +287,14 @@ def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_our
 
 
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
-    exact, usual = (found([made(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
-    recorded, _ = found([made(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
-    assert recorded.free_before < 12.0 and exact.free_before > usual.free_before + 100.0
+    exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
+    recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
+    assert recorded.free_before < 12.0 and exact.free_before > nominal.free_before + 100.0
     other = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
-    many = replace(other, same_models=True)
-    assert other.allowed == pytest.approx(0.1 * 1000.0) and many.allowed == pytest.approx(0.5 * other.allowed)
+    same_models = replace(other, same_models=True)
+    assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)
-    assert replace(many, assumed=True).allowed == pytest.approx(0.5 * 0.2 * 1000.0)
-    few = replace(many, steps=(), usual=20.0)
-    assert few.allowed == pytest.approx(12.0 * 7 / 5) and replace(few, simulated=False).allowed == pytest.approx(20.0)
+    assert replace(same_models, assumed=True).allowed == pytest.approx(0.5 * 0.2 * 1000.0)
+    no_effects = replace(same_models, steps=(), usual=20.0)
+    assert no_effects.allowed == pytest.approx(12.0 * 7 / 5)
+    assert replace(no_effects, simulated=False).allowed == pytest.approx(20.0)

@@ -14,14 +14,14 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
-from gap_flights import VEHICLE, flown, noise
-from hovers import DOWN, FLOOR, STIFF, chosen, found, made, own_gain, scattered
+from gap_flights import VEHICLE, fly, noise
+from hovers import DOWN, FLOOR, LIFT_N, STIFF, candidates_of, hover, own_gain, scattered, select_from, swaying, weak
 
 
 @pytest.fixture(scope="module")
 def flying():
     """A vehicle as declared with the loop of four nominal flights; no scatter."""
-    return calibrate.declared(VEHICLE, flown(4, 41))
+    return calibrate.declared(VEHICLE, fly(4, 41))
 
 
 def gains(selection):
@@ -32,37 +32,37 @@ def gains(selection):
 
 def test_beside_an_effect_of_recorded_flights_another_must_gain_a_tenth_as_much():
     """A push, and noise a tenth above the floor: enough beside models that are exact, and not beside those of air."""
-    one, names = [made(2, (0.0, 0.0, -DOWN), louder=1.1)], ("mass", "imu_noise")
-    exact, _ = found(one, names, scattered(exact=True))
+    flights, names = [hover(2, (0.0, 0.0, -DOWN), louder=1.1)], ("mass", "imu_noise")
+    exact, _ = select_from(flights, names, scattered(exact=True))
     assert [(s.name, s.named) for s in exact.steps] == [("mass", True), ("imu_noise", True)]
     factor = exact.chosen.terms[1].values["factor"]
     assert factor == pytest.approx(np.sqrt(2.0 * 1.1 ** 2 - 1.0), rel=0.03), "over the declared noise, half the floor"
-    gained = gains(exact)
-    assert judging.LEAST_GAIN < gained["imu_noise"] < 0.1 * gained["mass"]
-    recorded, _ = found(one, names, scattered())
+    added = gains(exact)
+    assert judging.LEAST_GAIN < added["imu_noise"] < 0.1 * added["mass"]
+    recorded, _ = select_from(flights, names, scattered())
     assert [s.name for s in recorded.steps] == ["mass"]
     assert recorded.singles["imu_noise"].gain > judging.LEAST_GAIN, "alone it would do"
 
 
 def test_an_effect_in_cells_of_its_own_is_held_against_what_is_gained_there():
     """Twice the noise everywhere, and a faint push that shows in the lowest band alone."""
-    one, names = [made(2, (0.0, 0.0, -0.06), louder=2.0)], ("mass", "imu_noise")
-    exact, _ = found(one, names, scattered(exact=True))
+    flights, names = [hover(2, (0.0, 0.0, -0.06), louder=2.0)], ("mass", "imu_noise")
+    exact, _ = select_from(flights, names, scattered(exact=True))
     assert [(s.name, s.named) for s in exact.steps] == [("imu_noise", True), ("mass", True)]
-    gained = gains(exact)
-    assert judging.LEAST_GAIN < gained["mass"] < 0.01 * gained["imu_noise"]
-    recorded, _ = found(one, names, scattered())
+    added = gains(exact)
+    assert judging.LEAST_GAIN < added["mass"] < 0.01 * added["imu_noise"]
+    recorded, _ = select_from(flights, names, scattered())
     assert [s.name for s in recorded.steps] == ["imu_noise"]
 
 
 @pytest.mark.parametrize("time_s", [0.005, 0.1])
 def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
     """First-order noise of the lift, as motors make it; the longer is no stronger than the shorter."""
-    keep = np.exp(-0.01 / time_s)
-    lift = 0.6 * lfilter([np.sqrt(1.0 - keep ** 2)], [1.0, -keep], noise(30.0, 1.0, 3)[:, 2])
-    one = made(5)
-    one = replace(one, acceleration=one.acceleration + lift[:, None] * [0.0, 0.0, 1.0])
-    selection, _ = found([one], ("motor_noise",))
+    decay = np.exp(-0.01 / time_s)
+    lift = 0.6 * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], noise(30.0, 1.0, 3)[:, 2])
+    flight = hover(5)
+    flight = replace(flight, acceleration=flight.acceleration + lift[:, None] * [0.0, 0.0, 1.0])
+    selection, _ = select_from([flight], ("motor_noise",))
     (step,) = selection.steps
     assert step.terms[0].values["time"] == time_s and selection.assumed
     assert step.choice == pytest.approx(np.log(3.0)), "one of three times"
@@ -73,7 +73,7 @@ def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
 @pytest.mark.parametrize(("name", "parameter", "value"), [
     ("sensor_latency", "delay", 0.008), ("controller_gain", "rate", 0.6)])
 def test_an_effect_of_the_loop_is_chosen_by_what_it_gains_in_the_commands(flying, name, parameter, value):
-    selection, data = found(flown(1, 2, {name: {parameter: value}}), (name, "mass"), flying)
+    selection, data = select_from(fly(1, 2, {name: {parameter: value}}), (name, "mass"), flying)
     (step,) = selection.steps
     assert step.name == name and step.named and selection.assumed and selection.nominal == 4
     assert step.terms[0].values[parameter] == pytest.approx(value, rel=0.2)
@@ -88,7 +88,7 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
     file.write_text(STIFF, encoding="utf-8")
     effects.load_file(file)
     try:
-        selection, _ = found(flown(1, 4, [("stiff_climb", {"factor": 2.5})]), ("stiff_climb", "mass"), flying)
+        selection, _ = select_from(fly(1, 4, [("stiff_climb", {"factor": 2.5})]), ("stiff_climb", "mass"), flying)
     finally:
         effects.unregister("stiff_climb")
     (step,) = selection.steps
@@ -97,47 +97,28 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
 
 
 def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
-    data = Data(flying, flown(1, 62))
+    data = Data(flying, fly(1, 62))
     on = judging.trial_of(data)
-    judged = rounds.round_of(on, chosen(["controller_gain"]), None, thorough=True)["controller_gain"]
-    _, *alone = all_candidates()["controller_gain"]
-    assert judged.strength.shape == judged.variance.shape == (len(alone),) == (4,)
-    for i, terms in enumerate(alone):
-        tried = judging.crossed(on, "controller_gain", terms, None, np.log(len(alone)))
-        assert judged.strength[i] == tried.strength[i] and judged.variance[i] == tried.variance[i]
-        assert np.isinf(np.delete(tried.variance, i)).all() and not np.delete(tried.strength, i).any()
-    assert judged.gain < judging.FIRST_GAIN, "a nominal flight"
-
-
-PWM = 40000.0  #: of the made hovers
-LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
-
-
-#: front and left (+1) of each rotor; 1 and 3 turn to the left, and without their drag the vehicle yaws that way
-PLACE = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}
-
-
-def weak(louder=1.0, **losses):
-    """A hover in which rotors (`r1` to `r4`) have lost a share of their lift: what is missing turns it, by hand."""
-    lost_n = {int(name[1]): share * LIFT_N for name, share in losses.items()}
-    one = made(11, (0.0, 0.0, -sum(lost_n.values()) / VEHICLE.mass_kg), louder, length_s=20.0)
-    arm = VEHICLE.arm_m / np.sqrt(2.0)  # it sinks on that side: x to the front, y to the left, z up
-    torque = sum(n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
-                 for n, (front, left, yaw) in ((n, PLACE[r]) for r, n in lost_n.items()))
-    turning = torque / np.array(VEHICLE.inertia_kg_m2)
-    return replace(one, rates=one.rates + np.arange(len(one))[:, None] * 0.01 * turning)
+    together = rounds.round_of(on, candidates_of(["controller_gain"]), None, thorough=True)["controller_gain"]
+    _, *variants = all_candidates()["controller_gain"]
+    assert together.strength.shape == together.variance.shape == (len(variants),) == (4,)
+    for i, terms in enumerate(variants):
+        single = judging.crossed(on, "controller_gain", terms, None, np.log(len(variants)))
+        assert together.strength[i] == single.strength[i] and together.variance[i] == single.variance[i]
+        assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.strength, i).any()
+    assert together.gain < judging.FIRST_GAIN, "a nominal flight"
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_the_rotor_that_is_weak_is_the_one_whose_side_sinks(rotor):
-    selection, _ = found([weak(**{f"r{rotor}": 0.002})], ("weak_motor",))
+    selection, _ = select_from([weak(**{f"r{rotor}": 0.002})], ("weak_motor",))
     (step,) = selection.steps
     assert step.terms[0].values["rotor"] == rotor
     assert step.terms[0].values["thrust_loss"] == pytest.approx(0.002, rel=0.1)
 
 
 def test_two_weak_rotors_have_a_strength_each():
-    selection, _ = found([weak(r1=0.002, r2=0.005)], ("weak_motor",))
+    selection, _ = select_from([weak(r1=0.002, r2=0.005)], ("weak_motor",))
     first, second = selection.steps
     losses = {t.values["rotor"]: t.values["thrust_loss"] for t in selection.whole.terms}
     assert losses == {2.0: pytest.approx(0.005, rel=0.1), 1.0: pytest.approx(0.002, rel=0.1)}
@@ -150,47 +131,47 @@ def test_a_few_lost_rows_beside_a_large_effect_are_not_named():
     """What the log did to its own times has no cells in which it is held against the effect before it."""
     lost = np.zeros(3000, bool)
     lost[500:2900:200] = True
-    selection, data = found([replace(made(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
-                            scattered(exact=True))
+    selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
+                                  scattered(exact=True))
     assert 0.0 < selection.singles["packet_loss"].gain < judging.LEAST_GAIN
     assert [s.name for s in selection.steps] == ["mass"]
 
 
 def test_a_faint_push_beside_many_lost_rows_is_not_named():
     lost = np.random.default_rng(0).random(3000) < 0.1
-    one = replace(made(2, (0.0, 0.0, -0.02)), lost=lost)
-    selection, _ = found([one], ("mass", "packet_loss"), scattered(exact=True))
+    flight = replace(hover(2, (0.0, 0.0, -0.02)), lost=lost)
+    selection, _ = select_from([flight], ("mass", "packet_loss"), scattered(exact=True))
     assert 0.0 < selection.singles["mass"].gain < judging.LEAST_GAIN
     assert [s.name for s in selection.steps] == ["packet_loss"]
 
 
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
-    data = Data(FLOOR, [replace(made(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
+    data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
-    known = judging.crossed(on, "packet_loss", (term,), None, 0.0)
-    assert known.gain == pytest.approx(loss(data)[1]) and known.gain > 100.0
-    assert nameless(on, None) - nameless(on, known) == pytest.approx(known.gain)
+    packet_loss = judging.crossed(on, "packet_loss", (term,), None, 0.0)
+    assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
+    assert nameless(on, None) - nameless(on, packet_loss) == pytest.approx(packet_loss.gain)
 
 
 def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():
-    selection, data = found([made(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
-    added = {s.name: s.share for s in selection.named}
+    selection, data = select_from([hover(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
+    shares = {s.name: s.share for s in selection.named}
     (bias,) = (t for t in selection.whole.terms if t.name == "imu_bias")
-    alone = own_gain(data, [bias]) - 5 * judging.PRICE
-    assert added["imu_noise"] == pytest.approx(selection.whole.gain - alone, abs=0.3)
+    bias_gain = own_gain(data, [bias]) - 5 * judging.PRICE
+    assert shares["imu_noise"] == pytest.approx(selection.whole.gain - bias_gain, abs=0.3)
 
 
 def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcomer_does_not_pay_for_that(flying):
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
-    data = Data(flying, flown(1, 2, {"sensor_latency": {"delay": 0.008}}))
+    data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
     late = judging.crossed(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
     both = judging.crossed(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
-    together = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
+    joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
     assert sure - unsure > 5.0 and late.beyond == 0.0 and both.choice == 0.5
     assert both.beyond == pytest.approx(sure - unsure)
-    assert both.gain == pytest.approx(together + (sure - unsure) - 0.5)
+    assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
     third = judging.crossed(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
     assert third.beyond == both.beyond, "paid once"
 
@@ -198,54 +179,101 @@ def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcome
 @pytest.mark.parametrize("simulated", [True, False])
 def test_a_loop_that_changes_is_assumed_in_recorded_flights_alone(flying, simulated):
     study = replace(flying, scatter=Scatter({}, 8.0, (0.0, 0.0), exact=simulated))
-    selection, _ = found(flown(1, 2, {"sensor_latency": {"delay": 0.008}}), ("sensor_latency",), study)
+    selection, _ = select_from(fly(1, 2, {"sensor_latency": {"delay": 0.008}}), ("sensor_latency",), study)
     assert [s.name for s in selection.steps] == ["sensor_latency"] and selection.assumed is not simulated
 
 
 def test_what_the_log_has_lost_makes_no_model_less_exact():
     """Of a tenth that another effect must gain in recorded flights, lost rows count for nothing."""
     lost = np.random.default_rng(0).random(3000) < 0.1
-    one = replace(made(2, (0.0, 0.0, -0.1), louder=1.25), lost=lost)
-    said, names = [], ("mass", "imu_noise", "packet_loss")
-    selection, _ = found([one], names, scattered(), progress=said.append)
+    flight = replace(hover(2, (0.0, 0.0, -0.1), louder=1.25), lost=lost)
+    names_reported, names = [], ("mass", "imu_noise", "packet_loss")
+    selection, _ = select_from([flight], names, scattered(), progress=names_reported.append)
     assert [s.name for s in selection.steps] == ["packet_loss", "mass", "imu_noise"]
-    gained = gains(selection)
-    assert 0.1 * gained["mass"] < gained["imu_noise"] < 0.1 * (gained["mass"] + gained["packet_loss"])
-    assert said.count("imu_noise") >= 3, "told in every round"
+    added = gains(selection)
+    assert 0.1 * added["mass"] < added["imu_noise"] < 0.1 * (added["mass"] + added["packet_loss"])
+    assert names_reported.count("imu_noise") >= 3, "told in every round"
 
 
 @pytest.mark.parametrize(("louder", "loss", "first"), [(2.0, 0.002, "imu_noise"), (2.0, 0.01, "weak_motor")])
 def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, loss, first):
     """One of four rotors is chosen, whether it is the first effect found or the second."""
-    selection, data = found([weak(louder=louder, r2=loss)], ("weak_motor", "imu_noise"))
+    selection, data = select_from([weak(louder=louder, r2=loss)], ("weak_motor", "imu_noise"))
     assert selection.steps[0].name == first
-    added = {s.name: s.share for s in selection.named}
-    assert set(added) == {"weak_motor", "imu_noise"}
+    shares = {s.name: s.share for s in selection.named}
+    assert set(shares) == {"weak_motor", "imu_noise"}
     of = {t.name: t for t in selection.whole.terms}
     assert selection.whole.gain == pytest.approx(own_gain(data, selection.whole.terms) - np.log(4.0), abs=0.3)
-    assert added["weak_motor"] == pytest.approx(selection.whole.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
+    assert shares["weak_motor"] == pytest.approx(selection.whole.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
     rotor_alone = own_gain(data, [of["weak_motor"]]) - np.log(4.0)
-    assert added["imu_noise"] == pytest.approx(selection.whole.gain - rotor_alone, abs=0.3)
+    assert shares["imu_noise"] == pytest.approx(selection.whole.gain - rotor_alone, abs=0.3)
+
+
+def test_what_an_effect_adds_includes_its_companion():
+    """Gusts with drag, and a push: without the gusts their drag goes as well, without the push both stay."""
+    flight = swaying(drag=0.02, gust_mps2=0.1)
+    pushed = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN])
+    selection, data = select_from([pushed], ("gust", "mass"), scattered(exact=True))
+    shares, (gust, drag, mass) = {s.name: s.share for s in selection.named}, selection.whole.terms
+    assert (gust.name, drag.name, mass.name) == ("gust", "rotor_drag", "mass") and drag.companion
+    assert shares["gust"] == pytest.approx(selection.whole.gain - own_gain(data, [mass]), abs=0.3)
+    of_gust = own_gain(data, [gust, drag]) - judging.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
+    assert shares["mass"] == pytest.approx(selection.whole.gain - of_gust, abs=0.3)
+
+
+def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
+    """The log's times and its forces are judged apart."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
+                                  scattered(exact=True))
+    shares = {s.name: s.share for s in selection.named}
+    mass = [t for t in selection.whole.terms if t.name == "mass"]
+    assert shares == {"mass": pytest.approx(own_gain(data, mass)), "packet_loss": pytest.approx(loss(data)[1])}
+
+
+@pytest.mark.parametrize(("louder", "named"), [(1.2, False), (1.25, True)])
+def test_noise_beside_a_push_is_named_where_it_gains_a_quarter_as_much(louder, named):
+    """A model that is wrong looks random: noise that gains less stands there without a name."""
+    selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=louder)], ("mass", "imu_noise"), scattered())
+    added = gains(selection)
+    assert [(s.name, s.named) for s in selection.steps] == [("mass", True), ("imu_noise", named)]
+    assert (added["imu_noise"] > 0.25 * added["mass"]) == named and added["imu_noise"] > 0.1 * added["mass"]
+
+
+@pytest.mark.parametrize("nominal_loss", [True, False])
+def test_three_deviations_of_nominal_flights_are_added_and_then_only_what_is_evident(nominal_loss):
+    """Four effects: lost rows, which gain least, where nominal flights lose as many as well, and where none does."""
+    flight = weak(r2=0.004, louder=1.3)
+    flight = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN],
+                     lost=np.random.default_rng(0).random(2000) < 0.02)
+    rms = {"mass": [3.0], "weak_motor": [30.0], "imu_noise": [30.0], "packet_loss": [30.0]}
+    study = scattered(**{n: r for n, r in rms.items() if n != "packet_loss" or nominal_loss})
+    selection, _ = select_from([flight], tuple(rms), study)
+    names = ["weak_motor", "mass", "imu_noise"] + ["packet_loss"] * (not nominal_loss)
+    assert [(s.name, s.named) for s in selection.steps] == [(n, n == "packet_loss") for n in names]
+    beside = {n: [t.name for t in j.terms] for n, j in selection.singles.items()}
+    assert beside["weak_motor"] == names[:1] and beside["mass"] == names[:2] and beside["imu_noise"] == names[:3]
+    assert beside["packet_loss"] == [*names[:2 if nominal_loss else 3], "packet_loss"], "as judged before the last step"
 
 
 def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
     """Four flights of the same mean push: alike, or 1.0 and 0.4 m/s^2 in turns."""
     def pushed(*amounts):
-        return [made(20 + k, (0.0, 0.0, -a), length_s=10.0) for k, a in enumerate(amounts)]
+        return [hover(20 + k, (0.0, 0.0, -a), length_s=10.0) for k, a in enumerate(amounts)]
 
     alike, apart = pushed(0.7, 0.7, 0.7, 0.7), pushed(1.0, 0.4, 1.0, 0.4)
-    (sure,), (doubted,) = (found(f, ("imu_bias",))[0].steps for f in (alike, apart))
+    (sure,), (doubted,) = (select_from(f, ("imu_bias",))[0].steps for f in (alike, apart))
     unit = 0.1  # m/s^2, the parameter's step
     assert doubted.strength[2] == pytest.approx(sure.strength[2], rel=0.02) == pytest.approx(-0.7 / unit, rel=0.02)
     # the mean of two values that lie 0.6 apart
     assert doubted.variance[2] == pytest.approx((0.6 / unit) ** 2 / 4.0, rel=0.05)
     assert sure.variance[2] < 0.01 * doubted.variance[2]
 
-    (mass,) = found(alike, ("mass",))[0].steps
-    usual = scattered(mass=[abs(mass.strength[0]) / 8.0])
-    (named,), (deviation,) = (found(f, ("mass",), usual)[0].steps for f in (alike, apart))
+    (mass,) = select_from(alike, ("mass",))[0].steps
+    nominal = scattered(mass=[abs(mass.strength[0]) / 8.0])
+    (evident,), (deviation,) = (select_from(f, ("mass",), nominal)[0].steps for f in (alike, apart))
     # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
-    assert named.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and named.named
+    assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.named
     weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (0.4, 0.7))  # shares of the mass
     assert deviation.evidence == pytest.approx(4.5 * np.log1p((8.0 * weak / between) ** 2 / 8.0), rel=0.1)
     assert not deviation.named
@@ -254,6 +282,6 @@ def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
 
 def test_a_ground_effect_that_shakes_is_found_with_its_random_part(flying):
     shaking = {"ground_effect": {"strength": 0.8, "fade": 0.0875, "turbulence": 1.0}}
-    selection, _ = found(flown(1, 12, shaking), ("ground_effect", "mass"), flying)
+    selection, _ = select_from(fly(1, 12, shaking), ("ground_effect", "mass"), flying)
     first = selection.steps[0]
     assert first.name == "ground_effect" and first.terms[0].values["strength"] == pytest.approx(0.8, rel=0.35)

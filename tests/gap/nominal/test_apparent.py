@@ -5,20 +5,20 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent
 from airtouch.gap.signatures.candidates import MEAN, all_candidates, strength_term
-from gap_flights import flown
+from gap_flights import fly
 
 
 def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
     """A strength at its bound of none has no curvature of its own: an error of next to nothing would say that nominal
     flights never differ in it."""
-    seen = apparent(Data(study, flown(1, 47)))
+    nominal = apparent(Data(study, fly(1, 47)))
     pressed = free = 0
     for name, hypotheses in all_candidates(()).items():
         term = strength_term(hypotheses[0])
-        if name not in seen.strengths or term.kind != MEAN:
+        if name not in nominal.strengths or term.kind != MEAN:
             continue
         low = term.among_all(term.bounds()[0], -np.inf)
-        for strength, error, least in zip(seen.strengths[name], seen.errors[name], low, strict=True):
+        for strength, error, least in zip(nominal.strengths[name], nominal.errors[name], low, strict=True):
             if least == 0.0 and strength < 1e-6:
                 pressed += 1
                 assert error == NOBODY_KNOWS, name

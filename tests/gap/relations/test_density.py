@@ -29,9 +29,9 @@ def way():
 
 def test_the_likeliest_strength_of_a_straight_line_is_the_projection(way):
     values = 2.0 * way + np.random.default_rng(4).normal(size=Q)
-    found = fit(straight(way), values, unchanged(Q))
-    assert found.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
-    assert found.level == pytest.approx(-0.5 * np.sum((values - found.strength * way) ** 2), rel=1e-6)
+    result = fit(straight(way), values, unchanged(Q))
+    assert result.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
+    assert result.level == pytest.approx(-0.5 * np.sum((values - result.strength * way) ** 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("signed", [False, True])
@@ -52,19 +52,19 @@ def test_scatter_about_the_curve_widens_the_density(way):
     rng = np.random.default_rng(5)
     axes = np.linalg.qr(rng.normal(size=(Q, 2)))[0]
     variances, values = np.array([0.3, 0.05]), 2.0 * way + rng.normal(size=Q)
-    found = fit(straight(way, axes, variances), values, unchanged(Q))
-    shift = found.strength * way
+    result = fit(straight(way, axes, variances), values, unchanged(Q))
+    shift = result.strength * way
     covariance = np.eye(Q) + (shift @ shift) * (axes * variances) @ axes.T
     constant = 0.5 * Q * np.log(2.0 * np.pi)
-    assert found.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
+    assert result.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
 
 
 def test_coordinates_turn_a_covariance_into_one():
     rng = np.random.default_rng(6)
     factors, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
-    known = coordinates_of(factors)
+    coordinates = coordinates_of(factors)
     exact = multivariate_normal(np.zeros(Q), np.eye(Q) + factors @ factors.T).logpdf(values)
-    assert known.level + log_density(known(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
+    assert coordinates.level + log_density(coordinates(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
 
 
 def test_several_parameters_are_solved_interaction():

@@ -15,18 +15,18 @@ def test_a_bent_curve_and_its_scatter_are_recovered():
     shift = np.zeros((N, Q))
     shift[:, 0], shift[:, 1] = strength, 0.02 * strength ** 1.5
     shift[:, 2] = 0.2 * rng.normal(size=N) * np.linalg.norm(shift[:, :2], axis=1)
-    flown = shift + rng.normal(size=(N, Q))
-    made = learn_class("one", "one", None, 0.01 * strength[:, None], shift, flown)
-    assert not made.signed and made.parameters == 1
+    features = shift + rng.normal(size=(N, Q))
+    effect_class = learn_class("one", "one", None, 0.01 * strength[:, None], shift, features)
+    assert not effect_class.signed and effect_class.parameters == 1
     for s in (5.0, 20.0, 80.0):
         expected = np.zeros(Q)
         expected[:2] = s, 0.02 * s ** 1.5
         # the strength is the shift along the main direction, which is nearly the first axis
-        found = min((made.mean(np.array([[x]]))[0] for x in np.geomspace(0.8 * s, 1.3 * s, 200)),
-                    key=lambda m: np.linalg.norm(m - expected))
-        assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
-    assert np.abs(made.axes[2, 0]) > 0.95
-    assert np.sqrt(made.variances[0]) == pytest.approx(0.2, rel=0.15)
+        nearest = min((effect_class.mean(np.array([[x]]))[0] for x in np.geomspace(0.8 * s, 1.3 * s, 200)),
+                      key=lambda m: np.linalg.norm(m - expected))
+        assert np.linalg.norm(nearest - expected) < 0.05 * np.linalg.norm(expected)
+    assert np.abs(effect_class.axes[2, 0]) > 0.95
+    assert np.sqrt(effect_class.variances[0]) == pytest.approx(0.2, rel=0.15)
 
 
 def test_two_signs_are_two_branches():
@@ -34,9 +34,9 @@ def test_two_signs_are_two_branches():
     strength = np.exp(rng.uniform(np.log(3.0), np.log(50.0), N)) * rng.choice([-1.0, 1.0], N)
     shift = np.zeros((N, Q))
     shift[:, 0], shift[:, 1] = strength, 0.5 * np.abs(strength)
-    made = learn_class("one", "one", None, strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
-    assert made.signed
-    up, down = made.mean(np.array([[20.0], [-20.0]]))
+    effect_class = learn_class("one", "one", None, strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
+    assert effect_class.signed
+    up, down = effect_class.mean(np.array([[20.0], [-20.0]]))
     assert up[0] == pytest.approx(-down[0], rel=0.05)
     assert up[1] == pytest.approx(down[1], rel=0.05) and up[1] > 0.0
 
@@ -46,7 +46,8 @@ def test_a_plane_of_two_parameters():
     plane = rng.normal(size=(2, Q))
     way = rng.normal(size=(N, 2))
     strength = way / np.linalg.norm(way, axis=1, keepdims=True) * np.exp(rng.uniform(0.0, 3.0, N))[:, None]
-    made = learn_class("two", "two", None, strength, strength @ plane, strength @ plane + 0.1 * rng.normal(size=(N, Q)))
-    one = np.array([[0.6, -0.8]])
+    shift = strength @ plane
+    effect_class = learn_class("two", "two", None, strength, shift, shift + 0.1 * rng.normal(size=(N, Q)))
+    strength_pair = np.array([[0.6, -0.8]])
     middle = np.median(np.abs(strength))  # what strengths are scaled by
-    assert made.mean(one)[0] == pytest.approx(middle * one[0] @ plane, rel=0.05, abs=0.05)
+    assert effect_class.mean(strength_pair)[0] == pytest.approx(middle * strength_pair[0] @ plane, rel=0.05, abs=0.05)

@@ -10,12 +10,12 @@ from airtouch.gap.relations import coherence, features
 from airtouch.gap.relations.flight_signals import COMMAND, LIFT, signals_of
 from airtouch.gap.relations.space import whitening
 from airtouch.logs.flight_log import FlightLog
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 
 @pytest.fixture(scope="module")
 def flight():
-    return flown(1, 41, {})[0]
+    return fly(1, 41, {})[0]
 
 
 def test_coherence_of_a_signal_and_its_noisy_copy(flight):
@@ -24,31 +24,32 @@ def test_coherence_of_a_signal_and_its_noisy_copy(flight):
     signals = signals_of(flight, VEHICLE)
     table = rng.normal(size=signals.table.shape)
     table[:, LIFT.start] = 2.0 * table[:, COMMAND.start] + rng.normal(size=len(table))
-    found = dict(zip(coherence.names(), coherence.coherence(replace(signals, table=table)), strict=True))
+    coherences = dict(zip(coherence.names(), coherence.coherence(replace(signals, table=table)), strict=True))
     wide = [k for k, (a, b) in enumerate(zip(coherence.BANDS_HZ, coherence.BANDS_HZ[1:], strict=False)) if b - a > 3.0]
-    assert np.mean([found[f"climb real command:lift {k}"] for k in wide]) == pytest.approx(2.0 / np.sqrt(5.0), abs=0.03)
-    assert np.mean([found[f"climb imaginary command:lift {k}"] for k in wide]) == pytest.approx(0.0, abs=0.05)
-    assert np.mean([np.exp(found[f"climb alone lift {k}"]) for k in wide]) == pytest.approx(0.2, abs=0.04)
-    assert np.mean([found[f"climb power lift {k}"] - found[f"climb power command {k}"] for k in wide]) \
+    real = np.mean([coherences[f"climb real command:lift {k}"] for k in wide])
+    assert real == pytest.approx(2.0 / np.sqrt(5.0), abs=0.03)
+    assert np.mean([coherences[f"climb imaginary command:lift {k}"] for k in wide]) == pytest.approx(0.0, abs=0.05)
+    assert np.mean([np.exp(coherences[f"climb alone lift {k}"]) for k in wide]) == pytest.approx(0.2, abs=0.04)
+    assert np.mean([coherences[f"climb power lift {k}"] - coherences[f"climb power command {k}"] for k in wide]) \
         == pytest.approx(np.log(5.0), abs=0.1)
 
 
 def test_a_row_lost_by_chance_hardly_moves_the_relations(flight):
     """One row of a log: its block is left out; no share of power changes as bridging it would change it."""
     log = flight.log
-    kept = np.delete(np.arange(len(log)), len(log) // 2)
-    holed = ready(FlightLog({k: v[kept] for k, v in log.columns.items()}, log.meta), VEHICLE)
+    rows = np.delete(np.arange(len(log)), len(log) // 2)
+    holed = ready(FlightLog({k: v[rows] for k, v in log.columns.items()}, log.meta), VEHICLE)
     before, after = (features.features(f, VEHICLE) for f in (flight, holed))
-    alone = np.array([" alone " in n for n in features.names()])
-    assert np.abs(after - before)[alone].max() < 1.0
+    of_one_signal = np.array([" alone " in n for n in features.names()])
+    assert np.abs(after - before)[of_one_signal].max() < 1.0
 
 
 def test_battery_voltage_and_rotor_speeds_are_not_looked_at(flight):
     """A flight whose log has them has the features of one whose log has not."""
-    bare = ready(FlightLog({k: v for k, v in flight.log.columns.items() if k not in features.UNSEEN}, flight.log.meta),
-                 VEHICLE)
+    columns = {k: v for k, v in flight.log.columns.items() if k not in features.UNSEEN}
+    without_them = ready(FlightLog(columns, flight.log.meta), VEHICLE)
     assert flight.log.has("vbat_V")
-    assert features.features(flight, VEHICLE) == pytest.approx(features.features(bare, VEHICLE), nan_ok=True)
+    assert features.features(flight, VEHICLE) == pytest.approx(features.features(without_them, VEHICLE), nan_ok=True)
 
 
 def test_a_log_without_attitude_has_no_features(flight):

@@ -23,8 +23,8 @@ def library():
     """Six effects along six axes, each by its strength alone; what has no name lies anywhere."""
     classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
                                 np.zeros(0)) for i, n in enumerate(NAMES))
-    learned = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
-    return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), learned,
+    model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
+    return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
                    (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)))
 
 
@@ -33,37 +33,37 @@ def noise(seed=1):
 
 
 def test_evidence_of_two_effects_that_do_not_meet_is_the_sum_of_each():
-    flown = FlightFeatures(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().model)
-    alone = {h.names[0]: h for h in flown.single_effects()}
-    both = next(h for h in flown.with_one_more(alone["mass"], lambda c, _: c.name == "wind"))
-    assert both.evidence == pytest.approx(alone["mass"].evidence + alone["wind"].evidence, abs=0.05)
+    features = FlightFeatures(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().model)
+    single = {h.names[0]: h for h in features.single_effects()}
+    both = next(h for h in features.with_one_more(single["mass"], lambda c, _: c.name == "wind"))
+    assert both.evidence == pytest.approx(single["mass"].evidence + single["wind"].evidence, abs=0.05)
 
 
 def test_something_without_a_name_is_a_mixture_of_normal_densities():
     of, values = library().model, 5.0 * noise(2)
     exact = logsumexp([multivariate_normal(np.zeros(Q), np.eye(Q) + s * s * of.nameless @ of.nameless.T).logpdf(values)
                        for s in SIZES]) - np.log(len(SIZES))
-    flown = FlightFeatures(values, of)
+    features = FlightFeatures(values, of)
     none = multivariate_normal(np.zeros(Q), np.eye(Q)).logpdf(values)
-    assert flown.nameless_evidence(flown.none) == pytest.approx(exact - none)
+    assert features.nameless_evidence(features.none) == pytest.approx(exact - none)
 
 
 @pytest.mark.parametrize("true", [(), ("mass",), ("mass", "wind"), ("vibration", "inertia", "gust")])
 def test_inference_names_what_is_there(true):
     values = noise() + sum(size * np.eye(Q)[NAMES.index(n)] for size, n in zip(SIZE, true, strict=False))
-    found = infer(library(), values[None])
-    assert {c.name for c in found.classes} == set(true)
-    assert found.unexplained < found.limit
-    chance = found.probabilities()
+    inference = infer(library(), values[None])
+    assert {c.name for c in inference.classes} == set(true)
+    assert inference.unexplained < inference.limit
+    chance = inference.probabilities()
     assert sum(chance.values()) == pytest.approx(1.0)
     assert max(chance, key=chance.__getitem__) == (true[0] if true else "none")
 
 
 def test_a_withheld_effect_is_left():
     values = (noise() + 45.0 * np.eye(Q)[0])[None]
-    found = infer(library().without(["mass"]), values)
-    assert not found.classes and found.unexplained > 10.0 * found.limit
-    assert found.evidence.keys() == set(NAMES[1:])
+    inference = infer(library().without(["mass"]), values)
+    assert not inference.classes and inference.unexplained > 10.0 * inference.limit
+    assert inference.evidence.keys() == set(NAMES[1:])
 
 
 def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(monkeypatch):
@@ -78,9 +78,9 @@ def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(mon
 def test_the_mean_of_flights_is_as_one_of_less_noise():
     """Four flights: evidence is that of one whose noise is half as large, whose shift is twice as long."""
     way = np.eye(Q)[0]
-    four, one = np.tile(3.0 * way, (4, 1)), 6.0 * way
-    scaled = replace(library(), model=model_of_mean(library().model, 4))
-    assert infer(library(), four).evidence["mass"] == pytest.approx(infer(scaled, one[None]).evidence["mass"])
+    four, mean_flight = np.tile(3.0 * way, (4, 1)), 6.0 * way
+    of_mean = replace(library(), model=model_of_mean(library().model, 4))
+    assert infer(library(), four).evidence["mass"] == pytest.approx(infer(of_mean, mean_flight[None]).evidence["mass"])
     assert infer(library(), four).evidence["mass"] > infer(library(), four[:1]).evidence["mass"] + 10.0
 
 

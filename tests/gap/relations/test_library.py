@@ -14,22 +14,22 @@ from airtouch.gap.relations.learning import drawings
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.simulation import batch
 from airtouch.simulation.effects import NAMES
-from gap_flights import VEHICLE, flown, ready
+from gap_flights import VEHICLE, fly, ready
 
 
 @pytest.fixture(scope="module")
 def nominal():
     """Features of nominal flights of a seed that nothing was learned from."""
-    return [features(f, VEHICLE) for f in flown(5, 77)]
+    return [features(f, VEHICLE) for f in fly(5, 77)]
 
 
 def test_a_file_holds_what_was_saved(tmp_path):
     shipped = library.shipped()
     library.save(shipped, tmp_path / "one.npz")
-    again = library.read((tmp_path / "one.npz").read_bytes())
-    assert [c.name for c in again.model.classes] == [c.name for c in shipped.model.classes]
-    assert again.projection == pytest.approx(shipped.projection)
-    assert again.effects == shipped.effects
+    reloaded = library.read((tmp_path / "one.npz").read_bytes())
+    assert [c.name for c in reloaded.model.classes] == [c.name for c in shipped.model.classes]
+    assert reloaded.projection == pytest.approx(shipped.projection)
+    assert reloaded.effects == shipped.effects
 
 
 def test_the_file_is_of_todays_features_and_effects():
@@ -66,18 +66,18 @@ def test_nominal_flights_lie_as_far_as_their_covariance_says(nominal):
                                      {"controller_gain": {"position": 1.25}}, {"imu_noise": {"factor": 1.15}}])
 def test_weak_effects_are_named_and_withheld_ones_are_not(study, effects):
     """Each too weak for the replay of a single flight; the other names of one that is withheld do not get it."""
-    data, candidates = Data(study, flown(1, 78, effects)), all_candidates()
+    data, candidates = Data(study, fly(1, 78, effects)), all_candidates()
     chosen = select(data, candidates)
     assert chosen.inference is not None and [s.name for s in chosen.named] == list(effects)
     left_out = {n: v for n, v in candidates.items() if n not in effects}
-    found = inference_of(data, list(left_out))
-    assert not set(effects) & set(found.evidence)
-    assert max(found.evidence.values()) < chosen.inference.evidence[next(iter(effects))]
+    inference = inference_of(data, list(left_out))
+    assert not set(effects) & set(inference.evidence)
+    assert max(inference.evidence.values()) < chosen.inference.evidence[next(iter(effects))]
 
 
 def test_it_is_not_asked_where_it_cannot_answer(study):
     """In recorded flights, and where an effect is a candidate that it has no class of."""
-    data = Data(study, flown(1, 79))
+    data = Data(study, fly(1, 79))
     assert inference_of(data, list(all_candidates())) is not None
     assert inference_of(data, [*all_candidates(), "an effect of one's own"]) is None
     recorded = replace(study, scatter=replace(study.scatter, exact=False))

@@ -20,18 +20,18 @@ def test_nine_intervals_in_ten_hold_the_amount(scatter):
     """The strength of a flight lies off by a normal error of the logarithm: its deviation is that of the amount."""
     rng = np.random.default_rng(1)
 
-    def drawn(many):
-        amount = np.exp(rng.uniform(np.log(0.01), np.log(1.0), many))
-        return 50.0 * amount * np.exp(scatter * rng.normal(size=many)), amount
+    def draw(count):
+        amount = np.exp(rng.uniform(np.log(0.01), np.log(1.0), count))
+        return 50.0 * amount * np.exp(scatter * rng.normal(size=count)), amount
 
-    held = []
+    covered = []
     for _ in range(10):
-        strength, amount = drawn(80)
+        strength, amount = draw(80)
         readout = Readout(("fraction",), strength[:, None], amount[:, None])
-        for s, true in zip(*drawn(60), strict=True):
+        for s, true in zip(*draw(60), strict=True):
             (value,), (deviation,) = readout(np.array([s]))
-            held.append(abs(value - true) <= 1.645 * deviation)
-    assert 0.84 < np.mean(held) < 0.96
+            covered.append(abs(value - true) <= 1.645 * deviation)
+    assert 0.84 < np.mean(covered) < 0.96
 
 
 def test_either_sign_has_its_own_line():
@@ -57,5 +57,5 @@ def test_several_parameters_are_linear_in_the_strengths():
 def test_amounts_and_values_are_the_inverse_of_each_other(name, parameter, value):
     amount = amount_of(get(name), parameter, value)
     size = np.geomspace(0.1, 10.0, 20)[:, None] * np.sign(amount)
-    found = read_out(Readout((parameter,), size, size), get(name), np.array([amount]))
-    assert found[parameter][0] == pytest.approx(value, rel=1e-6)
+    parameters = read_out(Readout((parameter,), size, size), get(name), np.array([amount]))
+    assert parameters[parameter][0] == pytest.approx(value, rel=1e-6)

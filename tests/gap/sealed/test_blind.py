@@ -24,27 +24,27 @@ CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_of
 
 
 @pytest.fixture(scope="module")
-def checked(tmp_path_factory):
+def blind_check(tmp_path_factory):
     """A set of 10 flights, diagnosed and scored."""
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
     patch.setattr(blind, "strengths", lambda *_: CLEAR)
     calibrated, study_in = [], blind_run.study_in
     patch.setattr(blind_run, "study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
-    found = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
+    figures = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
     patch.undo()
     assert len(calibrated) == 1, "a set is calibrated once"
-    return folder, found, calibrated[0]
+    return folder, figures, calibrated[0]
 
 
-def test_diagnosis_names_clear_effects(checked):
-    _, found, _ = checked
-    assert found["diagnosed"] == 10 and found["top_1"]["n"] == 4 and found["false_alarms"]["n"] == 4
-    assert found["top_1"]["hits"] >= 3 and found["top_3"]["hits"] == 4  # by chance, of 24 names: 3 in 10,000
-    assert found["false_alarms"]["hits"] <= 1
-    assert found["pairs_one_right"]["hits"] == 2
-    assert found["parameters"]["error"]["value"] < 0.25
-    assert found["shrink"]["right"]["value"] > 0.75 and found["shrink"]["wrong"]["value"] < 0.25
+def test_diagnosis_names_clear_effects(blind_check):
+    _, figures, _ = blind_check
+    assert figures["diagnosed"] == 10 and figures["top_1"]["n"] == 4 and figures["false_alarms"]["n"] == 4
+    assert figures["top_1"]["hits"] >= 3 and figures["top_3"]["hits"] == 4  # by chance, of 24 names: 3 in 10,000
+    assert figures["false_alarms"]["hits"] <= 1
+    assert figures["pairs_one_right"]["hits"] == 2
+    assert figures["parameters"]["error"]["value"] < 0.25
+    assert figures["shrink"]["right"]["value"] > 0.75 and figures["shrink"]["wrong"]["value"] < 0.25
 
 
 def dying(case):
@@ -60,61 +60,61 @@ def always_dying(_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
-    folder, *_ = checked
+def test_a_process_that_dies_loses_nothing(blind_check, tmp_path, monkeypatch):
+    folder, *_ = blind_check
     monkeypatch.setenv("DIED", str(tmp_path / "died"))
     monkeypatch.setenv("ANSWERS", str(folder / "answers"))
     monkeypatch.setattr(blind_run, "with_study", dying)
-    names, said = [f"flight_{i:04d}" for i in range(3)], []
-    blind_run.answer(folder, tmp_path / "answers", [(n, ()) for n in names], 2, said.append, object())
-    assert (tmp_path / "died").exists() and any("died" in s for s in said)
+    names, messages = [f"flight_{i:04d}" for i in range(3)], []
+    blind_run.answer(folder, tmp_path / "answers", [(n, ()) for n in names], 2, messages.append, object())
+    assert (tmp_path / "died").exists() and any("died" in s for s in messages)
     for n in names:
         assert (tmp_path / "answers" / f"{n}.json").read_bytes() == (folder / "answers" / f"{n}.json").read_bytes()
 
 
-def test_what_is_sent_to_a_process_fits_into_its_pipe(checked, tmp_path, monkeypatch):
+def test_what_is_sent_to_a_process_fits_into_its_pipe(blind_check, tmp_path, monkeypatch):
     """Else Python 3.11 waits for ever when the process dies while it is written (CPython issue 94777)."""
-    sent = []
+    jobs = []
 
     def in_order(submit, cases, ahead):
-        sent.extend(cases)
+        jobs.extend(cases)
         return iter(())
 
     monkeypatch.setattr(blind_run, "in_order", in_order)
     with pytest.raises(AirTouchError):  # nothing comes back
-        blind_run.answer(checked[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
+        blind_run.answer(blind_check[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
                          study=object())
-    assert sent and all(len(pickle.dumps(case)) < select.PIPE_BUF for case in sent)
+    assert jobs and all(len(pickle.dumps(case)) < select.PIPE_BUF for case in jobs)
 
 
-def test_processes_that_die_again_and_again_are_told(checked, tmp_path, monkeypatch):
+def test_processes_that_die_again_and_again_are_told(blind_check, tmp_path, monkeypatch):
     monkeypatch.setattr(blind_run, "with_study", always_dying)
     with pytest.raises(AirTouchError, match="4 processes died"):
-        blind_run.answer(checked[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
+        blind_run.answer(blind_check[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
                          study=object())
 
 
-def test_answers_are_the_same_wherever_flights_are_spread(checked, tmp_path):
-    folder, _, study = checked
+def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path):
+    folder, _, study = blind_check
     key = json.loads(blind.key_of(folder).read_text())["answers"]
     name = next(n for n in sorted(key) if len(key[n]["effects"]) == 1)  # two take longer
-    sent = []
+    jobs = []
 
     def spread(function, items):
         for item in items:
-            sent.append(pickle.dumps((function, item)))
-            function, item = pickle.loads(sent[-1])
+            jobs.append(pickle.dumps((function, item)))
+            function, item = pickle.loads(jobs[-1])
             yield function(item)
 
     blind_run.answer(folder, tmp_path / "answers", [(name, ())], study=study, spread=spread)
-    assert len(sent) == 1
+    assert len(jobs) == 1
     assert (tmp_path / "answers" / f"{name}.json").read_bytes() == (folder / "answers" / f"{name}.json").read_bytes()
 
 
-def test_flights_say_nothing_of_their_effect(checked):
-    folder, *_ = checked
-    kept = {p.name.split(".")[0] for p in folder.glob("*.gz")}
-    assert kept == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(10)}
+def test_flights_say_nothing_of_their_effect(blind_check):
+    folder, *_ = blind_check
+    log_names = {p.name.split(".")[0] for p in folder.glob("*.gz")}
+    assert log_names == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(10)}
     for path in folder.glob("*.csv.gz"):
         log = logs.read(path)
         assert not {"effects", "seed", "scenario", "flight"} & set(log.meta) and not log.meta.get("condition"), path
@@ -123,33 +123,33 @@ def test_flights_say_nothing_of_their_effect(checked):
     assert not any(name in public for name in CLEAR)
 
 
-def test_the_seal(checked, tmp_path):
-    folder, *_ = checked
+def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_check, tmp_path):
+    folder, *_ = blind_check
     key = blind.key_of(folder)
-    again = blind.score(folder, folder / "answers")  # the same answers may be scored once more
-    assert again["top_1"]["n"] == 4
+    rescored = blind.score(folder, folder / "answers")  # the same answers may be scored once more
+    assert rescored["top_1"]["n"] == 4
     other = tmp_path / "other.json"
     other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
                                             "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))
     with pytest.raises(AirTouchError, match="opened for other answers"):
         blind.score(folder, other)
-    changed = tmp_path / "key.json"
-    changed.write_bytes(key.read_bytes() + b" ")
+    edited_key = tmp_path / "key.json"
+    edited_key.write_bytes(key.read_bytes() + b" ")
     with pytest.raises(AirTouchError, match="not the key that was sealed"):
-        blind.score(folder, folder / "answers", changed)
+        blind.score(folder, folder / "answers", edited_key)
     with pytest.raises(AirTouchError, match="--force"):
         blind.make(folder, 3)
     with pytest.raises(AirTouchError, match="no sealed.json"):
         blind.open_key(tmp_path, "")
 
 
-def test_command_writes_figures(checked, tmp_path):
-    folder, found, _ = checked
+def test_command_writes_figures(blind_check, tmp_path):
+    folder, figures, _ = blind_check
     out, plot = tmp_path / "f.json", tmp_path / "f.png"
     result = CliRunner().invoke(command, ["blind", "score", str(folder), str(folder / "answers"), "--json", str(out),
                                           "--plot", str(plot)])
     assert result.exit_code == 0, result.output
-    assert json.loads(out.read_text())["top_1"] == found["top_1"] and plot.read_bytes().startswith(b"\x89PNG")
+    assert json.loads(out.read_text())["top_1"] == figures["top_1"] and plot.read_bytes().startswith(b"\x89PNG")
     assert "false alarms" in result.output
 
 
@@ -164,37 +164,38 @@ def test_wilson_and_auroc_in_closed_form():
     assert blind_score.auroc([0.0, 2.0], [1.0]) == 0.5
 
 
-def answer(name, verdict, ranking, effects=(), without=(), before=2.0, after=1.1):
+def answer(name, verdict, ranking, effects=(), withheld=(), before=2.0, after=1.1):
     return {"flights": [name], "verdict": verdict, "ranking": [{"name": n, "probability": p} for n, p in ranking],
-            "effects": [{"name": n, "parameters": q} for n, q in effects], "without": list(without),
+            "effects": [{"name": n, "parameters": q} for n, q in effects], "without": list(withheld),
             "gap": {"before": before, "after": after}, "control": {"before": before, "after": before}}
 
 
 def test_scores_in_closed_form():
-    def one(name, value, level=0):
+    def truth(name, value, level=0):
         return {"effects": [{"name": name, "kind": name, "level": level, "values": value}], "nats": 3.0 + 6.0 * level}
 
     key = {"answers": {
-        "a": one("mass", {"fraction": 0.1}), "b": one("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
-        "d": {"effects": one("mass", {})["effects"] + one("inertia", {})["effects"]}, "e": {"effects": []}}}
+        "a": truth("mass", {"fraction": 0.1}), "b": truth("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
+        "d": {"effects": truth("mass", {})["effects"] + truth("inertia", {})["effects"]}, "e": {"effects": []}}}
     quantity = {"fraction": {"value": 0.6, "low": 0.4, "high": 0.8, "unit": "1"}}
     cases = [
         answer("a", "effect", [("thrust_coefficient", 0.9), ("none", 0.1)], [("thrust_coefficient", {})]),
         answer("b", "effect", [("inertia", 0.8), ("none", 0.2), ("unknown", 0.0)], [("inertia", quantity)]),
         answer("c", "none", [("none", 1.0)]), answer("e", "unknown", [("unknown", 0.7), ("none", 0.3)]),
         answer("d", "effect", [("inertia", 0.8)], [("inertia", {}), ("gust", {})]),
-        answer("b", "unknown", [("unknown", 0.6), ("gust", 0.4)], without=["inertia"])]
-    found = blind_score.figures(key, cases)
-    assert (found["top_1"]["hits"], found["top_1"]["n"]) == (2, 2)  # mass and thrust_coefficient are one
-    assert (found["false_alarms"]["hits"], found["false_alarms"]["n"]) == (1, 2)
-    assert found["pairs_exact"]["hits"] == 0 and found["pairs_one_right"]["hits"] == 1
-    assert found["parameters"]["error"]["value"] == pytest.approx(0.2) and found["parameters"]["coverage"]["hits"] == 1
-    ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in found["by_severity"].items()}
+        answer("b", "unknown", [("unknown", 0.6), ("gust", 0.4)], withheld=["inertia"])]
+    figures = blind_score.figures(key, cases)
+    assert (figures["top_1"]["hits"], figures["top_1"]["n"]) == (2, 2)  # mass and thrust_coefficient are one
+    assert (figures["false_alarms"]["hits"], figures["false_alarms"]["n"]) == (1, 2)
+    assert figures["pairs_exact"]["hits"] == 0 and figures["pairs_one_right"]["hits"] == 1
+    assert figures["parameters"]["error"]["value"] == pytest.approx(0.2)
+    assert figures["parameters"]["coverage"]["hits"] == 1
+    ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in figures["by_severity"].items()}
     assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 26th of 2 % of the flights
-    assert found["shrink"]["right"]["value"] == pytest.approx(0.9) and found["shrink"]["wrong"]["value"] == 0.0
-    left_out = found["unknown"]["all"]
+    assert figures["shrink"]["right"]["value"] == pytest.approx(0.9) and figures["shrink"]["wrong"]["value"] == 0.0
+    left_out = figures["unknown"]["all"]
     assert left_out["auroc"] == left_out["auroc_told_apart"] == 1.0 and left_out["wrong_name"]["hits"] == 0
-    assert found["confusion"]["none"] == {"none": 1, "unknown": 1}
+    assert figures["confusion"]["none"] == {"none": 1, "unknown": 1}
     with pytest.raises(AirTouchError, match="not a flight of this set"):
         blind_score.figures(key, [answer("z", "none", [("none", 1.0)])])
 
@@ -221,9 +222,9 @@ def test_answers_that_are_none(tmp_path):
 
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
     """Two normal variables whose log ratios have means 2 x APART apart: the test has its false alarms and its power."""
-    apart = np.sqrt(2.0 * blind_severity.APART)
-    none, there = (apart * np.random.default_rng(k).normal(m, 1.0, 400_000) - 0.5 * apart ** 2
-                   for k, m in enumerate((0.0, apart)))
+    distance = np.sqrt(2.0 * blind_severity.APART)
+    none, there = (distance * np.random.default_rng(k).normal(m, 1.0, 400_000) - 0.5 * distance ** 2
+                   for k, m in enumerate((0.0, distance)))
     assert 0.5 * (there.mean() - none.mean()) == pytest.approx(blind_severity.APART, rel=0.01)
     alarm = none.mean() + blind_severity.FALSE_ALARM * none.std()
     assert np.mean(none > alarm) == pytest.approx(0.02 / len(KINDS), rel=0.15)
@@ -231,12 +232,13 @@ def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
     assert blind_severity.SEEN == pytest.approx(0.5 * chi2.isf(2.0 * 0.02 / len(KINDS), 1))  # one-sided
 
 
-def test_severities_and_strengths():
+def test_severities_are_in_equal_ratios_and_strengths_within_bounds():
     assert severities(0.1, 1.0) == pytest.approx((0.1, 0.2, 0.4))
     assert severities(0.1, 0.2) == pytest.approx((0.1, np.sqrt(0.02), 0.2))
     for kind in KINDS.values():
         rng = np.random.default_rng(0)
-        kind.active(kind.highest, rng)  # within the registry's bounds
+        active = kind.active(kind.highest, rng)
+        assert all(p.low <= active.values[p.name] <= p.high for p in active.effect.parameters), kind
 
 
 def test_a_set_is_balanced():

@@ -25,30 +25,30 @@ def noise(rng, size, rms=1.0):
 def flights(rng, true, alias, count=12, blocks=12):
     """Spectra measured and modelled: the vehicle feels `true` of what the log says, the rest is folded noise."""
     felt = [noise(rng, (blocks, BINS, 3), true) for _ in range(count)]
-    logged = [t + noise(rng, t.shape, alias) for t in felt]
-    return felt, logged
+    commands = [t + noise(rng, t.shape, alias) for t in felt]
+    return felt, commands
 
 
 def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
-    felt, logged = flights(rng, 1.0, 1.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
+    felt, commands = flights(rng, 1.0, 1.0)
+    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
     np.testing.assert_allclose(response.steady.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
     np.testing.assert_allclose(response.steady.coherent.imag, 0.0, atol=0.1)
 
 
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
-    felt, logged = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
+    felt, commands = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
+    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
     assert np.median(np.abs(response.steady.coherent)) == 0.0
 
 
 def test_a_weaker_response_earns_nothing_on_nominal_flights():
     """With q = 1 half the response halves what folded noise leaves; with q as measured it adds to it."""
     rng = np.random.default_rng(2)
-    felt, logged = flights(rng, 1.0, 2.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
+    felt, commands = flights(rng, 1.0, 2.0)
+    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
     y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
     def table(torque):
         return np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
@@ -56,38 +56,38 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     nominal, weaker = table(y - w), table(y - 0.5 * w)
     def size(x):
         return np.mean(np.abs(x[:, FIRST_BIN:, TORQUE]) ** 2)
-    quiet = response.quiet(w)
-    assert quiet.all()
+    steady = response.quiet(w)
+    assert steady.all()
     assert size(weaker) < 0.6 * size(nominal)
     residual = y - w
-    before, after = (size(response.with_residual(table(y - share * w), quiet, TorqueSpectra(y, residual, change)))
+    before, after = (size(response.with_residual(table(y - share * w), steady, TorqueSpectra(y, residual, change)))
                      for share, change in ((1.0, None), (0.5, y - 0.5 * w - residual)))
     assert after > before
 
 
 def test_means_stay_as_they_are():
     rng = np.random.default_rng(3)
-    felt, logged = flights(rng, 1.0, 2.0)
-    residuals = [f - w for f, w in zip(felt, logged, strict=True)]
+    felt, commands = flights(rng, 1.0, 2.0)
+    residuals = [f - w for f, w in zip(felt, commands, strict=True)]
     response = response_of(felt, residuals, NO_LOOP)
     spectra = np.zeros((12, BINS, COUNT), complex)
     spectra[:, :, TORQUE] = residuals[0]
-    out = response.with_residual(spectra, response.quiet(logged[0]), TorqueSpectra(felt[0], residuals[0]))
+    out = response.with_residual(spectra, response.quiet(commands[0]), TorqueSpectra(felt[0], residuals[0]))
     np.testing.assert_array_equal(out[:, :FIRST_BIN], spectra[:, :FIRST_BIN])
 
 
 def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_own():
     rng = np.random.default_rng(4)
-    felt, logged = flights(rng, 1.0, 1.0, 12, 20)
-    for f, w in zip(felt, logged, strict=True):  # every fourth block: a kick of which a third turns the vehicle
+    felt, commands = flights(rng, 1.0, 1.0, 12, 20)
+    for f, w in zip(felt, commands, strict=True):  # every fourth block: a kick of which a third turns the vehicle
         kick = noise(rng, (5, BINS, 3), 30.0)
         w[::4] += kick
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
-    np.testing.assert_array_equal(response.quiet(logged[0])[:, 0], np.arange(20) % 4 != 0)
+    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    np.testing.assert_array_equal(response.quiet(commands[0])[:, 0], np.arange(20) % 4 != 0)
     np.testing.assert_allclose(np.abs(response.stepped.coherent), 1.0 / 3.0, atol=0.05)
-    left = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: what errors in variables leave; the kick's own scatter
-    np.testing.assert_allclose(np.median(response.stepped.weight), np.sqrt(left[0] / left[1]), rtol=0.1)
+    variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
+    np.testing.assert_allclose(np.median(response.stepped.weight), np.sqrt(variances[0] / variances[1]), rtol=0.1)
 
 
 def test_turning_under_an_outside_torque_is_the_closed_loop_s():
@@ -96,10 +96,10 @@ def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     c = controller.Controller(0.01, 6.0, 0.4)
     f = np.geomspace(0.8, 20.0, 12)
     s = 2j * np.pi * f
-    plant, *_, whole = loop_model.loop_parts(c, row, "roll", f)
+    plant, *_, open_loop = loop_model.loop_parts(c, row, "roll", f)
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     expected = turning.turning_per_command(c, row, "roll", strengths, f)
-    np.testing.assert_allclose(expected, -s / whole, rtol=1e-9)
+    np.testing.assert_allclose(expected, -s / open_loop, rtol=1e-9)
 
 
 def test_more_inertia_leaves_more_of_an_outside_torque():
@@ -119,13 +119,13 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
 def empirical(active: list[Active]) -> np.ndarray:
     """Angular acceleration for the torque of logged commands in simulated flights, S_yw / S_ww of roll, (bins,)."""
     vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
-    flown = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
-    logs = [log for log in flown if isinstance(log, FlightLog)]
+    outcomes = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
+    logs = [log for log in outcomes if isinstance(log, FlightLog)]
     for flight in measure.usable(logs, vehicle, []):
         first = starts(flight, AIR)
-        turned = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
-        made = turned - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
-        cross, power = cross + (turned * made.conj()).sum(axis=0), power + (np.abs(made) ** 2).sum(axis=0)
+        turns = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
+        modelled = turns - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
+        cross, power = cross + (turns * modelled.conj()).sum(axis=0), power + (np.abs(modelled) ** 2).sum(axis=0)
     return np.asarray(cross / power)
 
 
@@ -133,13 +133,13 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     """Noise of the gyro folds into log and command alike, through the gyro chip's own low-pass."""
     vehicle, f = vehicles.load("crazyflie-2.1-flow"), frequencies(AIR)
     late = Active(get("sensor_latency"), {"delay": 0.003})
-    seen = empirical([late]) / empirical([])
+    simulated = empirical([late]) / empirical([])
     noise_alone = np.eye(5)[:1]
-    told = []
+    predicted = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        told.append(turning.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
-    judged = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
-    ratio = (seen / (told[1] / told[0]))[judged].reshape(-1, 8).mean(axis=1)
+        predicted.append(turning.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
+    band = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
+    ratio = (simulated / (predicted[1] / predicted[0]))[band].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)
     np.testing.assert_allclose(np.abs(ratio), 1.0, atol=0.25)

@@ -17,10 +17,10 @@ def test_means_of_flights_differ_beyond_chance_only_by_what_their_trims_do():
     trims = rng.normal(0.0, 0.02, count)
 
     def offset(trim):
-        left = [np.tile(t + rng.normal(0.0, rms, (len(f), 1)), COUNT) for t, f in zip(trim, flights, strict=True)]
-        spectra = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(left, first, strict=True)]
+        residuals = [np.tile(t + rng.normal(0.0, rms, (len(f), 1)), COUNT) for t, f in zip(trim, flights, strict=True)]
+        spectra = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(residuals, first, strict=True)]
         bridging = [np.zeros((len(s[AIR]), LENGTH[AIR] // 2 + 1, COUNT)) for s in first]
-        return floor_of(flights, left, first, spectra, np.zeros(COUNT), bridging).offset_beyond[0]
+        return floor_of(flights, residuals, first, spectra, np.zeros(COUNT), bridging).offset_beyond[0]
 
     chance = rms / np.sqrt(length_s / PERIOD_S)
     assert offset(0.0 * trims) < 0.4 * chance

@@ -21,7 +21,7 @@ from airtouch.gap.signatures.posterior import LEAST
 from airtouch.simulation.effects import EFFECTS
 
 
-def drawn(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
+def draw_strengths(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
     return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()},
                      {k: 1e-6 + 0.0 * v for k, v in rms.items()},
                      float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
@@ -46,12 +46,12 @@ def test_an_effect_without_scatter_is_judged_by_its_gain_alone():
 def test_flights_of_a_class_are_taken_for_it():
     rng = np.random.default_rng(3)
     for name in REAL:
-        known = {k: v for k, v in table()[name].rms.items() if v.min() > 0.05}
-        assert len(known) >= 5
-        got = scatter_of(drawn(rng, known, 6))
-        apart = {other: np.median([np.abs(np.log(got.rms[k] / one.rms[k])).mean() for k in known])
-                 for other, one in table().items()}
-        assert min(apart, key=apart.__getitem__) == name, apart
+        rms = {k: v for k, v in table()[name].rms.items() if v.min() > 0.05}
+        assert len(rms) >= 5
+        scatter = scatter_of(draw_strengths(rng, rms, 6))
+        distance = {other: np.median([np.abs(np.log(scatter.rms[k] / vehicle_class.rms[k])).mean() for k in rms])
+                    for other, vehicle_class in table().items()}
+        assert min(distance, key=distance.__getitem__) == name, distance
 
 
 def test_recorded_flights_are_never_taken_for_simulated_ones():
@@ -63,33 +63,36 @@ def test_recorded_flights_are_never_taken_for_simulated_ones():
 
 def test_recorded_flights_of_a_vehicle_in_the_table_are_of_its_class():
     rng = np.random.default_rng(6)
-    one, other = (next(c for c in table().values() if c.vehicle == v) for v in ("ns-34g", "ns-67g"))
-    odd = drawn(rng, {k: v for k, v in other.rms.items() if v.min() > 0.05}, 2)  # they look like the other vehicle's
+    brushed, heavier = (next(c for c in table().values() if c.vehicle == v) for v in ("ns-34g", "ns-67g"))
+    # they look like the other vehicle's
+    odd = draw_strengths(rng, {k: v for k, v in heavier.rms.items() if v.min() > 0.05}, 2)
     assert scatter_of(odd, True, "ns-34g").freedom == scatter_of(odd, True, "of nobody").freedom
-    beyond = set(one.rms) - set(odd[0].strengths) - SHARED
+    beyond = set(brushed.rms) - set(odd[0].strengths) - SHARED
     own = scatter_of(odd, True, "ns-34g").rms
-    assert all(np.array_equal(own[k], np.maximum(one.rms[k], LEAST_RECORDED)) for k in beyond)
-    assert any(not np.array_equal(scatter_of(odd, True).rms[k], np.maximum(one.rms[k], LEAST_RECORDED)) for k in beyond)
+    assert all(np.array_equal(own[k], np.maximum(brushed.rms[k], LEAST_RECORDED)) for k in beyond)
+    of_no_vehicle = scatter_of(odd, True).rms
+    assert any(not np.array_equal(of_no_vehicle[k], np.maximum(brushed.rms[k], LEAST_RECORDED)) for k in beyond)
 
 
 def test_names_of_one_thing_scatter_alike():
     rng = np.random.default_rng(8)
-    got = scatter_of(drawn(rng, {"mass": np.array([0.1]), "thrust_coefficient": np.array([2.0])}, 60), True, "ns-34g")
-    assert got.rms["mass"] == got.rms["thrust_coefficient"] == pytest.approx(2.0, rel=0.3)
+    rms = {"mass": np.array([0.1]), "thrust_coefficient": np.array([2.0])}
+    scatter = scatter_of(draw_strengths(rng, rms, 60), True, "ns-34g")
+    assert scatter.rms["mass"] == scatter.rms["thrust_coefficient"] == pytest.approx(2.0, rel=0.3)
 
 
 def test_a_baseline_without_a_loss_says_little_of_other_days():
     none = Apparent({"packet_loss": np.zeros(1)}, {"packet_loss": np.zeros(1)}, 0.0)
     of_class = next(c for c in table().values() if c.vehicle == "ns-34g").rms["packet_loss"]
-    got = scatter_of([none] * 3, True, "ns-34g").rms["packet_loss"]
-    assert got == pytest.approx(np.maximum(of_class, LEAST_RECORDED))
+    packet_loss = scatter_of([none] * 3, True, "ns-34g").rms["packet_loss"]
+    assert packet_loss == pytest.approx(np.maximum(of_class, LEAST_RECORDED))
 
 
 def test_many_baseline_flights_outweigh_the_table():
     rng = np.random.default_rng(4)
     own = {k: 0.1 + 3.0 * v for k, v in table()[REAL[0]].rms.items()}
-    got = scatter_of(drawn(rng, own, 400))
-    ratio = np.concatenate([got.rms[k] / own[k] for k in own if k not in SHARED])
+    scatter = scatter_of(draw_strengths(rng, own, 400))
+    ratio = np.concatenate([scatter.rms[k] / own[k] for k in own if k not in SHARED])
     np.testing.assert_allclose(ratio, 1.0, rtol=0.25)
 
 
@@ -102,32 +105,32 @@ def test_what_chance_alone_scatters_is_not_counted_as_scatter():
 
 
 def test_without_baseline_flights_the_widest_class_holds():
-    got = scatter_of(())
-    for one in table().values():
-        for name, rms in one.rms.items():
-            assert (got.rms[name][:len(rms)] >= rms[:len(got.rms[name])] - 1e-12).all()
+    scatter = scatter_of(())
+    for vehicle_class in table().values():
+        for name, rms in vehicle_class.rms.items():
+            assert (scatter.rms[name][:len(rms)] >= rms[:len(scatter.rms[name])] - 1e-12).all()
 
 
 def test_a_parameter_that_is_newer_than_the_table_scatters_as_the_widest():
     scatter = Scatter({"wind": np.array([0.1, 1.0])}, 8.0, (0.0, 0.5))
-    whole = Scatter({"wind": np.array([0.1, 1.0, 1.0])}, 8.0, (0.0, 0.5))
+    complete = Scatter({"wind": np.array([0.1, 1.0, 1.0])}, 8.0, (0.0, 0.5))
     strength = np.array([0.5, 2.0, 3.0])
-    assert scatter.evidence("wind", strength) == whole.evidence("wind", strength)
+    assert scatter.evidence("wind", strength) == complete.evidence("wind", strength)
 
 
 def test_a_longer_flight_may_gain_more_without_a_name():
     scatter = Scatter({}, 8.0, (0.3, 0.6))
     assert 12.0 < scatter.allowed(10.0, 12.0) < scatter.allowed(40.0, 12.0)
-    quiet = Scatter({}, 8.0, (0.0, 0.0))
-    assert quiet.allowed(40.0, 12.0) == pytest.approx(12.0)
+    no_scatter = Scatter({}, 8.0, (0.0, 0.0))
+    assert no_scatter.allowed(40.0, 12.0) == pytest.approx(12.0)
 
 
 def test_an_effect_of_one_sign_scatters_as_the_flights_that_show_it():
     """Half of the flights would have it below none: how far below, nobody knows, and they are no sign of calm."""
     rng = np.random.default_rng(8)
-    seen = 0.3 * rng.normal(size=200)
+    strengths = 0.3 * rng.normal(size=200)
     flights = [Apparent({"ground_effect": np.array([max(x, 0.0)])},
-                        {"ground_effect": np.array([0.02 if x > 0.0 else NOBODY_KNOWS])}, 0.0) for x in seen]
+                        {"ground_effect": np.array([0.02 if x > 0.0 else NOBODY_KNOWS])}, 0.0) for x in strengths]
     assert measured(flights).rms["ground_effect"][0] == pytest.approx(0.3, rel=0.15)
 
 
@@ -148,60 +151,60 @@ def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
 
     beyond = []
     for _ in range(50):
-        known = measured([Apparent({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
-        beyond += [known.unusual("gust", size()) > 0.0 for _ in range(40)]
+        scatter = measured([Apparent({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
+        beyond += [scatter.unusual("gust", size()) > 0.0 for _ in range(40)]
     assert np.mean(beyond) < 0.06
 
 
 def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
     rng = np.random.default_rng(11)
     sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)
-    known = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
-    assert np.mean([known.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(FALSE_SHARE, rel=0.3)
+    scatter = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
+    assert np.mean([scatter.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(FALSE_SHARE, rel=0.3)
 
 
 def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():
-    known = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
-    assert known.unusual("downwash", size_of(30.0, np.array([0.01]))) < 0.0
-    assert known.unusual("downwash", size_of(0.1, np.array([0.2]))) < 0.0
-    assert known.unusual("downwash", size_of(30.0, np.array([0.2]))) > 0.0
+    scatter = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
+    assert scatter.unusual("downwash", size_of(30.0, np.array([0.01]))) < 0.0
+    assert scatter.unusual("downwash", size_of(0.1, np.array([0.2]))) < 0.0
+    assert scatter.unusual("downwash", size_of(30.0, np.array([0.2]))) > 0.0
 
 
 def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():
     none = {"mass": np.zeros(1), "inertia": np.zeros(1)}
     values = ((1.0, 2.0), (-1.0, 0.0))
     flights = [Apparent({"mass": np.array([m]), "inertia": np.array([i])}, none, 1.0) for m, i in values]
-    got = measured(flights)
+    scatter = measured(flights)
     n = 2  # n s^2 / sigma^2 is chi-square of n degrees where every order of magnitude of sigma is as likely
     expected = np.sqrt(n * np.array([1.0, 2.0]) / chi2.ppf(0.5, n))
-    np.testing.assert_allclose([*got.rms["mass"], *got.rms["inertia"]], expected, rtol=0.06)  # the grid's step
+    np.testing.assert_allclose([*scatter.rms["mass"], *scatter.rms["inertia"]], expected, rtol=0.06)  # the grid's step
 
 
 def test_a_parameter_of_which_no_flight_tells_scatters_as_the_effect_s_others():
     rng = np.random.default_rng(7)
     error = {"wind": np.array([0.01, 1e6])}
     flights = [Apparent({"wind": np.array([rng.normal(), 0.0])}, error, 1.0) for _ in range(60)]
-    known, unknown = measured(flights).rms["wind"]
-    assert known == pytest.approx(1.0, rel=0.25)
-    assert 0.3 < unknown < 3.0
+    first_rms, second_rms = measured(flights).rms["wind"]
+    assert first_rms == pytest.approx(1.0, rel=0.25)
+    assert 0.3 < second_rms < 3.0
 
 
 def test_the_table_knows_every_effect_of_the_registry():
-    for name, one in table().items():
-        assert set(one.rms) == set(EFFECTS), name
+    for name, vehicle_class in table().items():
+        assert set(vehicle_class.rms) == set(EFFECTS), name
 
 
 def test_a_random_effect_is_judged_by_how_far_it_is_above_its_usual_strength():
     rng = np.random.default_rng(9)
     flights = [Apparent({"vibration": 0.5 + 0.05 * rng.normal(size=1)}, {"vibration": np.zeros(1)}, 0.0)
                for _ in range(300)]
-    got = measured(flights)
-    assert got.middle["vibration"] == pytest.approx(0.5, abs=0.01)
-    assert got.rms["vibration"] == pytest.approx(0.05, rel=0.15)
-    strength, (middle,), (rms,) = np.array([0.8]), got.middle["vibration"], got.rms["vibration"]
+    scatter = measured(flights)
+    assert scatter.middle["vibration"] == pytest.approx(0.5, abs=0.01)
+    assert scatter.rms["vibration"] == pytest.approx(0.05, rel=0.15)
+    strength, (middle,), (rms,) = np.array([0.8]), scatter.middle["vibration"], scatter.rms["vibration"]
     expected = student.logpdf(0.0, 300.0) - student.logpdf((0.8 - middle) / rms, 300.0)
-    assert got.evidence("vibration", strength) == pytest.approx(expected)
-    assert got.evidence("vibration", np.array([0.2])) == 0.0
+    assert scatter.evidence("vibration", strength) == pytest.approx(expected)
+    assert scatter.evidence("vibration", np.array([0.2])) == 0.0
 
 
 def test_a_strength_counts_from_the_likeliest_compromise_of_chance_and_nominal_scatter():
@@ -216,19 +219,19 @@ def test_a_strength_counts_from_the_likeliest_compromise_of_chance_and_nominal_s
         x = np.stack(np.meshgrid(*2 * [np.linspace(-0.1, 0.1, 801)]))
         off = x - np.reshape(strength, (2, 1, 1))
         chance = 0.5 * np.einsum("iab,ij,jab->ab", off, np.linalg.inv(covariance), off)
-        found = scatter.evidence("imu_bias", np.array(strength), covariance)
-        assert found == pytest.approx(float((chance + student_of(x)).min()), rel=0.05, abs=0.15)
+        evidence = scatter.evidence("imu_bias", np.array(strength), covariance)
+        assert evidence == pytest.approx(float((chance + student_of(x)).min()), rel=0.05, abs=0.15)
     sure = np.array([0.0, 0.05])
     assert scatter.evidence("imu_bias", sure, 1e-14 * np.eye(2)) == pytest.approx(student_of(sure), rel=1e-3)
-    alone = Scatter({"mass": np.array([1e-3])}, 8.0, (0.0, 0.5))
-    assert alone.evidence("mass", np.array([1.0]), np.array([[0.04]])) == pytest.approx(0.5 * 5.0 ** 2, rel=0.02)
+    mass_only = Scatter({"mass": np.array([1e-3])}, 8.0, (0.0, 0.5))
+    assert mass_only.evidence("mass", np.array([1.0]), np.array([[0.04]])) == pytest.approx(0.5 * 5.0 ** 2, rel=0.02)
 
 
 def test_a_parameter_that_the_data_leave_open_is_no_evidence():
     scatter = Scatter({"imu_bias": np.full(2, 0.01)}, 8.0, (0.0, 0.5))
-    known = np.array([0.0, 1.0])
-    assert scatter.evidence("imu_bias", known, np.diag([1e-6, 1.0])) <= 0.5
-    assert scatter.evidence("imu_bias", known, np.diag([1e-6, np.inf])) == 0.0
+    strength = np.array([0.0, 1.0])
+    assert scatter.evidence("imu_bias", strength, np.diag([1e-6, 1.0])) <= 0.5
+    assert scatter.evidence("imu_bias", strength, np.diag([1e-6, np.inf])) == 0.0
 
 
 def test_parameters_that_make_up_for_one_another_count_together():
@@ -236,35 +239,35 @@ def test_parameters_that_make_up_for_one_another_count_together():
     scatter = Scatter({"battery_sag": np.full(2, 1e-3)}, 8.0, (0.0, 0.5))
     strength, along, across = np.array([1.0, 1.0]), np.array([1.0, -1.0]), np.array([1.0, 1.0])
     covariance = 4.0 * np.outer(along, along) + 0.01 * np.outer(across, across)
-    together, alone = (scatter.evidence("battery_sag", strength, c) for c in (covariance, np.diag(np.diag(covariance))))
-    assert alone < 1.0 and together > 8.0
+    joint, separate = (scatter.evidence("battery_sag", strength, c) for c in (covariance, np.diag(np.diag(covariance))))
+    assert separate < 1.0 and joint > 8.0
 
 
 def test_the_best_of_several_trials_does_not_widen_the_scatter():
     """Of four gains with a chance error of 1 each, the largest is often 2; none scatters beyond chance."""
     rng = np.random.default_rng(10)
-    every = [rng.normal(size=4) for _ in range(200)]
-    best = [np.where(np.arange(4) == np.argmax(np.abs(x)), x, 0.0) for x in every]
-    each = [Apparent({"controller_gain": x}, {"controller_gain": np.ones(4)}, 0.0) for x in every]
+    strengths = [rng.normal(size=4) for _ in range(200)]
+    best = [np.where(np.arange(4) == np.argmax(np.abs(x)), x, 0.0) for x in strengths]
+    each = [Apparent({"controller_gain": x}, {"controller_gain": np.ones(4)}, 0.0) for x in strengths]
     largest = [Apparent({"controller_gain": x}, {"controller_gain": np.where(x == 0.0, 1e6, 1.0)}, 0.0) for x in best]
     assert measured(each).rms["controller_gain"].max() < 0.5 < measured(largest).rms["controller_gain"].min()
 
 
 def test_flights_of_the_simulator_are_all_drawn_alike():
     still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
-    got = scatter_of([Apparent(still, still, 0.0) for _ in range(4)])
-    assert got.exact and got.freedom == table()["simulated"].freedom + 4
+    scatter = scatter_of([Apparent(still, still, 0.0) for _ in range(4)])
+    assert scatter.exact and scatter.freedom == table()["simulated"].freedom + 4
     recorded = scatter_of([Apparent(still, still, 0.0) for _ in range(4)], recorded=True)
     assert not recorded.exact and recorded.freedom == 8.0
 
 
 def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed():
     """Four flights of another mission, with 0.1 of a ground effect each, where the class knows 0.005."""
-    rng, known = np.random.default_rng(8), table()["simulated"].rms
-    flights = [Apparent(one.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
-                        one.errors | {"ground_effect": np.array([0.02])}, one.rate)
-               for one in drawn(rng, {k: v for k, v in known.items() if k not in SHARED}, 4)]
-    got = scatter_of(flights)
-    assert got.exact and 0.05 < got.rms["ground_effect"][0] < 0.2
-    others = [got.rms[k] / v for k, v in known.items() if k in flights[0].strengths and k != "ground_effect"]
-    assert 0.8 < np.median(np.concatenate(others)) < 1.3  # those that scatter as the class does stay with it
+    rng, class_rms = np.random.default_rng(8), table()["simulated"].rms
+    flights = [Apparent(nominal.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
+                        nominal.errors | {"ground_effect": np.array([0.02])}, nominal.rate)
+               for nominal in draw_strengths(rng, {k: v for k, v in class_rms.items() if k not in SHARED}, 4)]
+    scatter = scatter_of(flights)
+    assert scatter.exact and 0.05 < scatter.rms["ground_effect"][0] < 0.2
+    ratios = [scatter.rms[k] / v for k, v in class_rms.items() if k in flights[0].strengths and k != "ground_effect"]
+    assert 0.8 < np.median(np.concatenate(ratios)) < 1.3  # those that scatter as the class does stay with it

@@ -7,15 +7,15 @@ import pytest
 
 from airtouch.gap.unnamed.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
 from airtouch.simulation import signals as at
-from gap_flights import VEHICLE, flight, flown
+from gap_flights import VEHICLE, flight, fly
 
 REST_S, TILT = 1.0, 0.3
 WEIGHT_N = VEHICLE.mass_kg * VEHICLE.gravity_mps2
 
 
-def columns(made):
+def columns(hover):
     """Each signal by its name, (n, 3)."""
-    return dict(zip(BASIS, basis(made, VEHICLE).transpose(1, 0, 2), strict=True))
+    return dict(zip(BASIS, basis(hover, VEHICLE).transpose(1, 0, 2), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -27,14 +27,14 @@ def lift_off():
 def test_thrust_rises_as_the_motors_do(lift_off):
     t = np.arange(len(lift_off)) * 0.01 - REST_S
     full = 4.0 * float(VEHICLE.thrust(np.array([40000.0]))[0]) / WEIGHT_N
-    seen = columns(lift_off)
+    column = columns(lift_off)
     late = t > 0.05
     thrust = full * (1.0 - np.exp(-(t[late] + 0.01) / VEHICLE.motor_time_constant_s))
-    np.testing.assert_allclose(seen["thrust"][late, 0], thrust, rtol=1e-9)
+    np.testing.assert_allclose(column["thrust"][late, 0], thrust, rtol=1e-9)
     slope = full / VEHICLE.motor_time_constant_s * np.exp(-(t[late] + 0.01) / VEHICLE.motor_time_constant_s) * LAG_S
-    np.testing.assert_allclose(seen["d_thrust"][late, 0], slope, rtol=0.05, atol=1e-6)
+    np.testing.assert_allclose(column["d_thrust"][late, 0], slope, rtol=0.05, atol=1e-6)
     for name in ("roll", "pitch", "yaw"):
-        np.testing.assert_allclose(seen[name], 0.0, atol=1e-12)
+        np.testing.assert_allclose(column[name], 0.0, atol=1e-12)
 
 
 def test_on_the_ground_only_the_constant_is_left(lift_off):
@@ -47,39 +47,39 @@ def test_on_the_ground_only_the_constant_is_left(lift_off):
                                                                (3, 1, -1, 1)])
 def test_one_motor_more_is_a_roll_a_pitch_and_a_yaw(motor, roll, pitch, yaw):
     """Motors front right, rear right, rear left, front left: the left side lifts to a positive roll."""
-    made = flight(3.0)
-    pwm = made.pwm.copy()
+    hover = flight(3.0)
+    pwm = hover.pwm.copy()
     pwm[:, motor] = 45000.0
-    seen = columns(replace(made, pwm=pwm))
-    more, usual = VEHICLE.thrust(np.array([45000.0, 40000.0])) / WEIGHT_N
+    column = columns(replace(hover, pwm=pwm))
+    stronger, nominal = VEHICLE.thrust(np.array([45000.0, 40000.0])) / WEIGHT_N
     for name, sign in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
-        np.testing.assert_allclose(seen[name][-1], sign * (more - usual), rtol=1e-9)
-    np.testing.assert_allclose(seen["thrust"][-1], 3.0 * usual + more, rtol=1e-9)
+        np.testing.assert_allclose(column[name][-1], sign * (stronger - nominal), rtol=1e-9)
+    np.testing.assert_allclose(column["thrust"][-1], 3.0 * nominal + stronger, rtol=1e-9)
 
 
 def test_time_height_and_axes_of_the_world():
-    made = flight(3.0)
-    signals = made.signals.copy()
+    hover = flight(3.0)
+    signals = hover.signals.copy()
     signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 2.0 * HEIGHT_M
     c, s = np.cos(TILT), np.sin(TILT)
-    turn = np.tile([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], (len(made), 1, 1))
-    seen = columns(replace(made, signals=signals, turn=turn))
-    t = np.arange(len(made)) * 0.01
-    np.testing.assert_allclose(seen["time"][:, 0], t / TIME_S)
-    np.testing.assert_allclose(seen["time_thrust"][:, 0], t / TIME_S * seen["thrust"][:, 0])
-    np.testing.assert_allclose(seen["height"], 0.25)  # a quarter at twice the height
-    np.testing.assert_allclose(seen["height_roll"], 0.0, atol=1e-12)
+    turn = np.tile([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], (len(hover), 1, 1))
+    column = columns(replace(hover, signals=signals, turn=turn))
+    t = np.arange(len(hover)) * 0.01
+    np.testing.assert_allclose(column["time"][:, 0], t / TIME_S)
+    np.testing.assert_allclose(column["time_thrust"][:, 0], t / TIME_S * column["thrust"][:, 0])
+    np.testing.assert_allclose(column["height"], 0.25)  # a quarter at twice the height
+    np.testing.assert_allclose(column["height_roll"], 0.0, atol=1e-12)
     # a push along x of the world is felt along the body's x by cos, along its y by -sin of the yaw
-    np.testing.assert_allclose(seen["world_x"][0], [c, -s, 0.0], atol=1e-12)
-    np.testing.assert_allclose(seen["world_y"][0], [s, c, 0.0], atol=1e-12)
+    np.testing.assert_allclose(column["world_x"][0], [c, -s, 0.0], atol=1e-12)
+    np.testing.assert_allclose(column["world_y"][0], [s, c, 0.0], atol=1e-12)
 
 
 def test_columns_are_the_signals_that_they_are_named_after():
-    one = flown(1, 43)[0]
-    made = columns(one)
-    hover = np.flatnonzero(one.phase == 2)
-    assert np.all(made["in_air"][one.on_ground] == 0.0) and np.all(made["one"] == 1.0)
-    assert abs(made["thrust"][hover, 0].mean() - 1.0) < 0.1  # of its weight
-    np.testing.assert_allclose(made["vx"][hover, 1], one.signals[hover, at.VELOCITY])
-    rows = np.stack([made[k][hover] for k in ("world_x", "world_y", "tilt")], axis=1)
+    simulated = fly(1, 43)[0]
+    column = columns(simulated)
+    hover = np.flatnonzero(simulated.phase == 2)
+    assert np.all(column["in_air"][simulated.on_ground] == 0.0) and np.all(column["one"] == 1.0)
+    assert abs(column["thrust"][hover, 0].mean() - 1.0) < 0.1  # of its weight
+    np.testing.assert_allclose(column["vx"][hover, 1], simulated.signals[hover, at.VELOCITY])
+    rows = np.stack([column[k][hover] for k in ("world_x", "world_y", "tilt")], axis=1)
     np.testing.assert_allclose(np.linalg.norm(rows, axis=2), 1.0, rtol=1e-9)  # rows of a rotation

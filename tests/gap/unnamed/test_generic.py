@@ -16,7 +16,7 @@ from airtouch.gap.unnamed.regression import HalfResiduals, coefficients
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 PUSH = 0.01  #: N s/m
 
@@ -29,10 +29,10 @@ def _sideways(p, s, memory, stream, out):
 @pytest.fixture
 def sideways():
     """A made-up effect: forward speed pushes to the left."""
-    made = effects.register(Effect("sideways", "forward speed pushes to the left",
-                                   (Parameter("push", "N s/m", PUSH, 0.0, 1.0, 0.0, "per forward speed"),),
-                                   wrench=_sideways))
-    yield made
+    effect = effects.register(Effect("sideways", "forward speed pushes to the left",
+                                     (Parameter("push", "N s/m", PUSH, 0.0, 1.0, 0.0, "per forward speed"),),
+                                     wrench=_sideways))
+    yield effect
     effects.unregister("sideways")
 
 
@@ -42,47 +42,48 @@ def gain_of(study, flights):
 
 
 def test_nominal_flights_of_other_seeds_have_nothing_left(study):
-    assert max(gain_of(study, [f]) for f in flown(6, 57)) < 10.0
+    assert max(gain_of(study, [f]) for f in fly(6, 57)) < 10.0
 
 
 def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways):
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
-    one = flown(1, 45, {"sideways": {"push": PUSH}})
-    data = Data(study, one)
-    found = [coefficients(HalfResiduals(data, p, ()), 1, study.unnamed_floor)[BASIS.index("vx")]
-             for p in halves(data)]
-    np.testing.assert_allclose(found, PUSH / VEHICLE.mass_kg, rtol=0.35)
-    assert gain_of(study, one) > 30.0
-    named, nameless = (brief(study, one, without, data) for without in ((), ("sideways",)))
-    chance, without_name = ({r.name: r.probability for r in d.ranking}["unknown"] for d in (named, nameless))
+    flights = fly(1, 45, {"sideways": {"push": PUSH}})
+    data = Data(study, flights)
+    push_per_speed = [coefficients(HalfResiduals(data, p, ()), 1, study.unnamed_floor)[BASIS.index("vx")]
+                      for p in halves(data)]
+    np.testing.assert_allclose(push_per_speed, PUSH / VEHICLE.mass_kg, rtol=0.35)
+    assert gain_of(study, flights) > 30.0
+    with_it, nameless = (brief(study, flights, without, data) for without in ((), ("sideways",)))
+    chance, without_name = ({r.name: r.probability for r in d.ranking}["unknown"] for d in (with_it, nameless))
     assert nameless.verdict == "unknown" and without_name > 0.85
-    assert named.verdict == "effect" and named.effects[0].name == "sideways" and chance < 0.1
+    assert with_it.verdict == "effect" and with_it.effects[0].name == "sideways" and chance < 0.1
 
 
 def test_an_effect_with_its_name_beats_the_model_without(study):
-    data = Data(study, flown(1, 47, {"com_offset": {"x": 0.001, "y": 0.0}}))
+    data = Data(study, fly(1, 47, {"com_offset": {"x": 0.001, "y": 0.0}}))
     parts = halves(data)
     (term,) = candidates.terms("com_offset")
     fits = [fit.fit(data, p, (term,)) for p in parts]
-    named = sum(fit.judge(data, parts[1 - k], f.terms) - fit.judge(data, parts[1 - k], ()) for k, f in enumerate(fits))
+    effect_gain = sum(fit.judge(data, parts[1 - k], f.terms) - fit.judge(data, parts[1 - k], ())
+                      for k, f in enumerate(fits))
     before = sum(generic.generic_gain(data, parts, [(), ()]))
     after = sum(generic.generic_gain(data, parts, [f.terms for f in fits]))
-    assert 30.0 < before < named and after < 0.15 * named
+    assert 30.0 < before < effect_gain and after < 0.15 * effect_gain
 
 
-def beside(study, term, given, seed):
+def beside(study, term, values, seed):
     """What columns gain beside an effect, without and with those that the effect itself makes."""
-    data = Data(study, flown(1, seed, {term.name: given}))
+    data = Data(study, fly(1, seed, {term.name: values}))
     parts = halves(data)
     fits = [fit.fit(data, p, [term]).terms for p in parts]
-    kept = generic.generic_gain(data, parts, fits)[0]
+    gain = generic.generic_gain(data, parts, fits)[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(generic, "answerable", lambda *_: np.ones(WIDEST, bool))
-        return kept, generic.generic_gain(data, parts, fits)[0]
+        return gain, generic.generic_gain(data, parts, fits)[0]
 
 
 def test_what_answers_a_random_torque_is_not_new_beside_it(study):
     """Torque of the motors' own noise is in the commands that fight it, so that what is left follows them."""
     term = next(t for t in candidates.terms("motor_noise") if t.values["time"] == 0.02)
-    kept, asked = beside(study, term, {"rms": 0.003}, 51)
-    assert kept < 5.0 and asked > 20.0
+    with_answer, without_answer = beside(study, term, {"rms": 0.003}, 51)
+    assert with_answer < 5.0 and without_answer > 20.0

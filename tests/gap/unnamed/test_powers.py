@@ -1,12 +1,16 @@
 """Free powers: against closed forms, and noise that no band alone tells from chance."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import GROUPS
 from airtouch.gap.naming.judging import halves
+from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.unnamed import generic, powers
-from gap_flights import flown
+from gap_flights import fly
 
 
 def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_believed():
@@ -28,9 +32,27 @@ def test_what_may_be_there_gains_half_and_costs_log_two_at_most():
     np.testing.assert_allclose(powers.gain_at_even_odds(50.0), 50.0 - np.log(2.0))
 
 
-def test_a_little_noise_in_every_band_shows_in_the_sensors_sum(study, monkeypatch):
-    """A tenth more power in every band of every sensor: no band alone tells it from chance."""
-    data = Data(study, flown(1, 49, {"imu_noise": {"factor": 1.06}}))
-    together = sum(generic.generic_gain(data, halves(data), [(), ()]))
-    monkeypatch.setattr(powers, "_of_sensors", lambda powers, middle: middle)
-    assert together > 15.0 > sum(generic.generic_gain(data, halves(data), [(), ()]))
+def halves_of(factor, count=150):
+    """Powers of two halves: all bands of the force but the means' have `factor` times the floor, and no band else."""
+    rng = np.random.default_rng(4)
+    bands = [band * COUNT + axis for band in range(1, 11) for axis in range(3)]
+    groups = np.repeat(bands, count)
+    certain = np.full(len(groups), 1e6)
+    return [(factor * rng.exponential(size=len(groups)), certain, certain, groups) for _ in range(2)]
+
+
+def test_a_little_more_power_in_every_band_shows_in_the_sensors_sum():
+    """A quarter more, of which a band holds two nats: no band alone tells it from chance, thirty together do."""
+    factor, middle = 1.25, np.zeros(GROUPS)
+    floor = SimpleNamespace(power=np.stack([middle, np.full(GROUPS, 0.05)]))
+    one, two = halves_of(factor)
+    expected = 0.5 * 30 * 150 * (factor - 1.0 - np.log(factor)) - np.log(2.0)  # even odds that it is there
+    assert powers.power_gain(one, two, floor, True) == pytest.approx(expected, rel=0.25)
+    assert powers.power_gain(one, two, floor, False) < 0.1 * expected, "in recorded flights no sum is looked at"
+    assert powers.power_gain(*halves_of(1.0), floor, True) < 1.0
+
+
+def test_a_little_noise_of_the_imu_is_no_chance_in_a_simulated_flight(study):
+    """A tenth more power in every band of every sensor."""
+    data = Data(study, fly(1, 49, {"imu_noise": {"factor": 1.06}}))
+    assert sum(generic.generic_gain(data, halves(data), [(), ()])) > 15.0

@@ -10,14 +10,14 @@ from airtouch.gap.signatures import candidates
 from airtouch.gap.unnamed.basis import BASIS
 from airtouch.gap.unnamed.columns import WIDEST, answerable
 from airtouch.gap.unnamed.regression import HalfResiduals, coefficients
-from gap_flights import flown
+from gap_flights import fly
 
 
 def test_torque_that_answers_the_commands_otherwise_shows_in_simulated_flights(study):
     """Half as much inertia again; recorded flights' loop is not modelled as well."""
-    data = Data(study, flown(1, 50, {"inertia": {"fraction": 0.5}}))
-    found = [coefficients(HalfResiduals(data, p, ()), 4, study.unnamed_floor) for p in halves(data)]
-    assert all(f[len(BASIS):].any() for f in found)
+    data = Data(study, fly(1, 50, {"inertia": {"fraction": 0.5}}))
+    halves_coefficients = [coefficients(HalfResiduals(data, p, ()), 4, study.unnamed_floor) for p in halves(data)]
+    assert all(f[len(BASIS):].any() for f in halves_coefficients)
     among = np.arange(WIDEST) < len(BASIS)
     recorded = [coefficients(HalfResiduals(data, p, ()), 4, study.unnamed_floor, among)
                 for p in halves(data)]
@@ -25,9 +25,9 @@ def test_torque_that_answers_the_commands_otherwise_shows_in_simulated_flights(s
 
 
 def test_how_changed_gains_turn_the_vehicle_about_its_yaw_axis_is_not_asked(study):
-    data, yaw = Data(study, flown(1, 52)), [BASIS.index(n) for n in ("yaw", "d_yaw")]
-    for name, values, asked in (("controller_gain", {"attitude": 1.4}, False), ("mass", {"fraction": 0.1}, True)):
+    data, yaw = Data(study, fly(1, 52)), [BASIS.index(n) for n in ("yaw", "d_yaw")]
+    for name, values, expected in (("controller_gain", {"attitude": 1.4}, False), ("mass", {"fraction": 0.1}, True)):
         term = candidates.terms(name)[0]
         term = replace(term, values={**term.values, **values})
-        assert (answerable(data, [term], 5)[yaw] == asked).all()
+        assert (answerable(data, [term], 5)[yaw] == expected).all()
         assert answerable(data, [term], 4).all()  # roll and pitch are modelled

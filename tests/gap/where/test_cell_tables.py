@@ -43,12 +43,12 @@ def test_rms_is_the_mean_weighted_by_samples():
 @pytest.mark.parametrize(("flights", "blocks"), [(1, 12), (8, 4)])
 def test_nine_of_ten_intervals_hold_the_true_rms(flights, blocks):
     """On blocks of four independent values: 90 % intervals that may be wider, as blocks also differ, not narrower."""
-    rng, held = np.random.default_rng(2), []
+    rng, covered = np.random.default_rng(2), []
     for draw in range(40):
         table = cell_tables.table_of(blocks_of(rng, flights, blocks), AIRBORNE, seed=draw)
-        held.append((table.low[0, 1:] <= 1.0) & (table.high[0, 1:] >= 1.0))
+        covered.append((table.low[0, 1:] <= 1.0) & (table.high[0, 1:] >= 1.0))
         assert (table.low <= table.rms + 1e-12).all() and (table.rms <= table.high + 1e-12).all()
-    assert np.mean(held) > 0.87
+    assert np.mean(covered) > 0.87
 
 
 def test_a_phase_that_was_not_flown_has_no_table():

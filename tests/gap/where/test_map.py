@@ -15,8 +15,8 @@ NOISE = float(prepare(VEHICLE, ())[0][0]["acc_noise"][0])
 WIDTH = np.array([b - a for a, b in BANDS_HZ])
 
 
-def cell(made, channel, band, phase="hover", regime="all"):
-    return next(c for c in made.cells if (c.channel, c.band_hz, c.phase, c.regime)
+def cell(gap_map, channel, band, phase="hover", regime="all"):
+    return next(c for c in gap_map.cells if (c.channel, c.band_hz, c.phase, c.regime)
                 == (channel, BANDS_HZ[band], phase, regime))
 
 
@@ -28,30 +28,30 @@ def test_bands_share_the_power_out():
 
 @pytest.mark.parametrize("rms", [0.05, 3.0])
 def test_white_noise_has_its_rms_in_every_band(rms):
-    made = maps.gap_map(study(), [flight(120.0, noise(120.0, rms, 1))])
+    gap_map = maps.gap_map(study(), [flight(120.0, noise(120.0, rms, 1))])
     for b, width in enumerate(WIDTH):
         for axis in "xyz":
-            c = cell(made, f"force_{axis}", b)
+            c = cell(gap_map, f"force_{axis}", b)
             expected = rms * np.sqrt(width / 50.0)
             assert c.gap == pytest.approx(expected, rel=0.25 if b == 0 else 0.1)
             assert c.low < expected < c.high and c.unit == "m/s^2" and c.blocks == 47 and c.flights == 1
 
 
-def test_intervals_cover():
+def test_intervals_hold_the_true_rms_in_85_of_100_cells():
     inside = []
     for seed in range(30):
-        made = maps.gap_map(study(), [flight(30.0, noise(30.0, 1.0, seed))])
-        inside += [cell(made, "force_x", b).low < np.sqrt(w / 50.0) < cell(made, "force_x", b).high
+        gap_map = maps.gap_map(study(), [flight(30.0, noise(30.0, 1.0, seed))])
+        inside += [cell(gap_map, "force_x", b).low < np.sqrt(w / 50.0) < cell(gap_map, "force_x", b).high
                    for b, w in enumerate(WIDTH)]
     assert np.mean(inside) >= 0.85
 
 
 def test_an_offset_is_in_the_lowest_band_alone():
-    made = maps.gap_map(study(), [flight(7.0, np.array([0.5, 0.0, -0.2]))])
-    assert cell(made, "force_x", 0).gap == pytest.approx(0.5)
-    assert cell(made, "force_z", 0).gap == pytest.approx(0.2)
-    assert cell(made, "force_x", 0).low == pytest.approx(0.5) == cell(made, "force_x", 0).high
-    assert all(cell(made, f"force_{a}", b).gap < 1e-9 for a in "xyz" for b in range(1, 6))
+    gap_map = maps.gap_map(study(), [flight(7.0, np.array([0.5, 0.0, -0.2]))])
+    assert cell(gap_map, "force_x", 0).gap == pytest.approx(0.5)
+    assert cell(gap_map, "force_z", 0).gap == pytest.approx(0.2)
+    assert cell(gap_map, "force_x", 0).low == pytest.approx(0.5) == cell(gap_map, "force_x", 0).high
+    assert all(cell(gap_map, f"force_{a}", b).gap < 1e-9 for a in "xyz" for b in range(1, 6))
 
 
 @pytest.mark.parametrize(("hz", "band"), [(1.0, 1), (4.0, 2), (8.1, 3), (18.0, 4), (40.0, 5)])
@@ -59,9 +59,9 @@ def test_a_tone_is_in_its_band(hz, band):
     t = np.arange(2000) * 0.01
     tone = np.zeros((2000, 3))
     tone[:, 1] = 0.8 * np.sin(2 * np.pi * hz * t)
-    made = maps.gap_map(study(), [flight(20.0, tone)])
-    assert cell(made, "force_y", band).gap == pytest.approx(0.8 / np.sqrt(2), rel=0.05)
-    assert sum(cell(made, "force_y", b).gap ** 2 for b in range(6) if b != band) < 0.02 * 0.32
+    gap_map = maps.gap_map(study(), [flight(20.0, tone)])
+    assert cell(gap_map, "force_y", band).gap == pytest.approx(0.8 / np.sqrt(2), rel=0.05)
+    assert sum(cell(gap_map, "force_y", b).gap ** 2 for b in range(6) if b != band) < 0.02 * 0.32
 
 
 def test_a_phase_shorter_than_a_block_keeps_what_is_in_it():
@@ -69,29 +69,29 @@ def test_a_phase_shorter_than_a_block_keeps_what_is_in_it():
     phase, force = np.full(n, HOVER), np.zeros((n, 3))
     phase[:50] = TAKE_OFF
     force[:50, 2] = np.sin(2 * np.pi * 16.0 * np.arange(50) * 0.01)
-    made = maps.gap_map(study(), [flight(12.0, force, phase=phase)])
-    assert cell(made, "force_z", 4, "take-off").gap == pytest.approx(np.sqrt(0.5), rel=0.1)
-    assert cell(made, "force_z", 4).gap < 0.1
-    assert cell(made, "force_z", 4, "take-off").blocks == 1
+    gap_map = maps.gap_map(study(), [flight(12.0, force, phase=phase)])
+    assert cell(gap_map, "force_z", 4, "take-off").gap == pytest.approx(np.sqrt(0.5), rel=0.1)
+    assert cell(gap_map, "force_z", 4).gap < 0.1
+    assert cell(gap_map, "force_z", 4, "take-off").blocks == 1
 
 
 def test_lost_samples_do_not_count():
     force, lost = np.full((2000, 3), 0.3), np.zeros(2000, bool)
     force[700:720], lost[700:720] = 50.0, True
-    made = maps.gap_map(study(), [flight(20.0, force, lost=lost)])
-    assert cell(made, "force_x", 0).gap == pytest.approx(0.3)
-    assert cell(made, "force_x", 5).gap < 1e-9
+    gap_map = maps.gap_map(study(), [flight(20.0, force, lost=lost)])
+    assert cell(gap_map, "force_x", 0).gap == pytest.approx(0.3)
+    assert cell(gap_map, "force_x", 5).gap < 1e-9
 
 
 def test_baseline_floor_is_what_differs_between_flights_not_what_they_share():
     offsets = np.array([-0.3, -0.1, 0.1, 0.3])
     nominal = [flight(20.0, 2.0 + o + noise(20.0, 0.2, i), name=str(i)) for i, o in enumerate(offsets)]
-    made = maps.gap_map(study(), [flight(20.0, 2.0 + noise(20.0, 0.06, 9))], nominal)
-    lowest = cell(made, "force_x", 0)
+    gap_map = maps.gap_map(study(), [flight(20.0, 2.0 + noise(20.0, 0.06, 9))], nominal)
+    lowest = cell(gap_map, "force_x", 0)
     assert lowest.gap == pytest.approx(2.0, rel=0.02)
     assert lowest.floor == pytest.approx(offsets.std(ddof=1), rel=0.08)
-    assert cell(made, "force_x", 5).floor == pytest.approx(0.2 * np.sqrt(0.5), rel=0.1)
-    assert made.floor_from == maps.BASELINE
+    assert cell(gap_map, "force_x", 5).floor == pytest.approx(0.2 * np.sqrt(0.5), rel=0.1)
+    assert gap_map.floor_from == maps.BASELINE
 
 
 def test_without_baseline_the_floor_is_sensor_noise_and_spread():
@@ -104,10 +104,10 @@ def test_without_baseline_the_floor_is_sensor_noise_and_spread():
 
 
 def test_no_gap_is_rarely_called_one():
-    def quiet(seed):
+    def nominal(seed):
         return flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
     hits = [maps.significant(c) for s in range(8) for c in maps.gap_map(
-        study(), [quiet(s)], [quiet(50 + s), quiet(70 + s)]).cells if c.regime == "all"]
+        study(), [nominal(s)], [nominal(50 + s), nominal(70 + s)]).cells if c.regime == "all"]
     assert np.mean(hits) < 0.02
 
 
@@ -115,8 +115,8 @@ def test_largest_names_what_was_injected():
     t = np.arange(2000) * 0.01
     force = noise(20.0, 0.06, 1)
     force[:, 2] += 0.5 * np.sin(2 * np.pi * 4.0 * t)
-    made = maps.gap_map(study(), [flight(20.0, force)], [flight(20.0, noise(20.0, 0.06, i)) for i in (2, 3)])
-    first = maps.largest(made.cells)[0]
+    gap_map = maps.gap_map(study(), [flight(20.0, force)], [flight(20.0, noise(20.0, 0.06, i)) for i in (2, 3)])
+    first = maps.largest(gap_map.cells)[0]
     assert (first.channel, first.band_hz) == ("force_z", (2.0, 6.0)) and first.gap == pytest.approx(0.35, rel=0.1)
     assert "2-6 Hz, lift: 0.35 m/s^2" in maps.in_words(first) and "times the floor" in maps.in_words(first)
 
@@ -124,9 +124,9 @@ def test_largest_names_what_was_injected():
 def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
     force = noise(60.0, 0.06, 1)
     force[4000:, 0] += np.random.default_rng(0).normal(0.0, 1.0, 2000)
-    found = maps.largest(maps.gap_map(study(), [flight(60.0, force)]).cells)
-    assert found and found[0].channel == "force_x"
-    assert any(c.regime == "last third of the flight" for c in found)
+    cells = maps.largest(maps.gap_map(study(), [flight(60.0, force)]).cells)
+    assert cells and cells[0].channel == "force_x"
+    assert any(c.regime == "last third of the flight" for c in cells)
 
 
 @pytest.mark.parametrize(("name", "values", "force", "band"), [
@@ -134,9 +134,9 @@ def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
     ("imu_noise", {"factor": 4.0}, noise(40.0, 4.0 * NOISE, 3), 5)])
 def test_after_an_effect_that_is_right_little_is_left(name, values, force, band):
     term = terms(name)[0]
-    right = term.fitted(np.zeros(len(term.free)))
-    right = type(term)(term.effect, term.kind, term.free, {**right.values, **values})
-    c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[right]), "force_x", band)
+    true_term = term.fitted(np.zeros(len(term.free)))
+    true_term = type(term)(term.effect, term.kind, term.free, {**true_term.values, **values})
+    c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[true_term]), "force_x", band)
     assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
 
 
@@ -145,17 +145,18 @@ def test_of_several_effects_each_cell_names_the_one_that_takes_most():
     for name, values in (("imu_bias", {"acc_x": 0.9}), ("imu_noise", {"factor": 4.0})):
         term = terms(name)[0]
         chosen.append(type(term)(term.effect, term.kind, term.free, {**term.values, **values}))
-    made = maps.gap_map(study(), [flight(40.0, noise(40.0, 4.0 * NOISE, 3) + np.array([0.9, 0.0, 0.0]))], terms=chosen)
-    assert cell(made, "force_x", 0).by == "imu_bias" and cell(made, "force_z", 5).by == "imu_noise"
-    assert cell(made, "force_x", 0).after < 0.3 and cell(made, "torque_z", 0).by is None
+    force = noise(40.0, 4.0 * NOISE, 3) + np.array([0.9, 0.0, 0.0])
+    gap_map = maps.gap_map(study(), [flight(40.0, force)], terms=chosen)
+    assert cell(gap_map, "force_x", 0).by == "imu_bias" and cell(gap_map, "force_z", 5).by == "imu_noise"
+    assert cell(gap_map, "force_x", 0).after < 0.3 and cell(gap_map, "torque_z", 0).by is None
 
 
 def test_sums_of_phases_are_sums_of_blocks():
-    made = sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
-    whole = made.by_phase()
-    assert len(made.phase) > 5 and len(whole.phase) == 1
-    assert whole.weight[0, REGIMES.index("all")] == 2000
-    assert whole.power[0, 0, 0] == pytest.approx(2000.0)
+    per_block = sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
+    per_phase = per_block.by_phase()
+    assert len(per_block.phase) > 5 and len(per_phase.phase) == 1
+    assert per_phase.weight[0, REGIMES.index("all")] == 2000
+    assert per_phase.power[0, 0, 0] == pytest.approx(2000.0)
 
 
 @given(st.integers(2, 900), st.integers(0, 2 ** 32 - 1))
@@ -166,6 +167,6 @@ def test_any_stretch_can_be_filtered(n, seed):
 
 
 def test_stretches_leave_contact_out():
-    made = flight(10.0)
-    made.usable[300:400] = False
-    assert stretches(made) == [(0, 300), (400, 1000)]
+    hover = flight(10.0)
+    hover.usable[300:400] = False
+    assert stretches(hover) == [(0, 300), (400, 1000)]

@@ -10,13 +10,12 @@ def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
     """A take-off cell of 26 floors in one block against a sideways force of 10 floors in four phases."""
     cells = [cell("force_z", "take-off", 2.6, blocks=1),
              *(cell("force_y", p, 1.0, blocks=10) for p in ("hover", "cruise", "over platform", "landing"))]
-    one = summary.headline(cells)
-    assert (one.channel, one.phase) == ("force_y", "hover")
-    said = words.sentences(diagnosis(cells, "unknown", ()))
-    assert said[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, "
-                       "and it "
-                       "stands out in 4 of 5 phases in the air.")
-    texts = [s.text for s in advice.steps("unknown", [], [], one, [], True, "v")]
+    headline = summary.headline(cells)
+    assert (headline.channel, headline.phase) == ("force_y", "hover")
+    sentences = words.sentences(diagnosis(cells, "unknown", ()))
+    assert sentences[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the "
+                            "floor, and it stands out in 4 of 5 phases in the air.")
+    texts = [s.text for s in advice.steps("unknown", [], [], headline, [], True, "v")]
     assert "more time in hover" in texts[0] and not any("take-off" in t for t in texts)
 
 
@@ -29,7 +28,7 @@ def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():
 
 def test_headline_of_named_effects_is_where_they_take_most():
     cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
-    found = diagnosis(cells, effects=(Found("ground_effect", {}),))
-    assert found.headline is cells[1] and "lift" in words.sentences(found)[0]
+    result = diagnosis(cells, effects=(Found("ground_effect", {}),))
+    assert result.headline is cells[1] and "lift" in words.sentences(result)[0]
     assert ("1 of 2 cells still stand out, mostly in hover in roll torque at 0-0.5 Hz "
-            "(18 times the floor, as before)") in words.answer(found)
+            "(18 times the floor, as before)") in words.answer(result)

@@ -88,18 +88,18 @@ int main(int argc, char **argv) {
 
 @pytest.fixture(scope="module")
 def compiler():
-    found = shutil.which(os.environ.get("CC", "cc"))
-    if found is None:
+    path = shutil.which(os.environ.get("CC", "cc"))
+    if path is None:
         pytest.skip("no C compiler on this machine")
-    return found
+    return path
 
 
 @pytest.mark.parametrize("source", ["main.c", "l1_network.c", "l1_rolling.c", "l1_stream.c"])
 def test_glue_compiles_against_the_interfaces_it_uses(compiler, source, tmp_path):
     # The stand-ins in pmsis/ were taken from gap_sdk and lib/cpx; with those themselves it compiles too.
-    run = subprocess.run([compiler, *FLAGS, f"-I{Path(__file__).parent / 'pmsis'}", "-c", APP / source, "-o",
-                          tmp_path / "unit.o"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    process = subprocess.run([compiler, *FLAGS, f"-I{Path(__file__).parent / 'pmsis'}", "-c", APP / source, "-o",
+                              tmp_path / "unit.o"], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
 
 
 @pytest.fixture(scope="module")
@@ -126,16 +126,16 @@ def test_core_and_networks_fit_l1_with_the_stacks(program):
 def team(compiler, tmp_path_factory):
     folder = tmp_path_factory.mktemp("team")
     (folder / "team.c").write_text(TEAM)
-    built = subprocess.run([compiler, *FLAGS, *PORTABLE, folder / "team.c", "-pthread", "-lm", "-o", folder / "team"],
-                           capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr
+    process = subprocess.run([compiler, *FLAGS, *PORTABLE, folder / "team.c", "-pthread", "-lm", "-o", folder / "team"],
+                             capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
     return folder / "team"
 
 
 @pytest.mark.parametrize("cores", [1, 2, 4, 8])
 def test_a_team_of_cores_gives_the_same_packets(team, cores):
-    run = subprocess.run([team, str(cores)], capture_output=True, text=True, timeout=HANG_S)
-    assert run.returncode == 0 and int(run.stdout) == 31
+    process = subprocess.run([team, str(cores)], capture_output=True, text=True, timeout=HANG_S)
+    assert process.returncode == 0 and int(process.stdout) == 31
 
 
 @pytest.mark.parametrize("detector, most", [("best-gap8", 90_000), ("paper-gap8", 2_200_000),
@@ -150,10 +150,10 @@ def test_on_an_emulated_core_the_replies_are_those_of_the_desktop(program, detec
     rng = np.random.default_rng(0)
     for _ in range(320):
         app.step(rng.normal(0, 1, 3) + [0, 0, 9.81], rng.normal(0, 0.3, 3), rng.uniform(40_000, 45_000, 4))
-        for sent in app.packets():
-            machine.write(packet, sent)
-            call = machine.call("gap8CoreTake", core, packet, len(sent), reply)
-            expected = desktop.take(sent)
+        for request in app.packets():
+            machine.write(packet, request)
+            call = machine.call("gap8CoreTake", core, packet, len(request), reply)
+            expected = desktop.take(request)
             assert machine.read(reply, call.value & 0xFFFF) == expected
             app.receive(expected)
             counts.append(call.instructions)
@@ -170,7 +170,7 @@ def test_make_gap8_says_what_is_missing(arguments, words, tmp_path):
     header = tmp_path / "lib" / "cpx" / "inc" / "cpx.h"
     header.parent.mkdir(parents=True)
     header.touch()
-    run = subprocess.run(["make", "-C", ROOT, "gap8", *(a.format(aideck=tmp_path) for a in arguments)],
-                         capture_output=True, text=True)
-    assert run.returncode != 0 and words in run.stderr
-    assert "GAP_SDK_HOME" not in words or "docker run" in run.stderr
+    process = subprocess.run(["make", "-C", ROOT, "gap8", *(a.format(aideck=tmp_path) for a in arguments)],
+                             capture_output=True, text=True)
+    assert process.returncode != 0 and words in process.stderr
+    assert "GAP_SDK_HOME" not in words or "docker run" in process.stderr

@@ -15,9 +15,9 @@ def driver(tmp_path_factory):
     program = build(Path(__file__).with_name("gap8_driver.c"), tmp_path_factory.mktemp("gap8") / "driver")
 
     def run(*words):
-        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
-        assert done.returncode == 0, done.stderr[-3000:]
-        return done.stdout
+        process = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
+        assert process.returncode == 0, process.stderr[-3000:]
+        return process.stdout
 
     return run
 

@@ -25,14 +25,14 @@ print:
 @pytest.fixture(scope="module")
 def makefile(tmp_path_factory):
     """Sources, include folders and linker flags that gap8/app/Makefile gives the SDK's rules."""
-    make = shutil.which("make")
-    if make is None:
+    make_path = shutil.which("make")
+    if make_path is None:
         pytest.skip("no make on this machine")
     rules = tmp_path_factory.mktemp("rules")
     (rules / "pmsis_rules.mk").write_text(RULES)
-    run = subprocess.run([make, "--no-print-directory", "-C", APP, f"RULES_DIR={rules}", "AIDECK=/aideck", "print"],
-                         capture_output=True, text=True, check=True)
-    sources, include, libraries = (line.split() for line in run.stdout.splitlines())
+    command = [make_path, "--no-print-directory", "-C", APP, f"RULES_DIR={rules}", "AIDECK=/aideck", "print"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    sources, include, libraries = (line.split() for line in process.stdout.splitlines())
     ours = [[APP / path for path in paths if not path.startswith("/aideck/")] for paths in (sources, include)]
     return *ours, libraries
 
@@ -51,9 +51,9 @@ def needs(makefile, tmp_path_factory):
 
 
 def test_every_name_the_app_needs_is_one_of_a_known_provider(needs):
-    known = {name for names in PROVIDED.values() for name in names}
-    assert needs - known == set()
-    assert known & needs, "it does need some"
+    provided = {name for names in PROVIDED.values() for name in names}
+    assert needs - provided == set()
+    assert provided & needs, "it does need some"
 
 
 def test_the_link_line_has_each_library_that_the_app_needs(makefile, needs):

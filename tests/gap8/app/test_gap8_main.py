@@ -88,15 +88,15 @@ def sample(rng: np.random.Generator) -> tuple:
 def conversation(detector: str, steps: int) -> tuple[list[bytes], list[bytes]]:
     """Packets that the STM32 app sends, and the replies of the GAP8's core alone."""
     stm32, gap8 = AppCore({"detector": DETECTORS.index(detector)}, have_gap8=True), Gap8Core()
-    rng, sent, replies = np.random.default_rng(0), [], []
+    rng, requests, replies = np.random.default_rng(0), [], []
     for _ in range(steps):
         stm32.step(*sample(rng))
-        for one in stm32.packets():
-            sent.append(one)
-            replies.append(gap8.take(one))
+        for request in stm32.packets():
+            requests.append(request)
+            replies.append(gap8.take(request))
             stm32.receive(replies[-1])
     assert stm32.log.answers > 0
-    return sent, replies
+    return requests, replies
 
 
 def reset(session: int) -> bytes:
@@ -107,18 +107,18 @@ def reset(session: int) -> bytes:
 
 @pytest.mark.parametrize("detector, steps", [("best-gap8", 400), ("paper-gap8", 330), ("paper-stream-gap8", 330)])
 def test_the_app_replies_what_its_core_replies(start, detector, steps):
-    sent, replies = conversation(detector, steps)
+    requests, replies = conversation(detector, steps)
     chip = start()
-    assert chip.exchange([packet(one) for one in sent])[:-1] == replies
+    assert chip.exchange([packet(request) for request in requests])[:-1] == replies
     assert chip.lines[0].startswith("AirTouch: 3 networks, best ")
     assert chip.lines[1:] == ["AirTouch: session 1, model known, cluster 175 MHz"]
 
 
 def test_packets_of_any_length_and_of_others_are_refused_and_counted(start):
-    sent, replies = conversation("best-gap8", 300)
+    requests, replies = conversation("best-gap8", 300)
     foreign = [packet(b"", length=n) for n in (0, 1, 9, 10, 98, 99, 100, 1020, 1021, 65_535)]
-    foreign += [packet(sent[0], source=WIFI_HOST), packet(sent[0] + b"\0")]
-    records = [packet(one) for one in sent]
+    foreign += [packet(requests[0], source=WIFI_HOST), packet(requests[0] + b"\0")]
+    records = [packet(request) for request in requests]
     *packets, heartbeat = start().exchange(records[:100] + foreign + records[100:])
     assert packets == replies, "as if they had not come"
     assert struct.unpack_from("<I", heartbeat, 8 + 16)[0] == len(foreign)
@@ -130,7 +130,7 @@ def test_without_a_cluster_the_stm32_is_told_so_and_computes(start, fault, words
     stm32 = AppCore({"detector": DETECTORS.index("best-gap8")}, have_gap8=True)
     for _ in range(400):
         stm32.step(*sample(rng))
-        for reply in chip.exchange([packet(one) for one in stm32.packets()]):
+        for reply in chip.exchange([packet(request) for request in stm32.packets()]):
             stm32.receive(reply)
     assert stm32.log.health == HEALTH["model refused"] | HEALTH["no GAP8"]
     assert DETECTORS[stm32.log.detector] == "best" and stm32.log.answers > 0
@@ -139,28 +139,28 @@ def test_without_a_cluster_the_stm32_is_told_so_and_computes(start, fault, words
 
 
 def test_a_cluster_that_fails_in_flight_repeats_no_reply(start):
-    sent, _ = conversation("best-gap8", 300)
+    requests, _ = conversation("best-gap8", 300)
     chip = start("later")  # its first task sets up, its second one fails
-    packets = chip.exchange([packet(one) for one in sent])
+    packets = chip.exchange([packet(item) for item in requests])
     assert sum("takes no task" in line for line in chip.lines) == 1
-    assert len(packets) == len(sent) - 1 + 1 and {one[1] for one in packets[:-1]} == {RESULT}
+    assert len(packets) == len(requests) - 1 + 1 and {item[1] for item in packets[:-1]} == {RESULT}
 
 
 def test_a_clock_that_is_refused_is_said_and_the_safe_one_stays(start):
-    sent, replies = conversation("best-gap8", 300)
+    requests, replies = conversation("best-gap8", 300)
     chip = start("clock", "controller")
-    assert chip.exchange([packet(one) for one in sent])[:-1] == replies
+    assert chip.exchange([packet(request) for request in requests])[:-1] == replies
     assert chip.lines[:2] == ["AirTouch: the controller's clock is refused",
                               "AirTouch: the cluster's clock is refused, it stays at 50 MHz"]
     assert chip.lines[-1] == "AirTouch: session 1, model known, cluster 50 MHz"
 
 
 def test_not_a_byte_before_the_stm32_has_spoken(start):
-    sent, replies = conversation("best-gap8", 300)
+    requests, replies = conversation("best-gap8", 300)
     chip = start("open", "clock")
-    foreign = [packet(b"noise"), packet(sent[0], source=WIFI_HOST), packet(b"", length=65_535)]
+    foreign = [packet(b"noise"), packet(requests[0], source=WIFI_HOST), packet(b"", length=65_535)]
     assert [chip.exchange(records) for records in ([], [], foreign, [])] == [[]] * 4 and chip.lines == []
-    reply, heartbeat = chip.exchange([packet(sent[0])])
+    reply, heartbeat = chip.exchange([packet(requests[0])])
     assert (reply[1], heartbeat[1]) == (RESULT, HEARTBEAT) and len(chip.lines) == 3
     later = [len(chip.exchange([])) for _ in range(25)]
     assert later == [1] * 19 + [0] * 6 and len(chip.lines) == 3, "ten seconds, then silence"

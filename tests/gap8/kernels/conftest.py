@@ -24,26 +24,27 @@ class Compiler:
         self.command = command
 
     def __call__(self, sources: list[Path], out: Path, *flags: str) -> Path:
-        made, error = compiled(self.command, [*FLAGS, *flags], sources)
+        objects, error = compiled(self.command, [*FLAGS, *flags], sources)
         assert not error, error
-        done = subprocess.run([self.command, *flags, *made, "-lm", "-o", str(out)], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        process = subprocess.run([self.command, *flags, *objects, "-lm", "-o", str(out)], capture_output=True,
+                                 text=True)
+        assert process.returncode == 0, process.stderr
         return out
 
     def has(self, *flags: str, folder: Path) -> bool:
         """Whether a program can be linked and run with these flags."""
         source, program = folder / "probe.c", folder / "probe"
         source.write_text("int main(void) { return 0; }\n")
-        built = subprocess.run([self.command, *flags, source, "-o", program], capture_output=True).returncode == 0
-        return built and subprocess.run([program], capture_output=True).returncode == 0
+        compiles = subprocess.run([self.command, *flags, source, "-o", program], capture_output=True).returncode == 0
+        return compiles and subprocess.run([program], capture_output=True).returncode == 0
 
 
 @pytest.fixture(scope="session")
 def compiler() -> Compiler:
-    found = shutil.which(os.environ.get("CC", "cc"))
-    if found is None:
+    path = shutil.which(os.environ.get("CC", "cc"))
+    if path is None:
         pytest.skip("no C compiler on this machine")
-    return Compiler(found)
+    return Compiler(path)
 
 
 @pytest.fixture(scope="session")

@@ -50,7 +50,7 @@ class TestBothPaths:
     @given(seed=st.integers(0, 2**31), rows=st.integers(4, 20), columns=st.integers(1, 4),
            channels=st.sampled_from([1, 2, 3, 4, 8]), stages=STAGES,
            dense=st.lists(st.integers(1, 9), min_size=1, max_size=2), sparsity=st.sampled_from([0.0, 0.6, 0.95, 1.0]))
-    def test_any_network(self, seed, rows, columns, channels, stages, dense, sparsity):
+    def test_any_network_has_the_bits_of_numpy(self, seed, rows, columns, channels, stages, dense, sparsity):
         if not fits(rows, columns, channels, stages):
             return
         net = made(seed, rows, columns, channels, stages, dense, sparsity)
@@ -58,7 +58,7 @@ class TestBothPaths:
         np.testing.assert_array_equal(c_network.run_int8(net, x), int8_network.run(net, x))
 
     @pytest.mark.parametrize("sparsity", [0.0, 0.8])
-    def test_extreme_inputs(self, sparsity):
+    def test_extreme_inputs_give_the_bits_of_numpy(self, sparsity):
         net = random_model(seed=5, sparsity=sparsity).int8
         x = np.array([[-128] * 300, [127] * 300, [-128, 127] * 150, [0] * 300], dtype=np.int8)
         np.testing.assert_array_equal(c_network.run_int8(net, x), int8_network.run(net, x))
@@ -100,15 +100,15 @@ class TestBothPaths:
         windows = np.stack([x[end - rows + 1:end + 1] for end in chosen])
         np.testing.assert_array_equal(out[chosen - size.ahead], int8_network.run(net, windows))
 
-    def test_a_reset_forgets(self):
+    def test_a_reset_forgets_the_samples_before(self):
         net = random_model(seed=7, sparsity=0.9).int8
         x, usable = samples((400, 3), 2), np.ones(400, bool)
         usable[[5, 150, 151]] = False
         out, valid = rolling.run_rolling(net, x, 4, usable)
-        fresh, known = rolling.run_rolling(net, x[152:], 4)
+        outputs, answered = rolling.run_rolling(net, x[152:], 4)
         assert not valid[:6 + 97].any() and not valid[150:152 + 97].any() and valid[103:150].any()
-        np.testing.assert_array_equal(valid[152:], known)
-        np.testing.assert_array_equal(out[152:], fresh)
+        np.testing.assert_array_equal(valid[152:], answered)
+        np.testing.assert_array_equal(out[152:], outputs)
 
 
 def test_networks_that_cannot_roll_are_refused() -> None:
@@ -126,14 +126,14 @@ def test_networks_that_cannot_roll_are_refused() -> None:
 def test_the_fixed_scale_is_a_logarithm(values: list[float]) -> None:
     features = np.array(values[:len(values) // 3 * 3], np.float32).reshape(-1, 3)
     scale = FixedScale(np.array([10, -5, 3], np.float32), np.array([40, 2, 0.5], np.float32))
-    found = rolling.fixed_scale(scale.mean, scale.deviation, features)
-    np.testing.assert_allclose(found, scale.apply(features), rtol=0, atol=3e-5)
+    scaled = rolling.fixed_scale(scale.mean, scale.deviation, features)
+    np.testing.assert_allclose(scaled, scale.apply(features), rtol=0, atol=3e-5)
 
 
 def test_the_fixed_scale_takes_what_is_no_number_for_the_smallest() -> None:
     scale = FixedScale(np.zeros(3, np.float32), np.full(3, 20, np.float32))
-    found = rolling.fixed_scale(scale.mean, scale.deviation, np.array([[np.nan, -1.0, np.inf]], np.float32))
-    np.testing.assert_allclose(found, [[-2.0, -2.0, 4.0]])
+    scaled = rolling.fixed_scale(scale.mean, scale.deviation, np.array([[np.nan, -1.0, np.inf]], np.float32))
+    np.testing.assert_allclose(scaled, [[-2.0, -2.0, 4.0]])
 
 
 def test_inputs_are_held_between_answers_and_unknown_after_a_gap() -> None:
@@ -144,8 +144,8 @@ def test_inputs_are_held_between_answers_and_unknown_after_a_gap() -> None:
     features = np.random.default_rng(0).gamma(1.0, 1e6, size=(500, 3)).astype(np.float32)
     features[:40] = np.nan
     features[300, 2] = np.inf
-    every, held = (rolling.probability_of_samples(model, features, stride) for stride in (1, 4))
-    assert np.isnan(every[:137]).all() and np.isfinite(every[137:300]).all() and np.isnan(every[300:398]).all()
-    answers = np.flatnonzero(np.isfinite(held))[0] + 4 * np.arange(30)
-    np.testing.assert_array_equal(held[answers], every[answers])
-    np.testing.assert_array_equal(held[answers + 3], held[answers])
+    each, fourth = (rolling.probability_of_samples(model, features, stride) for stride in (1, 4))
+    assert np.isnan(each[:137]).all() and np.isfinite(each[137:300]).all() and np.isnan(each[300:398]).all()
+    answers = np.flatnonzero(np.isfinite(fourth))[0] + 4 * np.arange(30)
+    np.testing.assert_array_equal(fourth[answers], each[answers])
+    np.testing.assert_array_equal(fourth[answers + 3], fourth[answers])

@@ -29,9 +29,9 @@ HEADERS = {
 
 def golden(command: list[str], out: Path, *flags: str) -> str:
     """What the golden vectors say of a build."""
-    built = subprocess.run([*command, *FLAGS, *flags, *map(str, SOURCES), "-lm", "-o", str(out)], capture_output=True,
-                           text=True)
-    assert built.returncode == 0, built.stderr
+    process = subprocess.run([*command, *FLAGS, *flags, *map(str, SOURCES), "-lm", "-o", str(out)], capture_output=True,
+                             text=True)
+    assert process.returncode == 0, process.stderr
     return subprocess.run([out], capture_output=True, text=True).stdout
 
 

@@ -53,14 +53,14 @@ def test_requantise_is_exact_on_ties_and_beside_them(requantise):
         shift = int(rng.integers(-31, 4))
         multiplier = int(rng.choice([2**30, 2**31 - 1, int(rng.integers(2**30, 2**31))]))
         # An accumulator whose result lies on or beside a tie of the second rounding.
-        wanted = int(rng.integers(-140, 140)) + Fraction(1, 2)
-        middle = round(wanted * Fraction(2**31, multiplier) * Fraction(2) ** -shift)
+        tie = int(rng.integers(-140, 140)) + Fraction(1, 2)
+        middle = round(tie * Fraction(2**31, multiplier) * Fraction(2) ** -shift)
         cases += [(middle + d, multiplier, shift) for d in (-1, 0, 1)]
     limit = 2**28
     cases = [c for c in cases if abs(c[0]) < limit and abs(c[0]) * 2.0 ** max(c[2], 0) < 2**29]
     cases += [(int(rng.integers(-limit + 1, limit)), 2**31 - 1, s) for s in range(-31, 0) for _ in range(20)]
     assert len(cases) > 4000
-    found = requantise(*np.array(cases).T)
+    outputs = requantise(*np.array(cases).T)
     expected = [requantised(*case, zero_point=-5) for case in cases]
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(outputs, expected)
     assert len(set(expected)) > 200

@@ -16,6 +16,6 @@ def test_sizes_beyond_int32_are_refused(compiler, tmp_path, sanitizer):
     flags = [f"-fsanitize={sanitizer}", "-fno-sanitize-recover=all"] if sanitizer else []
     if not compiler.has(*flags, folder=tmp_path):
         pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
-    done = subprocess.run([compiler(SOURCES, tmp_path / "shapes", *flags)], capture_output=True, text=True,
-                          timeout=HANG_S)
-    assert (done.returncode, done.stdout) == (0, "0 0 0 0 0 0 1 0 1\n"), done.stderr
+    process = subprocess.run([compiler(SOURCES, tmp_path / "shapes", *flags)], capture_output=True, text=True,
+                             timeout=HANG_S)
+    assert (process.returncode, process.stdout) == (0, "0 0 0 0 0 0 1 0 1\n"), process.stderr

@@ -16,25 +16,25 @@ def programs(request, compiler, tmp_path_factory) -> dict[str, Path]:
     """The program, plain and under the sanitizers that work here, by their name."""
     folder = tmp_path_factory.mktemp(request.param)
     emulation = [EMULATION] if request.param == "xpulp" else []
-    built = {"plain": compiler(SOURCES, folder / "plain", "-pthread", *emulation)}
+    paths = {"plain": compiler(SOURCES, folder / "plain", "-pthread", *emulation)}
     for name in ("thread", "address,undefined"):
         flag = f"-fsanitize={name}"
         if compiler.has(flag, folder=folder):
-            built[name] = compiler(SOURCES, folder / name.split(",")[0], "-pthread", "-g", flag,
+            paths[name] = compiler(SOURCES, folder / name.split(",")[0], "-pthread", "-g", flag,
                                    "-fno-sanitize-recover=all", *emulation)
-    return built
+    return paths
 
 
 @pytest.mark.parametrize("cores", range(1, 9))
 def test_any_number_of_cores_gives_the_golden_answers(programs, cores):
-    done = subprocess.run([programs["plain"], str(cores), "3"], capture_output=True, text=True, timeout=HANG_S)
-    assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr
+    process = subprocess.run([programs["plain"], str(cores), "3"], capture_output=True, text=True, timeout=HANG_S)
+    assert (process.returncode, process.stdout) == (0, "same\n"), process.stderr
 
 
 @pytest.mark.parametrize("cores", [2, 3, 8])
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
-def test_sanitizers_find_nothing(programs, sanitizer, cores):
+def test_sanitizers_find_no_race_and_no_fault_of_memory(programs, sanitizer, cores):
     if sanitizer not in programs:
         pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
-    done = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=HANG_S)
-    assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr[-3000:]
+    process = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=HANG_S)
+    assert (process.returncode, process.stdout) == (0, "same\n"), process.stderr[-3000:]

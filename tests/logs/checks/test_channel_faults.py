@@ -7,7 +7,7 @@ from airtouch.logs.checks import channel_faults
 from airtouch.logs.flight_log import FlightLog
 
 
-def made(columns, n=400):
+def log_of(columns, n=400):
     return FlightLog({"t_s": 0.01 * np.arange(n)} | columns, {"source": "made"})
 
 
@@ -23,10 +23,10 @@ def test_spikes_are_the_samples_that_a_loop_finds(seed):
     limit = max(0.3, 12.0 * 1.4826 * noise)
     expected = []
     for k in range(1, 399):
-        left, right = values[k] - values[k - 1], values[k] - values[k + 1]
-        if min(abs(left), abs(right)) > limit and left * right > 0 and abs(left - right) < limit / 3:
+        rise, fall = values[k] - values[k - 1], values[k] - values[k + 1]
+        if min(abs(rise), abs(fall)) > limit and rise * fall > 0 and abs(rise - fall) < limit / 3:
             expected.append(k)
-    assert channel_faults.spikes(made({"zrange_m": values})).get("zrange_m", []) == expected
+    assert channel_faults.spikes(log_of({"zrange_m": values})).get("zrange_m", []) == expected
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -42,12 +42,13 @@ def test_stuck_intervals_are_the_runs_that_a_loop_finds(seed):
             if k - start > 50:
                 expected.append(("gyro_x_radps", start, k))
             start = k
-    found = channel_faults.stuck(made({"gyro_x_radps": values}), flying)
-    assert [run for run in found if run[2] - run[1] != 50] == expected  # 0.5 s to the bit is on the limit
+    intervals = channel_faults.stuck(log_of({"gyro_x_radps": values}), flying)
+    # 0.5 s to the bit is on the limit
+    assert [interval for interval in intervals if interval[2] - interval[1] != 50] == expected
 
 
 def test_a_channel_that_never_changes_is_stuck_on_the_ground_too():
-    log = made({"vbat_V": np.full(400, 3.9), "acc_x_mps2": np.arange(400.0)})
+    log = log_of({"vbat_V": np.full(400, 3.9), "acc_x_mps2": np.arange(400.0)})
     assert channel_faults.stuck(log, np.zeros(400, bool)) == [("vbat_V", 0, 400)]
 
 
@@ -58,12 +59,12 @@ def test_duplicates_are_the_pairs_whose_correlation_is_one():
                "vbat_V": np.full(400, 3.9)}
     correlated = [(x, y) for i, x in enumerate(columns) for y in list(columns)[i + 1:]
                   if "vbat_V" not in (x, y) and abs(np.corrcoef(columns[x], columns[y])[0, 1]) > 1 - 1e-12]
-    assert channel_faults.duplicates(made(columns)) == correlated == [("gyro_x_radps", "gyro_y_radps")]
+    assert channel_faults.duplicates(log_of(columns)) == correlated == [("gyro_x_radps", "gyro_y_radps")]
 
 
 def test_saturation_counts_samples_at_full_scale():
     rng = np.random.default_rng(4)
     pwm = rng.choice([100.0, 65534.0, 65535.0], 400)
     gyro = rng.choice([0.0, np.deg2rad(1990.0), -np.deg2rad(2000.0)], 400)
-    assert channel_faults.saturated(made({"m1_pwm": pwm, "gyro_x_radps": gyro, "acc_x_mps2": gyro})) == {
+    assert channel_faults.saturated(log_of({"m1_pwm": pwm, "gyro_x_radps": gyro, "acc_x_mps2": gyro})) == {
         "m1_pwm": sum(v == 65535 for v in pwm), "gyro_x_radps": sum(v < 0 for v in gyro)}

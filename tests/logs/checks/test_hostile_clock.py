@@ -22,9 +22,9 @@ def test_one_damaged_time_costs_its_own_sample_and_no_other():
     times = 1000 * np.arange(40)
     for place in (0, 20, 39):
         for bit in (20, 30, 36, 50, 63):
-            wrong = times.astype(np.uint64)
-            wrong[place] ^= np.uint64(1 << bit)
-            log = parse(usd(wrong), "log00")
+            damaged = times.astype(np.uint64)
+            damaged[place] ^= np.uint64(1 << bit)
+            log = parse(usd(damaged), "log00")
             new = logs.resample(log, 1000.0)
             assert len(new) <= 10_000
             assert np.isfinite(new["acc_x_mps2"]).sum() >= 38
@@ -48,11 +48,11 @@ def test_most_samples_in_order_are_kept():
     for _ in range(200):
         times = rng.integers(0, 6, 7).astype(float)
         times[rng.random(7) < 0.1] = np.nan
-        kept = clock.rising(times)
-        assert (np.diff(times[kept]) > 0).all() and not np.isnan(times[kept]).any()
+        rising = clock.rising(times)
+        assert (np.diff(times[rising]) > 0).all() and not np.isnan(times[rising]).any()
         subsets = (np.flatnonzero([bits >> i & 1 for i in range(7)]) for bits in range(128))
         in_order = [s for s in subsets if (np.diff(times[s]) > 0).all() and not np.isnan(times[s]).any()]
-        assert len(kept) == max(map(len, in_order))
+        assert len(rising) == max(map(len, in_order))
 
 
 def test_a_clock_that_is_not_in_seconds_is_refused_with_the_remedy():
@@ -88,8 +88,8 @@ def test_a_stated_period_that_cannot_be_is_left_out(period):
     log = parse(f"# sample_period_s: {period}\n".encode() + flying(), "made")
     assert "sample_period_s" not in log.meta and any("sample_period_s" in w for w in log.meta["warnings"])
     assert logs.check(log).rate_hz == pytest.approx(100) and len(logs.segments(log)) > 3
-    made = FlightLog(log.columns, {**log.meta, "sample_period_s": 5e-324})
-    assert clock.sample_period(made) == pytest.approx(0.01)
+    misstated = FlightLog(log.columns, {**log.meta, "sample_period_s": 5e-324})
+    assert clock.sample_period(misstated) == pytest.approx(0.01)
 
 
 def test_logs_made_in_memory_overflow_nowhere():

@@ -51,8 +51,8 @@ def test_faults_put_in_are_found():
 
 def test_lost_samples_are_told_from_bursts():
     rng = np.random.default_rng(1)
-    sent = np.delete(np.arange(4000), [*range(1000, 1017), 2500])
-    arrival = 3.0 + sent * 0.009993 + rng.exponential(0.002, len(sent))
+    numbers = np.delete(np.arange(4000), [*range(1000, 1017), 2500])
+    arrival = 3.0 + numbers * 0.009993 + rng.exponential(0.002, len(numbers))
     for start in (500, 3000):  # bursts: 30 samples wait for the last of them, and none is lost
         arrival[start:start + 30] = arrival[start + 29] + np.arange(30) * 1e-4
     period = true_period(arrival)
@@ -62,12 +62,12 @@ def test_lost_samples_are_told_from_bursts():
 
 def test_rows_lost_in_the_air_are_no_ground():
     log = sound_flight()
-    whole = logs.segments(log)
-    hover = next(s for s in whole if s.kind not in ("ground", "take-off", "landing") and s.stop - s.start > 120)
+    segments = logs.segments(log)
+    hover = next(s for s in segments if s.kind not in ("ground", "take-off", "landing") and s.stop - s.start > 120)
     hole = slice(hover.start + 10, hover.start + 90)
     holed = log.with_columns({k: np.where(np.isin(np.arange(len(log)), np.r_[hole]), np.nan, v)
                               for k, v in log.columns.items() if k != "t_s"})
-    assert [s.kind for s in logs.segments(holed)] == [s.kind for s in whole]
+    assert [s.kind for s in logs.segments(holed)] == [s.kind for s in segments]
 
 
 def test_segments_of_a_made_flight():
@@ -78,12 +78,12 @@ def test_segments_of_a_made_flight():
     assert kinds[-1] == ("ground", 1900, 2000)
     speed = np.where((np.arange(2000) > 700) & (np.arange(2000) < 1300), 0.3, 0.0)
     moving = sound_flight().with_columns({"vx_mps": speed, "vy_mps": np.zeros(2000)})
-    found = [s.kind for s in logs.segments(moving)]
-    assert found == ["ground", "take-off", "hover", "cruise", "over platform", "cruise", "hover", "landing",
+    names = [s.kind for s in logs.segments(moving)]
+    assert names == ["ground", "take-off", "hover", "cruise", "over platform", "cruise", "hover", "landing",
                      "ground"]
 
 
-def test_real_flights(flights):
+def test_known_faults_of_recorded_flights_are_reported(flights):
     folder = flights / "airtouch"
     report = logs.check(logs.read(folder / "imu_data_0102-2131.csv.gz"))  # gyro duplicates acc
     assert len(report.duplicated) == 3

@@ -26,19 +26,19 @@ def test_the_times_that_stay_are_the_most_that_fit_together(times):
     times = np.array(times)
     most = most_together(times)
     try:
-        kept = checked(log(t_s=times, gyro_x_radps=times))["t_s"]
+        times_after = checked(log(t_s=times, gyro_x_radps=times))["t_s"]
     except AirTouchError as error:
         assert "times cannot be" in str(error)
         return
-    stay = kept[np.isfinite(kept)]
+    stay = times_after[np.isfinite(times_after)]
     assert len(stay) == most and 2 * most >= len(times)
     assert np.ptp(stay) <= 5.0 * len(times) and set(stay) <= set(times)
 
 
 def test_values_beyond_float32_are_missing_and_counted():
-    found = checked(log(m1_pwm=[1.0, 2.0 * LARGEST, -np.inf, LARGEST, np.nan]))
-    np.testing.assert_array_equal(found["m1_pwm"], [1.0, np.nan, np.nan, LARGEST, np.nan])
-    assert "2 of 5 values" in found.meta["warnings"][0] and "sample 1" in found.meta["warnings"][0]
+    readings = checked(log(m1_pwm=[1.0, 2.0 * LARGEST, -np.inf, LARGEST, np.nan]))
+    np.testing.assert_array_equal(readings["m1_pwm"], [1.0, np.nan, np.nan, LARGEST, np.nan])
+    assert "2 of 5 values" in readings.meta["warnings"][0] and "sample 1" in readings.meta["warnings"][0]
 
 
 def test_a_clock_that_is_not_in_seconds_is_refused():
@@ -47,6 +47,6 @@ def test_a_clock_that_is_not_in_seconds_is_refused():
 
 
 def test_metadata_that_cannot_be_is_left_out():
-    found = checked(log(t_s=[0.0, 0.01], meta={"sample_period_s": True, "acc_frame": "moon"}))
-    assert "sample_period_s" not in found.meta and found.meta["acc_frame"] == "body"
-    assert len(found.meta["warnings"]) == 2
+    readings = checked(log(t_s=[0.0, 0.01], meta={"sample_period_s": True, "acc_frame": "moon"}))
+    assert "sample_period_s" not in readings.meta and readings.meta["acc_frame"] == "body"
+    assert len(readings.meta["warnings"]) == 2

@@ -69,8 +69,8 @@ def test_a_px4_log_comes_in_our_axes_and_motor_order(px4):
 
 
 def test_a_px4_log_is_read_by_the_commands(px4, tmp_path):
-    shown = run("info", px4)
-    assert shown.exit_code == 0 and "ulog" in shown.output
+    result = run("info", px4)
+    assert result.exit_code == 0 and "ulog" in result.output
     px4.write_bytes(px4.read_bytes()[:60])
     with pytest.raises(AirTouchError, match="px4.ulg: (not a whole ULog|neither accelerations)"):
         logs.read(px4)
@@ -112,8 +112,8 @@ def bag(tmp_path):
             down = kind(names["/down"])(time, 0, 0.1, 0.0, 4.0, 0.75)
             layout = kind("std_msgs/msg/MultiArrayLayout")([], 0)
             motors = kind(names["/motors_pwm"])(layout, np.array([1, 2, 3, 4], np.uint16))
-            for topic_name, made in zip(names, (imu, odometry, down, motors), strict=True):
-                writer.write(connections[topic_name], i * 10_000_000, store.serialize_cdr(made, names[topic_name]))
+            for topic_name, message in zip(names, (imu, odometry, down, motors), strict=True):
+                writer.write(connections[topic_name], i * 10_000_000, store.serialize_cdr(message, names[topic_name]))
     return place
 
 
@@ -124,8 +124,8 @@ def test_a_ros_bag_is_read_by_message_type(bag):
     for name, value in {"gyro_y_radps": 0.2, "acc_y_mps2": 0.5, "acc_z_mps2": 9.81, "x_m": 1.0, "zrange_m": 0.75,
                         "m3_pwm": 3.0, "vx_mps": 0.0, "vy_mps": 1.0, "yaw_rad": np.pi / 2}.items():
         assert log[name][row] == pytest.approx(value, abs=1e-9), name
-    shown = run("info", bag)
-    assert shown.exit_code == 0 and "rosbag2" in shown.output
+    result = run("info", bag)
+    assert result.exit_code == 0 and "rosbag2" in result.output
 
 
 @pytest.fixture
@@ -157,30 +157,30 @@ scale = 65535
 
 def test_someone_elses_csv_by_a_map(theirs, tmp_path):
     (tmp_path / "map.toml").write_text(MAP)
-    shown = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv")
-    assert shown.exit_code == 0, shown.output
+    result = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv")
+    assert result.exit_code == 0, result.output
     log = logs.read(tmp_path / "out/nano.csv")
     assert log["t_s"][49] == pytest.approx(0.49) and log["gyro_x_radps"][0] == pytest.approx(np.pi / 2)
     assert log["acc_z_mps2"][3] == pytest.approx(9.81) and log["m1_pwm"][7] == pytest.approx(65535)
     assert log.meta["vehicle"] == "crazyflie-2.1"
 
 
-@pytest.mark.parametrize(("right", "wrong", "said"), [
+@pytest.mark.parametrize(("name", "typo", "message"), [
     ("columns.gyro_x_radps", "columns.gyro_x_rads", "is no column of the flight log; did you mean gyro_x_radps"),
     ('"imu.gyro.x"', '"imu.gyr.x"', "no column 'imu.gyr.x'; did you mean imu.gyro.x"),
     ("offset", "ofset", "has no key 'ofset'; did you mean offset"), ('from = "motor 1"', "", "needs from")])
-def test_a_wrong_name_in_a_map_gets_the_nearest(theirs, tmp_path, right, wrong, said):
-    (tmp_path / "map.toml").write_text(MAP.replace(right, wrong))
+def test_a_wrong_name_in_a_map_gets_the_nearest(theirs, tmp_path, name, typo, message):
+    (tmp_path / "map.toml").write_text(MAP.replace(name, typo))
     with pytest.raises(AirTouchError) as error:
         mapped.read(theirs, tmp_path / "map.toml")
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_a_plain_csv_is_a_header_and_numbers(theirs, tmp_path):
     (tmp_path / "map.toml").write_text(MAP)
-    shown = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv",
-                "--plain")
-    assert shown.exit_code == 0, shown.output
+    result = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv",
+                 "--plain")
+    assert result.exit_code == 0, result.output
     pandas = pytest.importorskip("pandas")
     table = pandas.read_csv(tmp_path / "out/nano.csv")
     assert list(table.columns) == ["t_s", "acc_z_mps2", "gyro_x_radps", "m1_pwm"] and len(table) == 50

@@ -50,11 +50,11 @@ def test_a_failure_is_counted_with_the_number_that_repeats_it(tmp_path, monkeypa
     monkeypatch.setattr(walk, "parse", broken)
     monkeypatch.setattr(fuzz_logs.walk, "walk", lambda *a, w=walk.walk: "log" if a[1] == "usd-2" else w(*a))
     count = fuzz_logs.fuzz("usd-2", 1, 5, 3, tmp_path)
-    ((what, numbers),) = count.failures.items()
-    assert "IndexError" in what and numbers == [5, 6, 7] and count.failed == 3
+    ((failure, numbers),) = count.failures.items()
+    assert "IndexError" in failure and numbers == [5, 6, 7] and count.failed == 3
 
 
 def test_inputs_are_the_same_each_time():
     for name in ("canonical", "usd-1"):
-        once, again, other = (fuzz_logs.mutated(name, seed, 17)[0] for seed in (3, 3, 4))
-        assert once == again != other
+        first, repeat, another_seed = (fuzz_logs.mutated(name, seed, 17)[0] for seed in (3, 3, 4))
+        assert first == repeat != another_seed

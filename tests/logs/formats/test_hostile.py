@@ -5,6 +5,7 @@ import json
 import os
 import struct
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -38,9 +39,9 @@ def test_a_last_line_of_white_space_without_its_end_is_blank(blank):
 
 
 def test_a_log_is_columns_of_one_length():
-    for wrong in (np.zeros((3, 2)), np.zeros(()), np.zeros(2)):
+    for column in (np.zeros((3, 2)), np.zeros(()), np.zeros(2)):
         with pytest.raises(AirTouchError, match="made: columns of unequal length.*; give each one value a sample"):
-            FlightLog({"t_s": np.zeros(3), "x_m": wrong}, {"source": "made"})
+            FlightLog({"t_s": np.zeros(3), "x_m": column}, {"source": "made"})
 
 
 def test_values_that_no_sensor_reads_are_missing_and_said_so():
@@ -55,16 +56,22 @@ def test_values_that_no_sensor_reads_are_missing_and_said_so():
 
 
 def test_slow_logs_have_edges_without_a_warning():
-    logs.check(FlightLog({"t_s": 0.3 * np.arange(60), "zrange_m": np.where(np.arange(60) % 20 < 10, 0.8, 0.2),
-                          **{f"m{i}_pwm": np.full(60, 4e4) for i in range(1, 5)}}, {"source": "made"}))
+    """A row every 0.3 s, over a platform of 0.6 m after each ten rows; NumPy warns of nothing, or the test fails."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        report = logs.check(FlightLog(
+            {"t_s": 0.3 * np.arange(60), "zrange_m": np.where(np.arange(60) % 20 < 10, 0.8, 0.2),
+             **{f"m{i}_pwm": np.full(60, 4e4) for i in range(1, 5)}}, {"source": "made"}))
+    assert [(e.sample, e.kind) for e in report.edges] == [
+        (10, "entry"), (20, "exit"), (30, "entry"), (40, "exit"), (50, "entry")]
 
 
 def test_names_from_a_file_can_be_printed(tmp_path, capsys):
     """Lone surrogates in stored warnings, and file names that are no UTF-8, ended `logs check` in a traceback."""
     assert printable("a\ud800\x1b[2J\u202e\n") == "a\\ud800\\x1b[2J\\u202e\\n" and len(printable("n" * 999)) == 40
-    stored = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
+    header = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
     path = tmp_path / os.fsdecode(b"flight\xff.csv")
-    path.write_bytes(stored + flying())
+    path.write_bytes(header + flying())
     for arguments in (["check"], ["check", "--json"], ["info"]):
         assert _command(arguments[0], path, *arguments[1:]) == 0
         out, err = capsys.readouterr()
@@ -117,13 +124,13 @@ def test_damaged_usd_headers_are_refused_with_the_remedy():
     twice = packed(2, [(1, "fixedFrequency", variables), (1, "other", variables[:1])], [])
     with pytest.raises(AirTouchError, match="two events have the number 1; copy it from the card again"):
         parse(twice, "log00")
-    many = packed(2, [(1, "fixedFrequency", variables * 100)], [])
+    oversized = packed(2, [(1, "fixedFrequency", variables * 100)], [])
     with pytest.raises(AirTouchError, match="300 variables in one event.*; copy it"):
-        parse(many, "log00")
+        parse(oversized, "log00")
     odd = packed(2, [(1, "fixedFrequency", [("a\nb" * 3000, "f")])], [(1, 0, [0.0])])
-    with pytest.raises(AirTouchError, match="none of its variables is known") as caught:
+    with pytest.raises(AirTouchError, match="none of its variables is known") as error:
         parse(odd, "log00")
-    assert str(caught.value).isprintable() and len(str(caught.value)) < 200
+    assert str(error.value).isprintable() and len(str(error.value)) < 200
 
 
 # Parquet
@@ -136,8 +143,8 @@ def _parquet(meta=b"{}", **columns):
     from pyarrow import parquet as writer
 
     sink = io.BytesIO()
-    made = pyarrow.table({"t_s": [0.0, 0.01], **columns}).replace_schema_metadata({b"airtouch": meta})
-    writer.write_table(made, sink)
+    table = pyarrow.table({"t_s": [0.0, 0.01], **columns}).replace_schema_metadata({b"airtouch": meta})
+    writer.write_table(table, sink)
     return sink.getvalue()
 
 
@@ -187,8 +194,8 @@ def test_damaged_packed_data_in_the_public_flights_are_no_traceback(tmp_path):
 def test_recovery_leaves_out_rows_without_a_time_and_keeps_a_file_without_any(tmp_path):
     (tmp_path / "a_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n0,1\n,1\n0.01,1\n1e300,1\n0.02,1\n")
     (tmp_path / "b_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n,1\n,1\n")
-    (found,), (unreadable,) = recover(tmp_path)
-    assert logs.read(found)["t_s"].tolist() == [0, 0.01, 0.02]
+    (recovered,), (unreadable,) = recover(tmp_path)
+    assert logs.read(recovered)["t_s"].tolist() == [0, 0.01, 0.02]
     assert "b_0001.csv.gz.part: no row has a time" in unreadable and (tmp_path / "b_0001.csv.gz.part").exists()
 
 
@@ -207,7 +214,7 @@ def test_hostile_shapes_cost_no_more_than_their_size(name):
         assert str(error).startswith("made") and ";" in str(error) and len(str(error)) < 300
 
 
-def test_metadata_survive():
+def test_metadata_of_a_file_are_kept_and_can_be_written_as_json():
     log = parse(canonical(motion(70, 0.01, 0)), "made")
     assert {key: log.meta[key] for key in META} == META | {"warnings": log.meta["warnings"]}
     assert log.meta["warnings"] == ["windy", "columns not in the schema, kept as they are: humidity"]

@@ -51,7 +51,7 @@ def test_authors_13_columns_give_attitude_and_body_acceleration():
     assert np.isnan(log["zrange_m"][0])
 
 
-def test_authors_other_widths():
+def test_the_authors_files_of_other_widths_have_their_columns():
     log = parse(lines([0, 0, 9810, 0, 0, 0, 1, 2, 3, 4, 0, 1500, 0.5, 0]), "f")  # 14
     assert np.isnan(log["range_left_m"][0]) and log["range_right_m"][0] == 1.5
     assert log["zrange_m"][0] == 0.0  # too near to measure is a reading
@@ -132,17 +132,17 @@ def test_real_attitude_agrees_with_gyro_and_accelerometer(flights):
     smooth = butter(4, 5, fs=100, output="sos")
     for name in ("imu_data_0201-2248_h82", "imu_data_0127-2027_+20d", "imu_data_0126-2025"):
         log = logs.read(flights / "airtouch" / f"{name}.csv.gz")
-        where = np.flatnonzero(logs.airborne(log))[200:-200]
+        in_air = np.flatnonzero(logs.airborne(log))[200:-200]
         angles = [np.unwrap(log[a]) for a in ATTITUDE]
         for angle, rate in zip(angles, GYRO, strict=True):
-            slope = sosfiltfilt(smooth, np.gradient(angle, 0.01))[where]
-            measured = sosfiltfilt(smooth, log[rate])[where]
+            slope = sosfiltfilt(smooth, np.gradient(angle, 0.01))[in_air]
+            measured = sosfiltfilt(smooth, log[rate])[in_air]
             assert np.corrcoef(slope, measured)[0, 1] > 0.92
             assert np.polyfit(measured, slope, 1)[0] == pytest.approx(1, abs=0.12)
         thrust_axis = rotation(*angles)[:, :, 2]
         for axis in (0, 1):
-            tilt = sosfiltfilt(smooth, thrust_axis[:, axis])[where]
-            push = sosfiltfilt(smooth, log[ACC_WORLD[axis]])[where]
+            tilt = sosfiltfilt(smooth, thrust_axis[:, axis])[in_air]
+            push = sosfiltfilt(smooth, log[ACC_WORLD[axis]])[in_air]
             assert np.polyfit(tilt, push, 1)[0] == pytest.approx(9.81, rel=0.12)
 
 
@@ -181,6 +181,6 @@ def test_thrust_stands_are_no_flights_but_can_be_read(flights):
     path = flights / "imrclab" / "thrust_cf21_bitcraze2021_cf21_stock2.csv.gz"
     with pytest.raises(AirTouchError, match="thrust-stand"):
         logs.read(path)
-    run = read_thrust_stand(path)
-    assert np.corrcoef(run["pwm"], run["weight_g"])[0, 1] > 0.95
-    assert {"vbat_V", "rpm_1", "power_W"} <= set(run)
+    stand = read_thrust_stand(path)
+    assert np.corrcoef(stand["pwm"], stand["weight_g"])[0, 1] > 0.95
+    assert {"vbat_V", "rpm_1", "power_W"} <= set(stand)

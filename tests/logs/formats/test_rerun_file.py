@@ -19,14 +19,14 @@ def flight(tmp_path_factory):
 
 
 def convert(*arguments):
-    done = CliRunner().invoke(command, ["convert", *map(str, arguments)])
-    assert done.exception is None, done.exception
+    result = CliRunner().invoke(command, ["convert", *map(str, arguments)])
+    assert result.exception is None, result.exception
 
 
 def test_rerun_reads_every_sample_back(flight, tmp_path):
     chunk = pytest.importorskip("rerun.chunk", reason="could not import rerun: pip install 'airtouch[rerun]'")
     convert(flight, "--format", "rrd", "--out", tmp_path)
-    log, seen = logs.read(flight), {}
+    log, samples = logs.read(flight), {}
     for piece in chunk.RrdReader(tmp_path / "flight.rrd").store().stream().to_chunks():
         table = piece.to_record_batch()
         columns = dict(zip(table.schema.names, table.columns, strict=True))
@@ -34,16 +34,16 @@ def test_rerun_reads_every_sample_back(flight, tmp_path):
         for name, values in columns.items():
             if time is not None and ("Scalars" in name or "TextLog:text" in name):
                 entity = piece.entity_path.strip("/")
-                times, numbers = seen.setdefault(entity, ([], []))
+                times, numbers = samples.setdefault(entity, ([], []))
                 times += [t.total_seconds() for t in time.to_pylist()]
                 numbers += [v[0] for v in values.to_pylist()]
     for name in ("gyro_x_radps", "m1_pwm", "zrange_m", "vx_mps"):
-        order = np.argsort(seen[name][0])
+        order = np.argsort(samples[name][0])
         there = np.isfinite(log[name])
-        np.testing.assert_allclose(np.array(seen[name][1])[order], log[name][there], atol=1e-9)
-        np.testing.assert_allclose(np.array(seen[name][0])[order], (log["t_s"] - log["t_s"][0])[there], atol=1e-6)
-    assert len(seen["vx_mps"][0]) == len(log) - 10
-    assert seen["edges"][1] == [edge.kind for edge in logs.true_edges(log)]
+        np.testing.assert_allclose(np.array(samples[name][1])[order], log[name][there], atol=1e-9)
+        np.testing.assert_allclose(np.array(samples[name][0])[order], (log["t_s"] - log["t_s"][0])[there], atol=1e-6)
+    assert len(samples["vx_mps"][0]) == len(log) - 10
+    assert samples["edges"][1] == [edge.kind for edge in logs.true_edges(log)]
 
 
 def test_pandas_reads_the_plain_table_back(flight, tmp_path):

@@ -39,8 +39,8 @@ def assert_same(back, log):
     assert set(back.columns) == set(log.columns)
     for name, values in log.columns.items():
         np.testing.assert_array_equal(back[name], values)
-        known = ~np.isnan(values)
-        np.testing.assert_array_equal(np.signbit(back[name])[known], np.signbit(values)[known])
+        finite = ~np.isnan(values)
+        np.testing.assert_array_equal(np.signbit(back[name])[finite], np.signbit(values)[finite])
     for key, value in log.meta.items():
         if key not in ("source", "format"):
             assert back.meta[key] == value
@@ -49,13 +49,13 @@ def assert_same(back, log):
 
 @settings(deadline=None)
 @given(flight_logs(), st.booleans())
-def test_canonical_round_trip(log, compress):
+def test_a_canonical_file_gives_the_log_back(log, compress):
     assert_same(parse(canonical.to_bytes(log, compress), "b.csv"), log)
 
 
 @settings(deadline=None, max_examples=50)
 @given(flight_logs())
-def test_parquet_round_trip(log):
+def test_a_parquet_file_gives_the_log_back(log):
     pytest.importorskip("pyarrow")
     assert_same(parse(parquet.to_bytes(log), "b.parquet"), log)
 

@@ -37,7 +37,7 @@ def _time(version, i):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_both_versions(version):
+def test_files_of_both_versions_give_columns_in_si_units(version):
     log = parse(usd_log(version), "log00")
     assert len(log) == 50 and log.meta["format"] == f"usd-{version}" and not log.meta["warnings"]
     np.testing.assert_allclose(log["t_s"], 0.1 + 0.001 * np.arange(50))
@@ -48,7 +48,7 @@ def test_both_versions(version):
     assert log["roll_rad"][0] == 0
 
 
-def test_checksum_is_checked():
+def test_a_wrong_checksum_is_told():
     data = bytearray(usd_log())
     data[-20] ^= 1
     log = parse(bytes(data), "log00")
@@ -57,8 +57,8 @@ def test_checksum_is_checked():
 
 def test_cut_log_keeps_whole_records():
     data = usd_log()
-    for cut in range(len(data) - 400, len(data) - 5):
-        log = parse(data[:cut], "log00")
+    for length in range(len(data) - 400, len(data) - 5):
+        log = parse(data[:length], "log00")
         assert 30 < len(log) <= 50 and any("checksum" in w for w in log.meta["warnings"])
         np.testing.assert_array_equal(log["m1_pwm"], np.arange(len(log)))
 
@@ -77,5 +77,5 @@ def test_logs_without_the_usual_event_and_unusable_ones():
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
-def test_damaged_logs_never_crash(data):
+def test_a_damaged_log_is_read_or_refused_in_one_line(data):
     damaged.is_read_or_refused(usd_log(rows=5), data)

@@ -43,7 +43,7 @@ def flight(n=50):
     return [struct.pack("<I6f4IH", 9000 + 10 * i, 0.5, 0, 1, 90, 0, 0, i, 2, 3, 65535, 3900) for i in range(n)]
 
 
-def test_columns_and_units():
+def test_an_old_file_gives_columns_in_si_units():
     log = parse(old_log(flight()), "log00")
     assert len(log) == 50 and log.meta["format"] == "usd-0" and not log.meta["warnings"]
     np.testing.assert_allclose(log["t_s"], 9 + 0.01 * np.arange(50))
@@ -53,7 +53,7 @@ def test_columns_and_units():
     assert log["vbat_V"][0] == pytest.approx(3.9)
 
 
-def test_ticks_in_microseconds():
+def test_ticks_in_microseconds_give_seconds():
     rows = [struct.pack("<IH", 9_000_000 + 9890 * i, 3900) for i in range(20)]
     log = parse(old_log(rows, ("tick(I)", "pm.vbatMV(H)")), "log00")
     np.testing.assert_allclose(log["t_s"], 9 + 0.00989 * np.arange(20))
@@ -65,11 +65,11 @@ def test_a_damaged_block_is_left_out_and_a_cut_one_gives_its_whole_rows():
     data[-size - 30] ^= 1  # in the last of three blocks
     log = parse(bytes(data), "log00")
     assert len(log) == 14 and "1 blocks with a wrong checksum" in log.meta["warnings"][0]
-    whole = old_log(flight(21))
-    for cut in (1, 4, 5, size, 3 * size + 4):
-        log = parse(whole[:-cut], "log00")
-        lost = -(-max(cut - 4, 0) // size)
-        np.testing.assert_array_equal(log["m1_pwm"], np.arange(21 - lost))
+    contents = old_log(flight(21))
+    for missing_bytes in (1, 4, 5, size, 3 * size + 4):
+        log = parse(contents[:-missing_bytes], "log00")
+        missing_rows = -(-max(missing_bytes - 4, 0) // size)
+        np.testing.assert_array_equal(log["m1_pwm"], np.arange(21 - missing_rows))
         assert "cut off" in log.meta["warnings"][0]
 
 
@@ -90,7 +90,7 @@ def test_rates_without_attitude_are_left_out_and_said():
     assert "gyro_y_radps" not in log.columns and "ratePitch" in log.meta["warnings"][0]
 
 
-def test_unusable_ones():
+def test_files_without_rows_time_or_known_variables_are_refused():
     with pytest.raises(AirTouchError, match="no complete row"):
         parse(old_log([]), "log00")
     with pytest.raises(AirTouchError, match="'tick' has no time"):
@@ -111,5 +111,5 @@ def test_checksum_is_zlibs_without_its_inversion():
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
-def test_damaged_logs_never_crash(data):
+def test_a_damaged_log_is_read_or_refused_in_one_line(data):
     damaged.is_read_or_refused(old_log(flight(9)), data)

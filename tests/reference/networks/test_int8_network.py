@@ -39,10 +39,10 @@ def layer(kind, shape_in, shape_out, kernel, rng, *, relu, output_zero_point, ou
 
 def test_quantise_rounds_half_up_and_clamps():
     x = np.array([0.0, 0.049, 0.05, -0.05, -0.051, 0.15, 1.0, 12.3, 12.4, -13.1, -13.2, 1e30, -1e30, np.inf, -np.inf])
-    found = quantise(x.astype(np.float32), 0.125, 3)
-    assert found.dtype == np.int8
+    quantised = quantise(x.astype(np.float32), 0.125, 3)
+    assert quantised.dtype == np.int8
     by_hand = [3, 3, 3, 3, 3, 4, 11, 101, 102, -102, -103, 127, -128, 127, -128]
-    assert found.tolist() == by_hand
+    assert quantised.tolist() == by_hand
 
 
 def test_quantise_takes_ties_up_and_nan_as_zero():
@@ -74,10 +74,10 @@ def test_a_multiplier_too_small_to_shift_by_is_zero():
        st.booleans())
 def test_requantise_is_exact(accumulator, multiplier, shift, zero_point, relu):
     low = zero_point if relu else -128
-    found = requantise(np.array([accumulator], np.int32), np.array([multiplier], np.int32), np.array([shift], np.int8),
-                       zero_point, low)
-    assert found.dtype == np.int8
-    assert found.tolist() == [exact_int8.requantised(accumulator, multiplier, shift, zero_point, low)]
+    outputs = requantise(np.array([accumulator], np.int32), np.array([multiplier], np.int32),
+                         np.array([shift], np.int8), zero_point, low)
+    assert outputs.dtype == np.int8
+    assert outputs.tolist() == [exact_int8.requantised(accumulator, multiplier, shift, zero_point, low)]
 
 
 def test_requantise_shifts_to_the_left_before_it_multiplies():
@@ -92,32 +92,32 @@ def test_requantise_shifts_to_the_left_before_it_multiplies():
 @pytest.mark.parametrize(("relu", "zero_point"), [(False, 12), (True, -128), (True, -20)])
 def test_a_convolution_is_its_sums(relu, zero_point):
     rng = np.random.default_rng(1)
-    one = layer(CONV, (5, 4, 2), (4, 2, 3), (2, 3), rng, relu=relu, output_zero_point=zero_point)
+    convolution = layer(CONV, (5, 4, 2), (4, 2, 3), (2, 3), rng, relu=relu, output_zero_point=zero_point)
     x = rng.integers(-128, 128, (3, 5, 4, 2)).astype(np.int8)
-    found = run(Int8Network((one,)), x).reshape(3, 4, 2, 3)
+    outputs = run(Int8Network((convolution,)), x).reshape(3, 4, 2, 3)
     for n, row, column, channel in product(range(3), range(4), range(2), range(3)):
         patch = x[n, row:row + 2, column:column + 3].ravel()
-        assert found[n, row, column, channel] == exact_int8.output(one, channel, patch)
-    assert found.min() == one.output_min and len(np.unique(found)) > 20
+        assert outputs[n, row, column, channel] == exact_int8.output(convolution, channel, patch)
+    assert outputs.min() == convolution.output_min and len(np.unique(outputs)) > 20
 
 
 @pytest.mark.parametrize(("relu", "zero_point"), [(False, 3), (True, -128), (True, 40)])
 def test_a_dense_layer_is_its_sums(relu, zero_point):
     rng = np.random.default_rng(2)
-    one = layer(DENSE, (2, 3, 4), (1, 1, 5), (1, 1), rng, relu=relu, output_zero_point=zero_point)
+    dense = layer(DENSE, (2, 3, 4), (1, 1, 5), (1, 1), rng, relu=relu, output_zero_point=zero_point)
     x = rng.integers(-128, 128, (40, 24)).astype(np.int8)
-    found = run(Int8Network((one,)), x)
-    assert found.dtype == np.int8
-    assert found.tolist() == [[exact_int8.output(one, channel, row) for channel in range(5)] for row in x]
+    outputs = run(Int8Network((dense,)), x)
+    assert outputs.dtype == np.int8
+    assert outputs.tolist() == [[exact_int8.output(dense, channel, row) for channel in range(5)] for row in x]
 
 
 def test_a_pool_is_the_largest_of_its_block_and_drops_what_is_left_over():
     pool = Int8Layer(MAX_POOL, (5, 5, 2), (2, 1, 2), (2, 3), 0.1, 0, 0.1, 0)
     x = np.random.default_rng(3).integers(-128, 128, (4, 5, 5, 2)).astype(np.int8)
-    found = run(Int8Network((pool,)), x).reshape(4, 2, 1, 2)
+    outputs = run(Int8Network((pool,)), x).reshape(4, 2, 1, 2)
     for n, row, channel in product(range(4), range(2), range(2)):
         block = [int(x[n, 2 * row + i, j, channel]) for i in range(2) for j in range(3)]
-        assert found[n, row, 0, channel] == max(block)
+        assert outputs[n, row, 0, channel] == max(block)
 
 
 def test_layers_follow_one_another_and_windows_do_not_mix():
@@ -129,8 +129,8 @@ def test_layers_follow_one_another_and_windows_do_not_mix():
     assert network.input_shape == (7, 1, 1) and network.outputs == 2
     x = rng.integers(-128, 128, (600, 7)).astype(np.int8)  # more than are computed at a time
     by_layer = x
-    for one in network.layers:
-        by_layer = run(Int8Network((one,)), by_layer)
+    for single in network.layers:
+        by_layer = run(Int8Network((single,)), by_layer)
     np.testing.assert_array_equal(run(network, x), by_layer)
     np.testing.assert_array_equal(run(network, x[300:301]), by_layer[300:301])
 
@@ -161,30 +161,30 @@ def test_float_windows_are_quantised_as_the_first_layer_says():
 @pytest.mark.parametrize("relu", [False, True])
 def test_c_constants_give_the_layers_outputs(relu):
     rng = np.random.default_rng(7)
-    one = layer(DENSE, (4, 1, 3), (1, 1, 6), (1, 1), rng, relu=relu, output_zero_point=-30)
-    weights = one.weights.copy()
+    dense = layer(DENSE, (4, 1, 3), (1, 1, 6), (1, 1), rng, relu=relu, output_zero_point=-30)
+    weights = dense.weights.copy()
     weights[[1, 4]] = 0  # pruning took these outputs
-    scale = one.weight_scale.copy()
+    scale = dense.weight_scale.copy()
     scale[[1, 4]] = 1e-20
-    bias = one.bias.copy()
+    bias = dense.bias.copy()
     bias[[1, 4]] = 2**31 - 1, -2**31
-    one = replace(one, weights=weights, weight_scale=scale, bias=bias)
-    c_bias, multiplier, shift = one.c_constants()
+    dense = replace(dense, weights=weights, weight_scale=scale, bias=bias)
+    c_bias, multiplier, shift = dense.c_constants()
     assert (c_bias.dtype, multiplier.dtype, shift.dtype) == (np.int32, np.int32, np.int8)
     x = rng.integers(-128, 128, (50, 12)).astype(np.int8)
-    for row, expected in zip(x, run(Int8Network((one,)), x), strict=True):
+    for row, expected in zip(x, run(Int8Network((dense,)), x), strict=True):
         sums = [int(c_bias[o]) + sum(int(a) * int(w) for a, w in zip(row, weights[o], strict=True)) for o in range(6)]
-        found = [exact_int8.requantised(s, int(multiplier[o]), int(shift[o]), -30, one.output_min)
-                 for o, s in enumerate(sums)]
-        assert found == expected.tolist()
+        outputs = [exact_int8.requantised(s, int(multiplier[o]), int(shift[o]), -30, dense.output_min)
+                   for o, s in enumerate(sums)]
+        assert outputs == expected.tolist()
     assert multiplier[[1, 4]].tolist() == [2**30] * 2 and shift[[1, 4]].tolist() == [1, 1]
 
 
 def test_an_output_without_weights_is_its_clamped_constant():
-    one = Int8Layer(DENSE, (1, 1, 4), (1, 1, 3), (1, 1), 0.1, 0, 0.1, 20, True,
-                    np.array([[0] * 4, [0] * 4, [1] * 4], np.int8), np.array([-500, 500, 500], np.int32),
-                    np.array([0.5, 0.5, 0.5], np.float32))
-    bias, multiplier, shift = one.c_constants()
+    dense = Int8Layer(DENSE, (1, 1, 4), (1, 1, 3), (1, 1), 0.1, 0, 0.1, 20, True,
+                      np.array([[0] * 4, [0] * 4, [1] * 4], np.int8), np.array([-500, 500, 500], np.int32),
+                      np.array([0.5, 0.5, 0.5], np.float32))
+    bias, multiplier, shift = dense.c_constants()
     assert (bias[:2] + 20).tolist() == [20, 127]  # clamped by the ReLU and by int8
     assert bias[2] == 500 and (int(multiplier[2]), int(shift[2])) == exact_int8.multiplier_of(0.5)
 
@@ -193,9 +193,9 @@ def test_a_gap_of_more_than_255_blocks_is_bridged_by_zeros():
     for gap, skips in ((255, [255]), (256, [255, 0]), (257, [255, 1]), (512, [255, 255, 0])):
         weights = np.zeros((1, 4 * 600), np.int8)
         weights[0, 4 * gap + 1] = 9
-        blocks, counts, found = sparse_blocks(weights)
-        assert (blocks.dtype, counts.dtype, found.dtype) == (np.int8, np.uint16, np.uint8)
-        assert found.tolist() == skips and counts.tolist() == [len(skips)]
+        blocks, counts, block_offsets = sparse_blocks(weights)
+        assert (blocks.dtype, counts.dtype, block_offsets.dtype) == (np.int8, np.uint16, np.uint8)
+        assert block_offsets.tolist() == skips and counts.tolist() == [len(skips)]
         assert blocks.tolist() == [[0, 0, 0, 0]] * (len(skips) - 1) + [[0, 9, 0, 0]]
 
 
@@ -206,12 +206,12 @@ def test_an_output_without_blocks_counts_none():
 
 def test_weights_go_in_blocks_where_these_take_fewer_bytes():
     """Five bytes a block and two an output, against one a weight."""
-    def dense(kept: int, size: int = 28, kind=DENSE) -> Int8Layer:
+    def dense(nonzero: int, size: int = 28, kind=DENSE) -> Int8Layer:
         weights = np.zeros((1, size), np.int8)
-        weights[0, :4 * kept:4] = 1
+        weights[0, :4 * nonzero:4] = 1
         return Int8Layer(kind, (1, 1, size), (1, 1, 1), (1, 1), 0.1, 0, 0.1, 0, weights=weights)
 
-    assert [runs_sparse(dense(kept)) for kept in (0, 4, 5, 6)] == [True, True, True, False]  # 2, 22, 27, 32 of 28
+    assert [runs_sparse(dense(nonzero)) for nonzero in (0, 4, 5, 6)] == [True, True, True, False]  # 2, 22, 27, 32 of 28
     assert not runs_sparse(dense(2, size=12)) and runs_sparse(dense(1, size=12))  # 12 of 12, 7 of 12
     assert not runs_sparse(dense(0, size=6))  # not in blocks of four
     assert not runs_sparse(replace(dense(0), kind=replace(DENSE, sparse_number=None)))

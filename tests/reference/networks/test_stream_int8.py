@@ -55,16 +55,16 @@ def by_definition(network: StreamNetwork, x: np.ndarray) -> list[list[int]]:
 @pytest.mark.parametrize("samples", [1, 2, 9, 60])
 def test_a_flight_is_its_definition(network, samples):
     x = np.random.default_rng(samples).integers(-128, 128, (samples, 2)).astype(np.int8)
-    found = run_stream(network, x)
-    assert found.dtype == np.int8 and found.shape == (-(-samples // 2), 3)
-    assert found.tolist() == by_definition(network, x)
-    np.testing.assert_array_equal(run_stream(network, x.astype(np.int64)), found)
+    outputs = run_stream(network, x)
+    assert outputs.dtype == np.int8 and outputs.shape == (-(-samples // 2), 3)
+    assert outputs.tolist() == by_definition(network, x)
+    np.testing.assert_array_equal(run_stream(network, x.astype(np.int64)), outputs)
 
 
-def test_the_outputs_move(network):
+def test_each_output_takes_more_than_twenty_values(network):
     x = np.random.default_rng(9).integers(-128, 128, (200, 2)).astype(np.int8)
-    found = run_stream(network, x)
-    assert all(len(np.unique(column)) > 20 for column in found.T)
+    outputs = run_stream(network, x)
+    assert all(len(np.unique(column)) > 20 for column in outputs.T)
 
 
 def test_what_a_network_says_of_itself(network):
@@ -98,8 +98,8 @@ def test_a_layer_of_the_graph_as_an_int8_layer():
 def test_follow_gives_each_layer_what_it_reads():
     graph = (StreamLayer("a", "", 1, 1, 1), StreamLayer("b", "", 1, 1, 1), StreamLayer("c", "", 2, 1, 1, reads=(0, 1)),
              StreamLayer("d", "", 1, 1, 1))
-    said = follow(graph, "x", lambda layer, x: f"{layer.name}({x})", "+".join)
-    assert said == "d(c(a(x)+b(a(x))))"
+    expression = follow(graph, "x", lambda layer, x: f"{layer.name}({x})", "+".join)
+    assert expression == "d(c(a(x)+b(a(x))))"
 
 
 def test_taps_come_oldest_first_with_the_past_before_the_first_row():

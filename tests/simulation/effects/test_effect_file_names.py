@@ -26,7 +26,7 @@ EFFECT = Effect("late_push", "begins half-way",
 '''
 
 
-@pytest.mark.parametrize(("right", "wrong", "said"), [
+@pytest.mark.parametrize(("name", "typo", "message"), [
     ("at.HEIGHT", "at.HIGHT", "mine.py:8: no signal 'HIGHT'; did you mean HEIGHT"),
     ("at.TIME", "at.time", "mine.py:7: no signal 'time'; did you mean TIME"),
     ('"motor_rise"', '"motor_rize"', "mine.py:12: no plant field 'motor_rize'; did you mean motor_rise"),
@@ -34,12 +34,12 @@ EFFECT = Effect("late_push", "begins half-way",
     ("Effect(\"late", "Efect(\"late", "mine.py:15: NameError"),
     ("def slower(plant, values):", "def slower(plant, values)", "mine.py:11: SyntaxError"),
 ])
-def test_a_wrong_name_has_its_line_and_the_nearest(tmp_path, right, wrong, said):
+def test_a_wrong_name_has_its_line_and_the_nearest(tmp_path, name, typo, message):
     file = tmp_path / "mine.py"
-    file.write_text(FILE.replace(right, wrong))
+    file.write_text(FILE.replace(name, typo))
     with pytest.raises(AirTouchError) as error:
         effects.load_file(file)
-    assert said in str(error.value) and "\n" not in str(error.value)
+    assert message in str(error.value) and "\n" not in str(error.value)
     assert "late_push" not in effects.EFFECTS
 
 
@@ -57,7 +57,7 @@ def test_a_mistyped_effect_gets_the_nearest():
         effects.get("weak_moter")
 
 
-@pytest.mark.parametrize(("right", "wrong", "said"), [
+@pytest.mark.parametrize(("name", "replacement", "message"), [
     ("wrench=push", "wrnch=push", "mine.py:15: Effect takes no 'wrnch'; did you mean wrench"),
     ("Parameter, wrench\n", "Paramter, wrench\n", "airtouch.simulation.effects has no 'Paramter'; did you mean Param"),
     ("@wrench\n", "", "effect late_push: put @wrench above the function push"),
@@ -65,7 +65,7 @@ def test_a_mistyped_effect_gets_the_nearest():
     ("out[2]", "out[6]", "mine.py:8: out[6] does not exist; the last place is out[5]"),
     ("p[0] *", "memory[12] *", "mine.py:8: memory[12] does not exist; the last place is memory[11]"),
 ])
-def test_what_compiled_code_would_not_notice_is_refused_with_its_line(right, wrong, said):
+def test_what_compiled_code_would_not_notice_is_refused_with_its_line(name, replacement, message):
     with pytest.raises(AirTouchError) as error:
-        effects.load_text(FILE.replace(right, wrong), "mine.py")
-    assert said in str(error.value)
+        effects.load_text(FILE.replace(name, replacement), "mine.py")
+    assert message in str(error.value)

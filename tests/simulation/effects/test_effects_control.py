@@ -31,9 +31,9 @@ def test_controller_gain_scales_the_loops(vehicle, field):
 
 
 def test_position_and_height_gain_scale_the_outer_loops(vehicle):
-    def wanted(**gains):
+    def outer_loops(**gains):
         state = commanded(vehicle, gains, velocity=(0.1, 0.0, 0.0), position=(0.0, 0.0, 0.05))
         return state["attitude"][1], state["thrust"] - from_vehicle(vehicle)[0]["thrust_base"]
-    pitch, thrust = wanted()
-    assert wanted(position_gain=2.0) == pytest.approx((2 * pitch, thrust))
-    assert wanted(height_gain=2.0)[1] == pytest.approx(4 * thrust, rel=0.05)  # two loops in series
+    pitch, thrust = outer_loops()
+    assert outer_loops(position_gain=2.0) == pytest.approx((2 * pitch, thrust))
+    assert outer_loops(height_gain=2.0)[1] == pytest.approx(4 * thrust, rel=0.05)  # two loops in series

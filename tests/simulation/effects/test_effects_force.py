@@ -38,13 +38,13 @@ def test_ground_effect_is_the_published_curve():
     radius, d = 0.0231348, 0.0561
     heights = np.array([0.04, 0.06, 0.08, 0.12])
     b = np.sqrt(2) * d
-    printed = 1 / (1 - (radius / (4 * heights)) ** 2
-                   - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
-                   - radius**2 / 2 * heights / np.sqrt((2 * d**2 + 4 * heights**2) ** 3)
-                   - 2 * radius**2 * heights / np.sqrt((b**2 + 4 * heights**2) ** 3) * 2.0)
-    got = np.array([1 + thrust_ratio(h, radius, d, 2.0) for h in heights])
-    np.testing.assert_allclose(got, printed, rtol=1e-12)
-    np.testing.assert_allclose(100 * (got - 1), [11.6, 7.5, 5.0, 2.5], rtol=0.09)
+    published = 1 / (1 - (radius / (4 * heights)) ** 2
+                     - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
+                     - radius**2 / 2 * heights / np.sqrt((2 * d**2 + 4 * heights**2) ** 3)
+                     - 2 * radius**2 * heights / np.sqrt((b**2 + 4 * heights**2) ** 3) * 2.0)
+    curve = np.array([1 + thrust_ratio(h, radius, d, 2.0) for h in heights])
+    np.testing.assert_allclose(curve, published, rtol=1e-12)
+    np.testing.assert_allclose(100 * (curve - 1), [11.6, 7.5, 5.0, 2.5], rtol=0.09)
 
 
 @pytest.mark.parametrize("range_m", [0.03, 0.06, 0.10])
@@ -82,19 +82,19 @@ def test_modes_of_the_turbulence_have_their_shares(signals):
     signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.05
     signals[:, [at.LOWER_FACTOR, at.LOWER_FACTOR + 1, at.LOWER_FACTOR + 2, at.LOWER_FACTOR + 3]] = 1.0
     calm = wrench("ground_effect", {"turbulence": 0.0}, signals)
-    alike, other = (wrench("ground_effect", {"turbulence": 0.3, **values}, signals) - calm
-                    for values in ({}, {"heave": 0.5, "pitch": 0.25, "swirl": 0.01}))
-    np.testing.assert_allclose(other[:, 2], 0.5 * alike[:, 2], atol=1e-12)
-    np.testing.assert_allclose(other[:, 3], alike[:, 3], atol=1e-12)
-    np.testing.assert_allclose(other[:, 4], 0.25 * alike[:, 4], atol=1e-12)
-    assert not alike[:, 5].any()
-    assert other[:, 5].std() == pytest.approx(0.01 * alike[:, 2].std(), rel=0.15)  # as much as four rotors' lift
+    common, pairwise = (wrench("ground_effect", {"turbulence": 0.3, **values}, signals) - calm
+                        for values in ({}, {"heave": 0.5, "pitch": 0.25, "swirl": 0.01}))
+    np.testing.assert_allclose(pairwise[:, 2], 0.5 * common[:, 2], atol=1e-12)
+    np.testing.assert_allclose(pairwise[:, 3], common[:, 3], atol=1e-12)
+    np.testing.assert_allclose(pairwise[:, 4], 0.25 * common[:, 4], atol=1e-12)
+    assert not common[:, 5].any()
+    assert pairwise[:, 5].std() == pytest.approx(0.01 * common[:, 2].std(), rel=0.15)  # as much as four rotors' lift
 
 
 def test_rotor_drag_is_linear(signals):
     signals[:, at.VELOCITY:at.VELOCITY + 3] = (1.0, -2.0, 0.5)
-    got = wrench("rotor_drag", {"horizontal": 0.01, "vertical": 0.02}, signals)[0]
-    np.testing.assert_allclose(got, [-0.01, 0.02, -0.01, 0, 0, 0], atol=1e-12)
+    force = wrench("rotor_drag", {"horizontal": 0.01, "vertical": 0.02}, signals)[0]
+    np.testing.assert_allclose(force, [-0.01, 0.02, -0.01, 0, 0, 0], atol=1e-12)
 
 
 def test_wind_gives_the_tilt_that_drag_implies(steady):
@@ -110,20 +110,20 @@ def test_wind_above_the_centre_of_mass_tips_the_vehicle_over(signals):
     signals[:, at.ROTATION:at.ROTATION + 9] = (1, 0, 0, 0, math.cos(angle), -math.sin(angle),
                                                0, math.sin(angle), math.cos(angle))
     values = {"x": 0.3, "y": 0.8, "drag": 0.0147, "lever": 0.02}
-    got = wrench("wind", values, signals)[0]
+    with_lever = wrench("wind", values, signals)[0]
     force = 0.0147 * np.array([0.3, 0.8 * math.cos(angle), 0.0])
-    np.testing.assert_allclose(got[:3], force, atol=1e-15)
-    np.testing.assert_allclose(got[3:], np.cross([0, 0, 0.02], force), atol=1e-15)
-    assert got[3] < 0.0
-    plain = wrench("wind", {**values, "lever": 0.0}, signals)[0]
-    assert not plain[3:].any() and np.array_equal(plain[:3], got[:3])
+    np.testing.assert_allclose(with_lever[:3], force, atol=1e-15)
+    np.testing.assert_allclose(with_lever[3:], np.cross([0, 0, 0.02], force), atol=1e-15)
+    assert with_lever[3] < 0.0
+    without_lever = wrench("wind", {**values, "lever": 0.0}, signals)[0]
+    assert not without_lever[3:].any() and np.array_equal(without_lever[:3], with_lever[:3])
 
 
 def test_rotors_on_the_lee_side_hold_against_wind_above_the_centre_of_mass(steady, vehicle):
     """Hover: torque of the rotors = minus the moment of the wind."""
     log = steady({"wind": {"x": 0.0, "y": 1.0, "drag": 0.0147, "lever": 0.03}})
     still = steady({"wind": {"x": 0.0, "y": 1.0, "drag": 0.0147}})
-    roll = [(t := vehicle.thrust(one.stack(PWM)).mean(axis=0))[2] + t[3] - t[0] - t[1] for one in (log, still)]
+    roll = [(t := vehicle.thrust(hover.stack(PWM)).mean(axis=0))[2] + t[3] - t[0] - t[1] for hover in (log, still)]
     torque = vehicle.arm_m / math.sqrt(2.0) * (roll[0] - roll[1])
     assert torque == pytest.approx(0.0147 * 1.0 * 0.03, rel=0.05)
 
@@ -148,34 +148,34 @@ def test_gusts_above_the_centre_of_mass_and_small_eddies_turn_the_vehicle(signal
     signals = np.repeat(signals[:1], 200_000, axis=0)
     signals[:, at.STEP] = 0.01
     tau, rms, drag, speed = 0.4, 0.4, 0.01, 1.25
-    plain = {"rms": rms, "length": tau * speed, "airspeed": speed, "drag": drag}
-    calm, got = (wrench("gust", values, signals) for values in (plain, {**plain, "lever": 0.02, "shear": 1.0}))
-    assert np.array_equal(got[:, :3], calm[:, :3]) and not calm[:, 3:].any()
-    np.testing.assert_allclose(got[:, 3:5], 0.02 * np.stack([-got[:, 1], got[:, 0]], axis=1), atol=1e-15)
-    f, power = welch(got[:, 5], fs=100.0, nperseg=8192)
+    centred = {"rms": rms, "length": tau * speed, "airspeed": speed, "drag": drag}
+    calm, gusty = (wrench("gust", values, signals) for values in (centred, {**centred, "lever": 0.02, "shear": 1.0}))
+    assert np.array_equal(gusty[:, :3], calm[:, :3]) and not calm[:, 3:].any()
+    np.testing.assert_allclose(gusty[:, 3:5], 0.02 * np.stack([-gusty[:, 1], gusty[:, 0]], axis=1), atol=1e-15)
+    f, power = welch(gusty[:, 5], fs=100.0, nperseg=8192)
     band = (f > 0.05) & (f < 3.0)
     w = 2 * np.pi * f[band]
     across = 2 * rms**2 * tau * (1 + 3 * (w * tau) ** 2) / (1 + (w * tau) ** 2) ** 2
     turning = across * (w / speed) ** 2 / (1 + (3 * signals[0, at.ROTOR_SPACING] / (np.pi * speed) * w) ** 2)
-    apart = np.mean(signals[0, at.ROTOR_X:at.ROTOR_X + 4] ** 2)
-    decibel = 10 * np.log10(power[band] / (turning * (drag * apart) ** 2))
+    lever_squared = np.mean(signals[0, at.ROTOR_X:at.ROTOR_X + 4] ** 2)
+    decibel = 10 * np.log10(power[band] / (turning * (drag * lever_squared) ** 2))
     assert abs(np.mean(decibel)) < 0.4 and np.std(decibel) < 1.5
 
 
 def test_blade_flapping_tilts_the_thrust_back(signals):
     signals[:, at.VELOCITY] = 2.0
-    got = wrench("blade_flapping", {"tilt": 0.01, "hub": 0.005, "above": 0.01}, signals)[0]
+    force = wrench("blade_flapping", {"tilt": 0.01, "hub": 0.005, "above": 0.01}, signals)[0]
     back = MASS * GRAVITY * 0.02
-    np.testing.assert_allclose(got, [-back, 0, 0, 0, -0.015 * back, 0], atol=1e-12)
+    np.testing.assert_allclose(force, [-back, 0, 0, 0, -0.015 * back, 0], atol=1e-12)
 
 
 def test_slung_load_hangs_and_swings_at_its_period(signals):
     signals = np.repeat(signals[:1], 15000, axis=0)
     signals[:, at.ACCELERATION] = np.where(np.arange(15000) < 50, 1.0, 0.0)  # a push sets it swinging
     length, load = 0.3, 0.002
-    got = wrench("slung_load", {"load": load, "length": length, "damping": 0.0}, signals)
-    assert got[5000:, 2].mean() == pytest.approx(-load * GRAVITY, rel=0.02)
-    swing = got[2500:, 0] - got[2500:, 0].mean()
+    force = wrench("slung_load", {"load": load, "length": length, "damping": 0.0}, signals)
+    assert force[5000:, 2].mean() == pytest.approx(-load * GRAVITY, rel=0.02)
+    swing = force[2500:, 0] - force[2500:, 0].mean()
     crossings = np.flatnonzero((swing[:-1] < 0) & (swing[1:] >= 0))
     period = np.diff(crossings).mean() * 0.002
     assert period == pytest.approx(2 * math.pi * math.sqrt(length / GRAVITY), rel=0.02)

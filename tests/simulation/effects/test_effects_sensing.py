@@ -30,11 +30,11 @@ speed_mps = 0.3
 
 
 @pytest.fixture(scope="module")
-def sweep(quiet):
+def sweep(ideal):
     scene = scenario.parse(SWEEP, "sweep")
 
     def fly(effects=(), number=0):
-        log = flight.fly(scene, quiet, 3, number, effects=effects)
+        log = flight.fly(scene, ideal, 3, number, effects=effects)
         assert not isinstance(log, flight.Diverged), str(log)
         return log
     return fly
@@ -43,10 +43,10 @@ def sweep(quiet):
 def test_imu_bias_shows_as_the_mean(steady):
     values = {"acc_x": 0.2, "acc_y": -0.1, "acc_z": 0.3, "gyro_x": 0.02, "gyro_y": 0.01, "gyro_z": -0.03}
     biased = flight_on_ground({"imu_bias": values})
-    plain = flight_on_ground(())
+    unbiased = flight_on_ground(())
     for name, value in values.items():
         column = f"{name}_mps2" if name.startswith("acc") else f"{name}_radps"
-        assert (biased[column] - plain[column]).mean() == pytest.approx(value, abs=1e-6)
+        assert (biased[column] - unbiased[column]).mean() == pytest.approx(value, abs=1e-6)
 
 
 def flight_on_ground(effects):
@@ -66,8 +66,8 @@ def test_imu_noise_has_its_rms(vehicle, factor):
 
 
 def test_vibration_folds_to_the_rotors_alias(steady):
-    apart = [("weak_motor", {"rotor": i, "thrust_loss": 0.004 * i}) for i in (1, 2, 3)]  # four lines, not one
-    log = steady([("vibration", {"amplitude": 1.0, "gyro": 0.05}), *apart])
+    detuned = [("weak_motor", {"rotor": i, "thrust_loss": 0.004 * i}) for i in (1, 2, 3)]  # four lines, not one
+    log = steady([("vibration", {"amplitude": 1.0, "gyro": 0.05}), *detuned])
     turns = log["rpm_1"].mean() / 60.0
     alias = abs(turns - 100.0 * round(turns / 100.0))
     f, power = welch(log["acc_x_mps2"], fs=100.0, nperseg=400)
@@ -142,15 +142,15 @@ def test_packet_loss_has_its_share_and_bursts():
 
 
 def test_range_residual_shifts_the_height_over_the_platform(sweep):
-    plain, shifted = sweep(), sweep({"range_step": {"residual": 0.03, "kick": 0.0}})
-    over = slice(true_edges(plain)[0].sample + 350, true_edges(plain)[1].sample)
-    assert (shifted["z_m"] - plain["z_m"])[over].mean() == pytest.approx(0.03, abs=0.012)
+    nominal, shifted = sweep(), sweep({"range_step": {"residual": 0.03, "kick": 0.0}})
+    over = slice(true_edges(nominal)[0].sample + 350, true_edges(nominal)[1].sample)
+    assert (shifted["z_m"] - nominal["z_m"])[over].mean() == pytest.approx(0.03, abs=0.012)
 
 
 def test_range_kick_acts_once_at_each_edge(sweep):
-    plain, kicked = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.05}})
-    difference = np.abs(kicked.stack(PWM).mean(1) - plain.stack(PWM).mean(1))
-    first = true_edges(plain)[0].sample
+    nominal, kicked = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.05}})
+    difference = np.abs(kicked.stack(PWM).mean(1) - nominal.stack(PWM).mean(1))
+    first = true_edges(nominal)[0].sample
     assert difference[:first - 3].max() == 0.0
     assert difference[first - 3:first + 20].max() > 500.0
 
@@ -173,8 +173,8 @@ def test_one_reading_at_each_edge_mixes_both_surfaces(sweep):
     beyond = leaving > 0.9
     assert 2 <= beyond.sum() <= len(beyond) - 2
     assert 1.1 < leaving.max() < 1.55 and leaving[~beyond].max() < 0.55
-    plain, never = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.0, "mixed": 0.0}})
-    assert (never["zrange_m"] == plain["zrange_m"]).all()
+    nominal, never = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.0, "mixed": 0.0}})
+    assert (never["zrange_m"] == nominal["zrange_m"]).all()
 
 
 def test_flow_scale_slows_the_drone_down_over_the_platform(sweep):
@@ -234,8 +234,8 @@ def test_a_late_range_makes_no_kick_of_the_flow(sweep):
     assert max(kick(0.012), kick(0.04)) < 1.5 * kick(0.0) + 500.0
 
 
-def test_flow_latency_is_the_plants_delay(quiet):
-    plant = from_vehicle(quiet)
+def test_flow_latency_is_the_plants_delay(ideal):
+    plant = from_vehicle(ideal)
     from airtouch.simulation import effects
     (active,) = effects.activate({"flow_latency": {"delay": 0.06}})
     active.effect.settings(plant[0], active.values)
@@ -244,28 +244,28 @@ def test_flow_latency_is_the_plants_delay(quiet):
 
 def test_reach_sees_the_platform_before_and_after_the_beam_does(sweep):
     """By reach over speed at both edges, and the beam alone at none."""
-    plain, wide = (true_edges(sweep({"range_bias": {"near": 0.0, "dip": 0.0, "reach": reach}}))
-                   for reach in (0.0, 0.06))
-    assert plain[0].sample - wide[0].sample == pytest.approx(100 * 0.06 / 0.3, abs=4)
-    assert wide[1].sample - plain[1].sample == pytest.approx(100 * 0.06 / 0.3, abs=6)
+    narrow, wide = (true_edges(sweep({"range_bias": {"near": 0.0, "dip": 0.0, "reach": reach}}))
+                    for reach in (0.0, 0.06))
+    assert narrow[0].sample - wide[0].sample == pytest.approx(100 * 0.06 / 0.3, abs=4)
+    assert wide[1].sample - narrow[1].sample == pytest.approx(100 * 0.06 / 0.3, abs=6)
 
 
-@pytest.mark.parametrize("kept", [{"above": 0.4}, {"wait": 1.0}])
-def test_flow_transient_waits_and_only_acts_above(sweep, kept):
+@pytest.mark.parametrize("condition", [{"above": 0.4}, {"wait": 1.0}])
+def test_flow_transient_waits_and_only_acts_above(sweep, condition):
     """Bit by bit as without it until its time, for ever where the drone is too low; with neither it acts at once."""
-    still, free, held = (sweep({"flow_scale": {"share": 0.0, "transient": 0.5, **more}})
-                         for more in ({"transient": 0.0}, {}, kept))
+    still, free, withheld = (sweep({"flow_scale": {"share": 0.0, "transient": 0.5, **values}})
+                             for values in ({"transient": 0.0}, {}, condition))
     entry = true_edges(still)[0].sample
-    until = len(still) if "above" in kept else entry + 90
-    np.testing.assert_array_equal(held["vx_mps"][:until], still["vx_mps"][:until])
+    until = len(still) if "above" in condition else entry + 90
+    np.testing.assert_array_equal(withheld["vx_mps"][:until], still["vx_mps"][:until])
     assert np.abs(free["vx_mps"] - still["vx_mps"])[entry:entry + 90].max() > 0.01
-    if "wait" in kept:
-        assert np.abs(held["vx_mps"] - still["vx_mps"])[until:].max() > 0.01
+    if "wait" in condition:
+        assert np.abs(withheld["vx_mps"] - still["vx_mps"])[until:].max() > 0.01
 
 
 def test_leaving_a_surface_presses_down_and_entering_it_does_not(sweep):
-    plain, pressed = (sweep({"ground_effect": {"turbulence": 0.0, "leaving": share}}) for share in (0.0, 0.05))
-    entry, leave = true_edges(plain)[:2]
-    np.testing.assert_array_equal(pressed["acc_z_mps2"][:leave.sample - 60], plain["acc_z_mps2"][:leave.sample - 60])
-    change = (pressed["acc_z_mps2"] - plain["acc_z_mps2"])[leave.sample - 60:leave.sample + 30]
+    nominal, pressed = (sweep({"ground_effect": {"turbulence": 0.0, "leaving": share}}) for share in (0.0, 0.05))
+    entry, leave = true_edges(nominal)[:2]
+    np.testing.assert_array_equal(pressed["acc_z_mps2"][:leave.sample - 60], nominal["acc_z_mps2"][:leave.sample - 60])
+    change = (pressed["acc_z_mps2"] - nominal["acc_z_mps2"])[leave.sample - 60:leave.sample + 30]
     assert change.min() == pytest.approx(-0.05 * 9.81, rel=0.4)

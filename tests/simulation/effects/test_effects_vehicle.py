@@ -25,7 +25,7 @@ def command(pwm):
     return FlightLog({name: pwm[:, i] for i, name in enumerate(PWM)})
 
 
-def ran(pwm, vehicle, chosen=(), period_s=0.002):
+def rotor_speeds(pwm, vehicle, chosen=(), period_s=0.002):
     return replay.run(command(pwm), vehicle, effects.activate(chosen), period_s=period_s)
 
 
@@ -39,10 +39,10 @@ def test_mass_and_thrust_coefficient_are_carried_by_more_thrust(steady, vehicle)
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_weak_motor_gets_more_command_and_the_others_none(steady, vehicle, rotor):
-    got = thrusts(steady({"weak_motor": {"rotor": rotor, "thrust_loss": 0.12}}), vehicle)
+    thrust = thrusts(steady({"weak_motor": {"rotor": rotor, "thrust_loss": 0.12}}), vehicle)
     expected = np.full(4, WEIGHT / 4)
     expected[rotor - 1] /= 0.88
-    np.testing.assert_allclose(got, expected, rtol=3e-3)
+    np.testing.assert_allclose(thrust, expected, rtol=3e-3)
 
 
 def test_two_weak_motors_are_two_entries(steady, vehicle):
@@ -54,31 +54,31 @@ def test_two_weak_motors_are_two_entries(steady, vehicle):
 
 def test_centre_of_mass_is_carried_by_the_rotors_nearer_to_it(steady, vehicle):
     half = vehicle.arm_m / np.sqrt(2)
-    got = thrusts(steady({"com_offset": {"x": 0.002, "y": -0.001}}), vehicle)
-    front, right = got[[0, 3]].sum() / got.sum(), got[[0, 1]].sum() / got.sum()
-    assert front == pytest.approx(0.5 + 0.5 * 0.002 / half, rel=3e-3)
-    assert right == pytest.approx(0.5 + 0.5 * 0.001 / half, rel=3e-3)
+    thrust = thrusts(steady({"com_offset": {"x": 0.002, "y": -0.001}}), vehicle)
+    front_share, right_share = thrust[[0, 3]].sum() / thrust.sum(), thrust[[0, 1]].sum() / thrust.sum()
+    assert front_share == pytest.approx(0.5 + 0.5 * 0.002 / half, rel=3e-3)
+    assert right_share == pytest.approx(0.5 + 0.5 * 0.001 / half, rel=3e-3)
 
 
 def test_inertia_slows_the_turn(vehicle):
     pwm = np.tile([42000.0, 42000.0, 46000.0, 46000.0], (200, 1))
-    nominal = ran(pwm, vehicle).angular_acceleration[-1]
-    heavy = ran(pwm, vehicle, {"inertia": {"fraction": 0.5}}).angular_acceleration[-1]
+    nominal = rotor_speeds(pwm, vehicle).angular_acceleration[-1]
+    heavy = rotor_speeds(pwm, vehicle, {"inertia": {"fraction": 0.5}}).angular_acceleration[-1]
     np.testing.assert_allclose(heavy, nominal / 1.5, rtol=1e-9)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_motor_lag_has_its_time_constant(vehicle, factor):
     pwm = np.r_[np.full(100, 30000.0), np.full(400, 45000.0)]
-    speed = ran(pwm, vehicle, {"motor_lag": {"factor": factor}}).rotor_speed[:, 0]
+    speed = rotor_speeds(pwm, vehicle, {"motor_lag": {"factor": factor}}).rotor_speed[:, 0]
     share = (speed - speed[0]) / (speed[-1] - speed[0])
-    when = 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 100)
-    assert when == pytest.approx(factor * vehicle.motor_time_constant_s, abs=0.003)
+    rise_s = 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 100)
+    assert rise_s == pytest.approx(factor * vehicle.motor_time_constant_s, abs=0.003)
 
 
 def test_motor_lag_may_differ_between_rise_and_fall(vehicle):
     pwm = np.r_[np.full(500, 45000.0), np.full(400, 30000.0)]
-    speed = ran(pwm, vehicle, {"motor_lag": {"factor": 1.0, "fall": 2.0}}).rotor_speed[:, 0]
+    speed = rotor_speeds(pwm, vehicle, {"motor_lag": {"factor": 1.0, "fall": 2.0}}).rotor_speed[:, 0]
     share = (speed - speed[0]) / (speed[-1] - speed[0])
     assert 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 500) == pytest.approx(0.12, abs=0.003)
 
@@ -86,8 +86,8 @@ def test_motor_lag_may_differ_between_rise_and_fall(vehicle):
 @pytest.mark.parametrize("delay", [0.0, 0.004, 0.013, 0.03])
 def test_actuator_delay_shifts_the_thrust(vehicle, delay):
     pwm = np.r_[np.full(100, 30000.0), np.full(400, 45000.0)]
-    early = ran(pwm, vehicle).rotor_speed[:, 0]
-    late = ran(pwm, vehicle, {"actuator_delay": {"delay": delay}}).rotor_speed[:, 0]
+    early = rotor_speeds(pwm, vehicle).rotor_speed[:, 0]
+    late = rotor_speeds(pwm, vehicle, {"actuator_delay": {"delay": delay}}).rotor_speed[:, 0]
     t = 0.002 * np.arange(500)
     half = 0.5 * (early[0] + early[-1])
     assert np.interp(half, late, t) - np.interp(half, early, t) == pytest.approx(delay, abs=0.0012)
@@ -98,8 +98,8 @@ def test_motor_noise_has_its_rms_and_colour(steady, names):
     rms, time = 0.05, 0.02
     values = {"rms": 0.0, **dict(zip(names, (rms, time), strict=True))}
     log = steady({"motor_noise": values, "controller_gain": {"rate": 0.7}})
-    quiet = steady()
-    force = log["acc_z_mps2"] - quiet["acc_z_mps2"].mean()
+    nominal = steady()
+    force = log["acc_z_mps2"] - nominal["acc_z_mps2"].mean()
     # four rotors each on their own: rms / 2 of the weight; the loop and 10 ms sampling change little
     assert force.std() == pytest.approx(9.81 * rms / 2, rel=0.2)
     lagged = np.corrcoef(force[:-1], force[1:])[0, 1]
@@ -117,24 +117,24 @@ def test_battery_solves_its_circuit(vehicle):
 
 def test_battery_sag_raises_the_command_with_the_square_of_the_voltage(steady, vehicle):
     log = steady({"battery_sag": {"charge": 0.5}})
-    scaled = vehicle.thrust(log.stack(PWM)).sum(1) * (log["vbat_V"] / vehicle.nominal_voltage_v) ** 2
-    assert scaled.mean() == pytest.approx(WEIGHT, rel=2e-3)
+    thrust = vehicle.thrust(log.stack(PWM)).sum(1) * (log["vbat_V"] / vehicle.nominal_voltage_v) ** 2
+    assert thrust.mean() == pytest.approx(WEIGHT, rel=2e-3)
     mean = log.stack(PWM).mean(1)
     assert mean[-100:].mean() > mean[:100].mean()
 
 
 @pytest.mark.parametrize("firmware", ["2026.08", "authors-2024-01"])
-def test_firmware_compensation_undoes_the_sag(quiet, steady, firmware):
+def test_firmware_compensation_undoes_the_sag(ideal, steady, firmware):
     """Its commands change less with the charge than the PWM that carries the same weight."""
     from dataclasses import replace
-    flown = replace(quiet, firmware=firmware)
-    full, empty = (steady({"battery_sag": {"charge": c}}, vehicle=flown) for c in (0.9, 0.2))
+    compensating = replace(ideal, firmware=firmware)
+    full, empty = (steady({"battery_sag": {"charge": c}}, vehicle=compensating) for c in (0.9, 0.2))
     for log in (full, empty):
-        scaled = flown.thrust(log.stack(PWM)).sum(1) * (log["vbat_V"] / flown.nominal_voltage_v) ** 2
-        assert scaled.mean() == pytest.approx(WEIGHT, rel=2e-3)
+        thrust = compensating.thrust(log.stack(PWM)).sum(1) * (log["vbat_V"] / compensating.nominal_voltage_v) ** 2
+        assert thrust.mean() == pytest.approx(WEIGHT, rel=2e-3)
         assert log["z_m"].std() < 0.02
     pwm = [log.stack(PWM).mean() for log in (full, empty)]
-    plant = prepare(flown, ())[0][0]
+    plant = prepare(compensating, ())[0][0]
     volts = [log["vbat_V"].mean() for log in (full, empty)]
 
     def command(p, v):

@@ -41,7 +41,7 @@ FILES = {
 
 
 @pytest.fixture
-def flown(tmp_path):
+def fly_columns(tmp_path):
     """Columns of a hover with the effect of that file, or with none."""
     def fly(name=None, **values):
         if name is None:
@@ -61,21 +61,21 @@ def hovering(columns, name, low=6.0, high=11.0):
     return columns[name][(t > low) & (t < high)]
 
 
-def test_an_old_battery_gives_less_voltage(flown):
-    little, much = (hovering(flown("own_battery", size=ohm), "vbat_V").mean() for ohm in (0.05, 0.15))
-    current = 85.0 * 4 * (0.0362 * 9.81 / 4) ** 1.5 / little  # power of a hover, W, over volts
-    assert little - much == pytest.approx(0.1 * current, rel=0.25)
+def test_an_old_battery_gives_less_voltage(fly_columns):
+    low_ohm_v, high_ohm_v = (hovering(fly_columns("own_battery", size=ohm), "vbat_V").mean() for ohm in (0.05, 0.15))
+    current = 85.0 * 4 * (0.0362 * 9.81 / 4) ** 1.5 / low_ohm_v  # power of a hover, W, over volts
+    assert low_ohm_v - high_ohm_v == pytest.approx(0.1 * current, rel=0.25)
 
 
-def test_a_gyro_that_reads_too_much_shows_a_turn_as_larger(flown):
+def test_a_gyro_that_reads_too_much_shows_a_turn_as_larger(fly_columns):
     """A body turns by what its attitude says; the gyro's integral over a tilt is larger by the share."""
     for share in (0.0, 0.4):
-        c = flown("own_gyro", size=share)
-        rate, shown = np.gradient(c["pitch_rad"], c["t_s"]), c["gyro_y_radps"]
+        c = fly_columns("own_gyro", size=share)
+        rate, gyro = np.gradient(c["pitch_rad"], c["t_s"]), c["gyro_y_radps"]
         air = slice(400, 1100)
         slow = np.ones(8) / 8.0
-        rate, shown = (np.convolve(x[air] - x[air].mean(), slow, "valid") for x in (rate, shown))
-        assert rate @ shown / (rate @ rate) == pytest.approx(1.0 + share, abs=0.12)
+        rate, gyro = (np.convolve(x[air] - x[air].mean(), slow, "valid") for x in (rate, gyro))
+        assert rate @ gyro / (rate @ rate) == pytest.approx(1.0 + share, abs=0.12)
 
 
 def lag_s(command, rpm):
@@ -84,23 +84,23 @@ def lag_s(command, rpm):
     return 0.01 * int(np.argmax([np.corrcoef(command[:len(command) - k or None], rpm[k:])[0, 1] for k in range(30)]))
 
 
-def test_one_motor_answers_late(flown):
-    plain, slow = flown(), flown("own_slow", size=0.08)
-    third = [lag_s(hovering(c, "m3_pwm"), hovering(c, "rpm_3")) for c in (plain, slow)]
-    first = [lag_s(hovering(c, "m1_pwm"), hovering(c, "rpm_1")) for c in (plain, slow)]
+def test_one_motor_answers_late(fly_columns):
+    nominal, slow = fly_columns(), fly_columns("own_slow", size=0.08)
+    third = [lag_s(hovering(c, "m3_pwm"), hovering(c, "rpm_3")) for c in (nominal, slow)]
+    first = [lag_s(hovering(c, "m1_pwm"), hovering(c, "rpm_1")) for c in (nominal, slow)]
     assert abs(third[0] - first[0]) <= 0.011 and third[1] - first[1] >= 0.03
 
 
-def test_one_motor_does_not_answer_to_small_changes(flown):
-    plain, zone = flown(), flown("own_zone", size=4000.0)
-    still = [np.mean(np.abs(np.diff(hovering(c, "rpm_3"))) < 0.5) for c in (plain, zone)]
-    other = [np.mean(np.abs(np.diff(hovering(c, "rpm_1"))) < 0.5) for c in (plain, zone)]
+def test_one_motor_does_not_answer_to_small_changes(fly_columns):
+    nominal, zone = fly_columns(), fly_columns("own_zone", size=4000.0)
+    still = [np.mean(np.abs(np.diff(hovering(c, "rpm_3"))) < 0.5) for c in (nominal, zone)]
+    other = [np.mean(np.abs(np.diff(hovering(c, "rpm_1"))) < 0.5) for c in (nominal, zone)]
     assert still[1] > 0.1 > 2 * max(still[0], *other)  # share of rows in which the speed stands
 
 
-def test_a_load_that_falls_onto_the_drone_half_way(flown):
-    loaded, plain = flown("own_load", size=0.05, since=7.0), flown()
-    pwm = [np.mean([hovering(c, f"m{i}_pwm", 5.0, 6.9).mean() for i in range(1, 5)]) for c in (plain, loaded)]
-    later = [np.mean([hovering(c, f"m{i}_pwm", 9.0, 11.0).mean() for i in range(1, 5)]) for c in (plain, loaded)]
+def test_a_load_that_falls_onto_the_drone_half_way(fly_columns):
+    with_load, nominal = fly_columns("own_load", size=0.05, since=7.0), fly_columns()
+    pwm = [np.mean([hovering(c, f"m{i}_pwm", 5.0, 6.9).mean() for i in range(1, 5)]) for c in (nominal, with_load)]
+    later = [np.mean([hovering(c, f"m{i}_pwm", 9.0, 11.0).mean() for i in range(1, 5)]) for c in (nominal, with_load)]
     assert pwm[0] == pytest.approx(pwm[1], abs=1.0)
     assert later[1] / later[0] - 1.0 > 0.05  # 14 % more weight

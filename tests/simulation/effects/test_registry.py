@@ -63,15 +63,15 @@ def test_every_parameter_says_what_it_is():
 @pytest.mark.parametrize("name", sorted(GAP_LIST))
 def test_strength_goes_to_zero_continuously(short, name):
     effect = effects.get(name)
-    plain = as_table(short())
+    nominal = as_table(short())
     off = short({name: effect.scaled(effect.values(), 0.0)})
-    np.testing.assert_array_equal(as_table(off), plain)
+    np.testing.assert_array_equal(as_table(off), nominal)
     if name == "packet_loss":
         return
     distance = []
     for strength in (1e-4, 1e-2):
         log = short({name: effect.scaled(effect.values(), strength)})
-        distance.append(np.max(np.abs(as_table(log) - plain) / (np.std(plain, axis=0) + 1e-3)))
+        distance.append(np.max(np.abs(as_table(log) - nominal) / (np.std(nominal, axis=0) + 1e-3)))
     assert 0.0 < distance[0] < 0.5, distance
 
 
@@ -81,11 +81,11 @@ def test_order_given_does_not_matter(short):
 
 
 def test_switching_an_effect_on_leaves_other_draws_alone(short):
-    one = as_table(short({"imu_noise": {"factor": 1.0}}))
-    np.testing.assert_array_equal(one, as_table(short()))
+    with_noise = as_table(short({"imu_noise": {"factor": 1.0}}))
+    np.testing.assert_array_equal(with_noise, as_table(short()))
 
 
-@pytest.mark.parametrize(("text", "said"), [
+@pytest.mark.parametrize(("text", "message"), [
     ("thunder:x=1", "no effect 'thunder'"),
     ("wind:x=0.3", "needs the unit m/s"),
     ("wind:x=0.3km/h", "needs the unit m/s"),
@@ -95,13 +95,13 @@ def test_switching_an_effect_on_leaves_other_draws_alone(short):
     ("weak_motor:rotor=2.5", "whole number"),
     ("wind:x", "parameter=value"),
 ])
-def test_bad_effects_get_one_clear_line(text, said):
-    with pytest.raises(AirTouchError, match=said) as error:
+def test_bad_effects_get_one_clear_line(text, message):
+    with pytest.raises(AirTouchError, match=message) as error:
         effects.parse(text)
     assert "\n" not in str(error.value)
 
 
-def test_command_line_form():
+def test_an_effect_on_the_command_line_is_its_name_and_values():
     assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147,
                                                              "lever": 0.0}
     assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0,
@@ -134,10 +134,10 @@ def test_an_effect_of_your_own_is_one_short_file(tmp_path, short, vehicle, signa
     path.write_text(OWN)
     (effect,) = effects.load_file(path)
     try:
-        pulled, plain = short({"magnet": {"force": 0.02}}), short()
-        more = vehicle.thrust(pulled.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1) - vehicle.thrust(
-            plain.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1)
-        assert more[150:].mean() > 0.001
+        pulled, nominal = short({"magnet": {"force": 0.02}}), short()
+        extra_thrust = vehicle.thrust(pulled.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1) - vehicle.thrust(
+            nominal.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1)
+        assert extra_thrust[150:].mean() > 0.001
         signals[:, at.HEIGHT] = 0.2
         force = replay.wrench_of(effects.activate({"magnet": {"force": 0.02}})[0], signals)
         np.testing.assert_allclose(force[:, 2], -0.01)

@@ -27,8 +27,8 @@ def test_the_sum_is_that_of_each_alone(signals):
     out = np.zeros((len(signals), 6))
     all_of(slots.slots(active, [generator(3, 0, a.effect.name) for a in active]), signals,
            np.zeros((slots.SLOTS, MEMORY)), out)
-    alone = sum(replay.wrench_of(a, signals, seed=3) for a in active)
-    np.testing.assert_allclose(out, alone, rtol=1e-12, atol=1e-15)
+    summed = sum(replay.wrench_of(a, signals, seed=3) for a in active)
+    np.testing.assert_allclose(out, summed, rtol=1e-12, atol=1e-15)
     assert np.abs(out).max() > 0.01
 
 

@@ -12,9 +12,9 @@ from airtouch.simulation.sensors import imu
 STEP_S = 1e-4
 
 
-def test_specific_force_is_the_second_derivative_of_the_sensors_place_plus_gravity(quiet):
+def test_specific_force_is_the_second_derivative_of_the_sensors_place_plus_gravity(ideal):
     """A vehicle that spins freely, its centre of mass 8 mm off: the sensor in the middle feels the spin."""
-    plants = from_vehicle(quiet)
+    plants = from_vehicle(ideal)
     plants["com"], plants["inertia"], plants["step"] = (0.006, -0.004, 0.003), (1.4e-5, 1.9e-5, 2.8e-5), STEP_S
     plant, record = plants[0], states.empty()[0]
     speed = hover_speed(plants)

@@ -14,18 +14,18 @@ def test_results_come_in_the_order_of_the_items():
 
 
 def test_no_more_is_out_than_asked():
-    out, most, taken = [], [], []
+    out, most, results = [], [], []
 
     def submit(item):
         future = Future()
         future.set_result(item)
         out.append(item)
-        most.append(len(out) - len(taken))
+        most.append(len(out) - len(results))
         return future
 
     for result in in_order(submit, iter(range(20)), 4):
-        taken.append(result)
-    assert taken == list(range(20)) and max(most) <= 5 and out[:4] == [0, 1, 2, 3]
+        results.append(result)
+    assert results == list(range(20)) and max(most) <= 5 and out[:4] == [0, 1, 2, 3]
 
 
 def test_what_waits_is_cancelled_when_one_fails_or_the_caller_stops():
@@ -39,7 +39,7 @@ def test_what_waits_is_cancelled_when_one_fails_or_the_caller_stops():
     assert [f.cancelled() for f in futures] == [False, False, True, True, False, False]
     futures = [Future() for _ in range(3)]
     futures[0].set_result(1)
-    stopped = in_order(lambda i: futures[i], range(3), 3)
-    next(stopped)
-    stopped.close()
+    unfinished = in_order(lambda i: futures[i], range(3), 3)
+    next(unfinished)
+    unfinished.close()
     assert futures[1].cancelled() and futures[2].cancelled()

@@ -29,8 +29,8 @@ def test_two_processes_write_what_one_does(tmp_path, vehicle):
                                  workers=workers))
         assert ended == [None] * 3
     for number in numbers:
-        one, two = (store.path_of(tmp_path / name, "short", 5, number) for name in "12")
-        assert one.read_bytes() == two.read_bytes()
-        flown = fly(scene, vehicle, 5, number, effects={"wind": {"x": 0.4}})
-        np.testing.assert_allclose(logs.read(one)["m1_pwm"], flown["m1_pwm"])
+        by_one, by_two = (store.path_of(tmp_path / name, "short", 5, number) for name in "12")
+        assert by_one.read_bytes() == by_two.read_bytes()
+        log = fly(scene, vehicle, 5, number, effects={"wind": {"x": 0.4}})
+        np.testing.assert_allclose(logs.read(by_one)["m1_pwm"], log["m1_pwm"])
     assert len(list((tmp_path / "2").glob("*"))) == 3

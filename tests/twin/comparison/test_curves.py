@@ -32,9 +32,9 @@ def curves_of(recorded, simulated):
 
 def test_edges_are_taken_against_the_level_before_the_entry():
     recorded = [flight(level, lift) for level, lift in ((5, 1), (7, 2), (9, 6))]
-    found = curves_of(recorded, [flight(0, 3)] * 3)
-    assert list(found.edges) == ["low"]
-    real, fake = found.edges["low"]["entry"]
+    result = curves_of(recorded, [flight(0, 3)] * 3)
+    assert list(result.edges) == ["low"]
+    real, fake = result.edges["low"]["entry"]
     assert (real.flights, fake.flights) == (3, 3)
     before, after = real.quartiles[:, curves.BEFORE - 1, 0], real.quartiles[:, curves.BEFORE, 0]
     assert before == pytest.approx([0, 0, 0]) and after == pytest.approx([1.5, 2, 4])  # of 1, 2 and 6
@@ -42,8 +42,8 @@ def test_edges_are_taken_against_the_level_before_the_entry():
 
 
 def test_a_height_class_that_one_side_lacks_is_left_out():
-    found = curves_of([flight(0, 1, 0.04), flight(0, 1, 0.05)] * 2, [flight(0, 1, 0.05)] * 3)
-    assert list(found.edges) == ["mid"]
+    curves = curves_of([flight(0, 1, 0.04), flight(0, 1, 0.05)] * 2, [flight(0, 1, 0.05)] * 3)
+    assert list(curves.edges) == ["mid"]
 
 
 def test_the_overlaid_flight_has_the_median_time_over_the_platform():

@@ -16,22 +16,22 @@ from twin_courses import PLAIN, made_course
 pytestmark = needs("sklearn")
 
 
-def flown(fly_course, count, seed, effects=PLAIN, **options):
+def fly(fly_course, count, seed, effects=PLAIN, **options):
     out = []
     for number in range(count):
         log = fly_course(made_course(number, 0.06), effects, number, seed, **options)
         try:
-            read = course(log) if log is not None else None
+            sweep = course(log) if log is not None else None
         except AirTouchError:
-            read = None
-        if read is not None:
-            out.append((channels(log), read, number))
+            sweep = None
+        if sweep is not None:
+            out.append((channels(log), sweep, number))
     return out
 
 
 @pytest.fixture(scope="module")
 def some(fly_course):
-    return flown(fly_course, 40, 3)
+    return fly(fly_course, 40, 3)
 
 
 def test_area_is_that_of_the_rank_sum_test():
@@ -52,36 +52,36 @@ def test_area_within_folds_does_not_compare_folds():
 def test_two_halves_of_one_set_cannot_be_told_apart(some):
     """Other courses, other seeds: the 95 % interval of most phases holds 0.5, none is far off."""
     real, fake = windows(some[0::2]), windows([(x, c, n + 1000) for x, c, n in some[1::2]])
-    found = {a.phase: a for a in two_sample(real, fake)}
-    print(*found.values(), sep="\n")
-    assert {"hover", "cruise", "over", "after"} <= set(found)
-    values = [a.value for a in found.values()]
+    by_phase = {a.phase: a for a in two_sample(real, fake)}
+    print(*by_phase.values(), sep="\n")
+    assert {"hover", "cruise", "over", "after"} <= set(by_phase)
+    values = [a.value for a in by_phase.values()]
     assert np.mean(values) == pytest.approx(0.5, abs=0.1)
     assert 0.25 < min(values) and max(values) < 0.75
-    assert sum(a.low <= 0.5 <= a.high for a in found.values()) >= 4
+    assert sum(a.low <= 0.5 <= a.high for a in by_phase.values()) >= 4
 
 
 def test_other_noise_and_other_air_are_told_apart(some, fly_course, vehicle):
     noisy = replace(vehicle, gyro_noise_rms_radps=2.0 * vehicle.gyro_noise_rms_radps)
-    other = flown(fly_course, 16, 4, {**PLAIN, "ground_effect": {"strength": 2.5, "turbulence": 1.0}}, craft=noisy)
-    found = {a.phase: a for a in two_sample(windows(some), windows(other))}
-    print(*found.values(), sep="\n")
-    assert found["hover"].value > 0.9 and found["over"].value > 0.9
-    assert "gyro" in found["hover"].telling[0]
-    for a in found.values():
+    other = fly(fly_course, 16, 4, {**PLAIN, "ground_effect": {"strength": 2.5, "turbulence": 1.0}}, craft=noisy)
+    by_phase = {a.phase: a for a in two_sample(windows(some), windows(other))}
+    print(*by_phase.values(), sep="\n")
+    assert by_phase["hover"].value > 0.9 and by_phase["over"].value > 0.9
+    assert "gyro" in by_phase["hover"].telling[0]
+    for a in by_phase.values():
         assert a.low <= a.value <= a.high
 
 
 def test_windows_stay_in_their_phase_and_flight(some):
-    made = windows(some[:3])
-    assert made.values.shape == (len(made.phase), len(feature_names()))
-    assert np.isfinite(made.values).all()
-    assert set(made.flight) == {n for _, _, n in some[:3]}
+    features = windows(some[:3])
+    assert features.values.shape == (len(features.phase), len(feature_names()))
+    assert np.isfinite(features.values).all()
+    assert set(features.flight) == {n for _, _, n in some[:3]}
 
 
 def test_trims_do_not_tell(some):
     """A constant on a motor channel changes no window."""
-    x, read, number = some[0]
-    shifted = x + np.r_[np.zeros(6), [500.0, -300.0, 200.0, 1000.0], np.zeros(2)]
-    np.testing.assert_allclose(windows([(shifted, read, number)]).values, windows([(x, read, number)]).values,
+    x, sweep, number = some[0]
+    trimmed = x + np.r_[np.zeros(6), [500.0, -300.0, 200.0, 1000.0], np.zeros(2)]
+    np.testing.assert_allclose(windows([(trimmed, sweep, number)]).values, windows([(x, sweep, number)]).values,
                                atol=1e-6)

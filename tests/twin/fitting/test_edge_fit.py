@@ -25,8 +25,8 @@ def chosen(vehicle):
                  if lever.name in LEVERS or lever.name == "mission.height_m")
 
 
-def values_of(chosen, which, height_m=0.0):
-    return np.array([height_m if lever.of == "mission" else LEVERS[lever.name][which] for lever in chosen])
+def values_of(chosen, index, height_m=0.0):
+    return np.array([height_m if lever.of == "mission" else LEVERS[lever.name][index] for lever in chosen])
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +35,12 @@ def aim(vehicle, chosen):
     for i in range(48):
         log = fly.fly(made_course(i, HEIGHTS_M[i % 6]), vehicle, chosen, values_of(chosen, 0), 11, i, FIXED)
         try:
-            flown = None if isinstance(log, Diverged) else course(log)
+            sweep = None if isinstance(log, Diverged) else course(log)
         except AirTouchError:
             continue
-        if flown:
-            courses.append(flown)
-            numbers.append(features(log, flown))
+        if sweep:
+            courses.append(sweep)
+            numbers.append(features(log, sweep))
     assert len(courses) >= 36
     return fit.target_of(courses, np.array(numbers))
 
@@ -51,11 +51,11 @@ def test_levers_at_edges_come_back(aim, vehicle, chosen):
     One wrong reading in 40 a second tells little beside the ridge: it comes nearer, no more.
     """
     low = float(np.median([0.8 - c.cruise_m for c in aim.courses]))  # a course is flown at the height that was logged
-    found = edge_fit.refine(aim, vehicle, chosen, values_of(chosen, 1, low), flights=36, fixed=FIXED)
-    print(found.misfit)
-    assert found.misfit[0] > min(found.misfit[1:])
+    result = edge_fit.refine(aim, vehicle, chosen, values_of(chosen, 1, low), flights=36, fixed=FIXED)
+    print(result.misfit)
+    assert result.misfit[0] > min(result.misfit[1:])
     both = values_of(chosen, 0, low), values_of(chosen, 1, low)
-    for lever, value, truth, start in zip(chosen, found.values, *both, strict=True):
+    for lever, value, truth, start in zip(chosen, result.values, *both, strict=True):
         print(f"{lever.name}: start {start:.4g}, truth {truth:.4g}, fitted {value:.4g}, a step is {lever.step:.4g}")
         allowed = {"residual": lever.step, "kick": 0.8 * abs(start - truth)}.get(lever.key, 1.5 * lever.step)
         assert abs(value - truth) <= allowed + 1e-9, lever.name
@@ -68,5 +68,5 @@ def test_every_height_has_as_many_flights():
     heights = [courses[i].clearance_m for i in of]
     assert [heights.count(h) for h in (0.02, 0.05, 0.09)] == [10, 10, 10]
     assert len(set(of)) == 12
-    one = edge_fit.balanced(courses[:9], 18, np.random.default_rng(0))
-    assert sorted(one.tolist()) == sorted(2 * list(range(9)))
+    drawn_courses = edge_fit.balanced(courses[:9], 18, np.random.default_rng(0))
+    assert sorted(drawn_courses.tolist()) == sorted(2 * list(range(9)))

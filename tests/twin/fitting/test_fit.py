@@ -54,41 +54,41 @@ def truth(aim):
 
 
 @pytest.fixture(scope="module")
-def fitted(aim, vehicle, chosen):
+def fit_result(aim, vehicle, chosen):
     return fit.fit(aim, vehicle, chosen, rounds=7, flights=120, fixed=FIXED, seed=5)
 
 
-def test_withheld_levers_are_recovered(fitted, chosen, truth):
+def test_withheld_levers_are_recovered(fit_result, chosen, truth):
     """Within 1.5 of a lever's step (a tenth of the lag, ...), from up to four steps off."""
-    for lever, value in zip(chosen, fitted.values, strict=True):
+    for lever, value in zip(chosen, fit_result.values, strict=True):
         off = (value - truth[lever.name]) / lever.step
         print(f"{lever.name}: start {lever.start:.4g}, truth {truth[lever.name]:.4g}, fitted {value:.4g} "
               f"({off:+.2f} steps)")
         assert abs(off) < 1.5, lever.name
 
 
-def test_the_best_round_is_the_one_with_the_least_misfit(fitted):
+def test_the_best_round_is_the_one_with_the_least_misfit(fit_result):
     def total(h):
         return sum((fit.GROUP_WEIGHT[name] * off) ** 2 for name, off in h["misfit"].items())
-    entry = next(h for h in fitted.history if h["values"] == fit.best(fitted).tolist())
-    assert total(entry) == min(map(total, fitted.history)) < total(fitted.history[0])
+    entry = next(h for h in fit_result.history if h["values"] == fit.best(fit_result).tolist())
+    assert total(entry) == min(map(total, fit_result.history)) < total(fit_result.history[0])
 
 
-def test_misfit_falls(fitted):
-    first, last = fitted.history[0]["misfit"], fitted.history[-1]["misfit"]
+def test_a_fit_lowers_the_misfit_of_spectra_and_coherency(fit_result):
+    first, last = fit_result.history[0]["misfit"], fit_result.history[-1]["misfit"]
     assert last["spectrum"] < 0.6 * first["spectrum"]
     assert last["coherency"] < 0.6 * first["coherency"]
 
 
 def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, tmp_path):
     settings = {"flights": 24, "fixed": FIXED, "seed": 2}
-    whole = fit.fit(aim, vehicle, chosen, rounds=3, **settings)
+    uninterrupted = fit.fit(aim, vehicle, chosen, rounds=3, **settings)
     fit.fit(aim, vehicle, chosen, rounds=1, state_file=tmp_path / "fit.json", **settings)
-    told = []
+    progress_calls = []
     resumed = fit.fit(aim, vehicle, chosen, rounds=3, state_file=tmp_path / "fit.json",
-                      progress=lambda done, total, misfit: told.append(done), **settings)
-    assert told == [2, 3]
-    np.testing.assert_array_equal(resumed.values, whole.values)
+                      progress=lambda count, total, misfit: progress_calls.append(count), **settings)
+    assert progress_calls == [2, 3]
+    np.testing.assert_array_equal(resumed.values, uninterrupted.values)
 
 
 def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
@@ -99,16 +99,16 @@ def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
 
 def test_a_fit_of_other_flights_is_refused(aim, vehicle, chosen, tmp_path):
     """One flight more, or another vehicle, is another fit."""
-    kept = tmp_path / "fit.json"
+    path = tmp_path / "fit.json"
     fit.fit(fit.Target(aim.courses[:-1], aim.features[:-1], aim.scatter), vehicle, chosen, rounds=1, flights=48,
-            state_file=kept)
+            state_file=path)
     with pytest.raises(AirTouchError, match="other flights"):
-        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=kept)
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=path)
     keys = {fit.key(aim, vehicle, chosen), fit.key(aim, replace(vehicle, mass_kg=0.05), chosen),
             fit.key(aim, vehicle, chosen, seed=1), fit.key(aim, vehicle, chosen[1:])}
     assert len(keys) == 4
-    moved = fit.Target([replace(c, source="elsewhere") for c in aim.courses], aim.features, aim.scatter)
-    assert fit.key(moved, vehicle, chosen) == fit.key(aim, vehicle, chosen)
+    elsewhere = fit.Target([replace(c, source="elsewhere") for c in aim.courses], aim.features, aim.scatter)
+    assert fit.key(elsewhere, vehicle, chosen) == fit.key(aim, vehicle, chosen)
 
 
 def test_regression_is_least_squares():
@@ -116,10 +116,10 @@ def test_regression_is_least_squares():
     rng = np.random.default_rng(0)
     true, offset = rng.normal(size=(len(names()), 3)), rng.normal(size=len(names()))
     steps, centre = np.array([0.1, 2.0, 5.0]), np.array([1.0, 10.0, -5.0])
-    drawn = centre + steps * rng.standard_normal((400, 3))
-    apart = offset + (drawn - centre) / steps @ true.T + 0.05 * rng.standard_normal((400, len(names())))
-    apart[rng.random(apart.shape[0]) < 0.3, 7] = np.nan
-    jacobian, gap, variance = fit.regression(drawn, apart, centre, steps, 200)
+    lever_values = centre + steps * rng.standard_normal((400, 3))
+    feature_values = offset + (lever_values - centre) / steps @ true.T + 0.05 * rng.standard_normal((400, len(names())))
+    feature_values[rng.random(feature_values.shape[0]) < 0.3, 7] = np.nan
+    jacobian, gap, variance = fit.regression(lever_values, feature_values, centre, steps, 200)
     np.testing.assert_allclose(jacobian, true, atol=0.12)
     np.testing.assert_allclose(gap, offset, atol=0.05)
     assert np.median(variance) == pytest.approx(0.05**2 / 200, rel=0.8)  # the ridge adds some
@@ -131,9 +131,9 @@ def test_levers_are_those_of_the_registry(vehicle):
     levers.table(listed, levers.starts(listed))
     for lever in listed:
         assert lever.low <= lever.start <= lever.high and lever.step > 0, lever.name
-    wrong = (*listed, levers.Lever("gust", "colour", 0.0, 0.0, 1.0, 0.1, "1"))
+    with_unknown = (*listed, levers.Lever("gust", "colour", 0.0, 0.0, 1.0, 0.1, "1"))
     with pytest.raises(AirTouchError, match="gust has no parameter colour"):
-        levers.table(wrong, levers.starts(wrong))
+        levers.table(with_unknown, levers.starts(with_unknown))
 
 
 def test_craft_sets_fields_and_axes(vehicle):
@@ -142,5 +142,5 @@ def test_craft_sets_fields_and_axes(vehicle):
     vehicle = replace(vehicle, rotor_inertia_kg_m2=levers.ROTOR_INERTIA, acc_lowpass_hz=levers.ACC_LOWPASS_HZ)
     assert levers.craft(vehicle, chosen, values) == vehicle
     values[[v.key for v in chosen].index("gyro_noise_ratio.2")] = 0.7
-    changed = levers.craft(vehicle, chosen, values)
-    assert changed == replace(vehicle, gyro_noise_ratio=(*vehicle.gyro_noise_ratio[:2], 0.7))
+    adjusted = levers.craft(vehicle, chosen, values)
+    assert adjusted == replace(vehicle, gyro_noise_ratio=(*vehicle.gyro_noise_ratio[:2], 0.7))

@@ -25,27 +25,27 @@ def noise_log(log, motors, rates):
 
 
 @pytest.fixture(scope="module")
-def long_flight(made):
+def long_flight(sweeps):
     """A flight of 80 s of free air: the first one, stretched by repeating its hover."""
-    log, read = made[0][1], course(made[0][1])
-    piece = np.arange(read.level + 120, read.level + 420)
-    order = np.r_[np.arange(read.level + 420), np.tile(piece, 26), np.arange(read.level + 420, len(log))]
+    log, sweep = sweeps[0][1], course(sweeps[0][1])
+    piece = np.arange(sweep.level + 120, sweep.level + 420)
+    order = np.r_[np.arange(sweep.level + 420), np.tile(piece, 26), np.arange(sweep.level + 420, len(log))]
     extra = 26 * 300
     stretched = log.with_columns({k: v[order] for k, v in log.columns.items()})
-    return stretched, replace(read, step=read.step + extra, entry=read.entry + extra, exit=read.exit + extra,
-                              landing=read.landing + extra)
+    return stretched, replace(sweep, step=sweep.step + extra, entry=sweep.entry + extra, exit=sweep.exit + extra,
+                              landing=sweep.landing + extra)
 
 
 def test_spectra_are_scipys_of_the_calm_half(long_flight):
     """SciPy's spectrogram, averaged over the half of the blocks with the least roll and pitch rate."""
-    log, read = long_flight
+    log, sweep = long_flight
     rng = np.random.default_rng(0)
     rates = {f"gyro_{axis}_radps": np.deg2rad(rng.normal(0.0, 3.0, len(log))) for axis in "xy"}
-    values = features(log.with_columns(rates), read)
-    f, _, density = spectrogram(channels(log.with_columns(rates))[read.free], fs=100.0, window=np.hanning(LENGTH),
+    values = features(log.with_columns(rates), sweep)
+    f, _, density = spectrogram(channels(log.with_columns(rates))[sweep.free], fs=100.0, window=np.hanning(LENGTH),
                                 nperseg=LENGTH, noverlap=LENGTH - LENGTH // 2, detrend="linear", axis=0)
-    moved = density[:, [ch.GYRO_X, ch.GYRO_Y]].sum(axis=(0, 1))
-    calm = density[..., np.argsort(moved)[:(len(moved) + 1) // 2]].mean(axis=-1)
+    motion = density[:, [ch.GYRO_X, ch.GYRO_Y]].sum(axis=(0, 1))
+    calm = density[..., np.argsort(motion)[:(len(motion) + 1) // 2]].mean(axis=-1)
     scale = 10 * np.log10(100.0 * (np.hanning(LENGTH) ** 2).sum() / 2.0)  # one-sided density to |FFT|^2
     for k, name in ((ch.GYRO_X, "gyro x"), (ch.YAW, "motor yaw")):
         for a, b in BANDS_HZ[1:-1]:
@@ -55,22 +55,23 @@ def test_spectra_are_scipys_of_the_calm_half(long_flight):
 
 def test_coherency_has_the_phase_of_a_delay(long_flight):
     """The rate follows the command by 30 ms: coherency e^(-i w 30 ms) while it is whole."""
-    log, read = long_flight
+    log, sweep = long_flight
     rng = np.random.default_rng(1)
     command = rng.normal(0.0, 800.0, len(log))
-    values = features(noise_log(log, command, 0.01 * np.roll(command, 3)), read)
+    values = features(noise_log(log, command, 0.01 * np.roll(command, 3)), sweep)
     assert PAIRS[0] == (ch.GYRO_X, ch.ROLL)
     for a, b in BANDS_HZ[1:6]:
-        got = complex(*(values[NAMES.index(f"gyro x with motor roll {a:g}-{b:g} Hz {part}")] for part in ("re", "im")))
+        real, imaginary = (values[NAMES.index(f"gyro x with motor roll {a:g}-{b:g} Hz {part}")]
+                           for part in ("re", "im"))
         f = np.fft.rfftfreq(LENGTH, 0.01)
         w = 2 * np.pi * f[(f >= a) & (f < b)]
-        assert got == pytest.approx(np.exp(-1j * w * 0.03).mean(), abs=0.08)
+        assert complex(real, imaginary) == pytest.approx(np.exp(-1j * w * 0.03).mean(), abs=0.08)
 
 
 def test_channels_that_have_nothing_to_do_with_each_other_are_incoherent(long_flight):
-    log, read = long_flight
+    log, sweep = long_flight
     rng = np.random.default_rng(2)
-    values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rng.normal(0.0, 3.0, len(log))), read)
+    values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rng.normal(0.0, 3.0, len(log))), sweep)
     some = [values[k] for k in rows("coherency") if NAMES[k].startswith("gyro x with motor roll")]
     f, cross = csd(rng.normal(size=4000), rng.normal(size=4000), fs=100.0, nperseg=LENGTH)
     assert np.abs(some).mean() < 0.1 and len(f) == len(cross)
@@ -78,41 +79,41 @@ def test_channels_that_have_nothing_to_do_with_each_other_are_incoherent(long_fl
 
 def test_spectra_are_those_of_the_calm_half_of_a_hover(long_flight):
     """A push by hand in one block of three, twenty times as strong as the air, changes no spectrum by 2 dB."""
-    log, read = long_flight
+    log, sweep = long_flight
     rng = np.random.default_rng(3)
     rate, command = rng.normal(0.0, 3.0, len(log)), rng.normal(0.0, 800.0, len(log))
     pushed = rate.copy()
-    pushed[read.free.start + 2 * LENGTH::6 * LENGTH] += 400.0
-    calm, steered = (features(noise_log(log, command, r), read) for r in (rate, pushed))
+    pushed[sweep.free.start + 2 * LENGTH::6 * LENGTH] += 400.0
+    calm, steered = (features(noise_log(log, command, r), sweep) for r in (rate, pushed))
     some = [k for k in rows("spectrum") if NAMES[k].startswith("gyro x")]
     assert np.abs(steered[some] - calm[some]).max() < 2.0
 
 
-def test_edge_means_are_those_of_the_channels(made):
-    _, log, _ = made[1]
-    read = course(log)
-    x, values = channels(log), features(log, read)
-    level = x[read.entry - 100:read.entry - 40].mean(axis=0)
-    name = height_class(read.clearance_m)
+def test_edge_means_are_those_of_the_channels(sweeps):
+    _, log, _ = sweeps[1]
+    sweep = course(log)
+    x, values = channels(log), features(log, sweep)
+    level = x[sweep.entry - 100:sweep.entry - 40].mean(axis=0)
+    name = height_class(sweep.clearance_m)
     for a, b in BINS_S[:6]:
-        part = x[read.entry + round(100 * a):read.entry + round(100 * b)].mean(axis=0)
+        part = x[sweep.entry + round(100 * a):sweep.entry + round(100 * b)].mean(axis=0)
         az = values[next(k for k in rows("entry") if NAMES[k] == f"{name} az {a:+g}..{b:+g} s")]
         down = values[next(k for k in rows("entry") if NAMES[k] == f"{name} down range {a:+g}..{b:+g} s")]
         assert az == pytest.approx(part[ch.AZ] - level[ch.AZ], abs=1e-9)
         assert down == pytest.approx(part[ch.DOWN], abs=1e-9)
-    others = [k for k in rows("entry") if not NAMES[k].startswith(name)]
-    assert np.isnan(values[others]).all()
+    other_names = [k for k in rows("entry") if not NAMES[k].startswith(name)]
+    assert np.isnan(values[other_names]).all()
 
 
 def test_height_classes_cover_what_flies():
     assert [height_class(h) for h in (0.01, 0.05, 0.08, 0.5)] == [*CLASSES, None]
 
 
-def test_hover_level_and_slope(made):
-    _, log, _ = made[0]
-    read = course(log)
+def test_hover_level_and_slope(sweeps):
+    _, log, _ = sweeps[0]
+    sweep = course(log)
     t = np.arange(len(log)) * 0.01
     ramp = log.with_columns({f"m{i}_pwm": 40000.0 + 70.0 * t for i in range(1, 5)})
-    values = features(ramp, read)
+    values = features(ramp, sweep)
     assert values[NAMES.index("hover PWM slope")] == pytest.approx(70.0, rel=1e-6)
     assert values[NAMES.index("trim motor roll")] == pytest.approx(0.0, abs=1e-6)

@@ -11,25 +11,25 @@ from airtouch.twin.recorded.features import names
 
 
 @pytest.fixture(scope="module")
-def folder(made, tmp_path_factory):
+def folder(sweeps, tmp_path_factory):
     """Six usable flights in folds 0 and 1, one without a down range in fold 1, and their manifest."""
     out = tmp_path_factory.mktemp("flights")
     rows = ["file,use,fold,speed_mps"]
-    for i, (course, log, _) in enumerate(made[:6]):
+    for i, (course, log, _) in enumerate(sweeps[:6]):
         logs.write(log, out / f"f{i}.csv.gz")
         rows.append(f"f{i}.csv.gz,clean,{i % 2},{course.speed_mps}")
-    blind = made[6][1]
+    blind = sweeps[6][1]
     logs.write(FlightLog({k: v for k, v in blind.columns.items() if k != "zrange_m"}, blind.meta), out / "blind.csv.gz")
     (out / "manifest.csv").write_text("\n".join([*rows, "blind.csv.gz,clean,1,0.3"]) + "\n")
     return out
 
 
-def test_every_usable_flight_has_a_course_channels_and_features(folder, made):
+def test_every_usable_flight_has_a_course_channels_and_features(folder, sweeps):
     steps = []
-    recorded = flights.read([folder], progress=lambda done, total: steps.append((done, total)))
+    recorded = flights.read([folder], progress=lambda count, total: steps.append((count, total)))
     assert len(recorded.courses) == len(recorded.channels) == len(recorded.features) == 6
     assert recorded.features.shape == (6, len(names())) and recorded.channels[0].shape[1] == 12
-    assert [c.speed_mps for c in recorded.courses] == pytest.approx([c.speed_mps for c, _, _ in made[:6]])
+    assert [c.speed_mps for c in recorded.courses] == pytest.approx([c.speed_mps for c, _, _ in sweeps[:6]])
     (path, reason), = recorded.left_out
     assert path.endswith("blind.csv.gz") and "no down range in this log" in reason
     assert steps[-1] == (7, 7) and np.isfinite([c.clearance_m for c in recorded.courses]).all()

@@ -17,7 +17,7 @@ BIAS = {"near": -0.05, "fade": 0.055, "delay": 0.035, "dip": 0.0}
 
 
 @pytest.fixture(scope="module")
-def flown(vehicle):
+def platform_flights(vehicle):
     """Flights 2.5 to 10 cm over one platform, whose down range reads as BIAS says."""
     steady = replace(vehicle, range_drift_rms=0.004)  # as the twin of the authors' flights has it, or less
     out = []
@@ -35,24 +35,24 @@ def flown(vehicle):
     return out
 
 
-def test_height_of_the_platform_comes_back(flown):
+def test_height_of_the_platform_comes_back(platform_flights):
     """Within 8 mm and nearer than the steps of the down range alone;
     the error near the platform within 1.2 cm of its 1.7 to 2.9."""
-    found = near_range.measure(*zip(*flown, strict=True))
-    steps = np.array([c.before_m - c.entered_m for c, _ in flown])
-    print(found, np.median(steps))
-    assert found.top_m == pytest.approx(TOP, abs=0.008)
-    assert abs(found.top_m - TOP) < 0.7 * abs(np.median(steps) - TOP)
+    height = near_range.measure(*zip(*platform_flights, strict=True))
+    steps = np.array([c.before_m - c.entered_m for c, _ in platform_flights])
+    print(height, np.median(steps))
+    assert height.top_m == pytest.approx(TOP, abs=0.008)
+    assert abs(height.top_m - TOP) < 0.7 * abs(np.median(steps) - TOP)
     for distance in (0.03, 0.06):
-        error = found.near * np.exp(-distance / found.fade)
+        error = height.near * np.exp(-distance / height.fade)
         assert error == pytest.approx(BIAS["near"] * np.exp(-distance / BIAS["fade"]), abs=0.012)
 
 
-def test_two_platforms_or_too_few_flights_are_not_measured(flown):
-    courses, shapes = zip(*flown, strict=True)
+def test_two_platforms_or_too_few_flights_are_not_measured(platform_flights):
+    courses, shapes = zip(*platform_flights, strict=True)
     assert near_range.measure(courses[:3], shapes[:3]) is None
-    apart = [replace(c, before_m=c.before_m + 0.1 * (i % 2)) for i, c in enumerate(courses)]
-    assert near_range.measure(apart, shapes) is None
+    two_places = [replace(c, before_m=c.before_m + 0.1 * (i % 2)) for i, c in enumerate(courses)]
+    assert near_range.measure(two_places, shapes) is None
 
 
 def test_a_known_top_is_flown():

@@ -17,44 +17,44 @@ from twin_courses import PLAIN, made_course
 @pytest.fixture(scope="module")
 def pulsing(fly_course):
     """Six flights with pulses of 0.2 m/s backwards every 0.52 s in the hover: (course read, log)."""
-    found = []
+    flights = []
     for number in range(6):
         planned = made_course(number, 0.06)
         log = fly_course(planned, PLAIN, number, pulse_mps=-0.2, pulse_s=0.52)
         if log is not None:
-            found.append((course(log), log))
-    assert len(found) >= 5
-    return found
+            flights.append((course(log), log))
+    assert len(flights) >= 5
+    return flights
 
 
 def test_their_period_is_read_off_the_log(pulsing):
-    periods = [read.pulse_s for read, _ in pulsing]
+    periods = [measured.pulse_s for measured, _ in pulsing]
     print(periods)
     assert np.abs(np.array(periods) - 0.52).max() < 0.01
 
 
-def test_flights_without_pulses_have_none(made):
-    assert [course(log).pulse_s for _, log, _ in made] == [0.0] * len(made)
+def test_flights_without_pulses_have_none(sweeps):
+    assert [course(log).pulse_s for _, log, _ in sweeps] == [0.0] * len(sweeps)
 
 
-def test_they_move_the_drone(pulsing, made):
+def test_they_move_the_drone(pulsing, sweeps):
     """The pitch rate of the hover swings by more than 1.3 times what it does without pulses."""
-    def swing(read, log):
-        return np.std(log["gyro_y_radps"][read.phases()["hover"]])
-    with_pulses = np.median([swing(read, log) for read, log in pulsing])
-    assert with_pulses > 1.3 * np.median([swing(course(log), log) for _, log, _ in made])
+    def swing(measured, log):
+        return np.std(log["gyro_y_radps"][measured.phases()["hover"]])
+    with_pulses = np.median([swing(measured, log) for measured, log in pulsing])
+    assert with_pulses > 1.3 * np.median([swing(course(log), log) for _, log, _ in sweeps])
 
 
 def test_recorded_flights(flights):
     """Of folds 0 to 2 more than half have pulses, all with one period."""
     with open(flights / "airtouch" / "manifest.csv") as file:
         rows = [r for r in csv.DictReader(file) if r["use"] == "clean" and r["fold"] in "012"]
-    found = []
+    periods = []
     for row in rows:
-        read = course(logs.read(flights / "airtouch" / row["file"]))
-        found.append(read.pulse_s)
-    some = np.array([p for p in found if p])
-    print(f"{len(some)} of {len(found)} flights, {some.min():.3f} to {some.max():.3f} s")
+        measured = course(logs.read(flights / "airtouch" / row["file"]))
+        periods.append(measured.pulse_s)
+    some = np.array([p for p in periods if p])
+    print(f"{len(some)} of {len(periods)} flights, {some.min():.3f} to {some.max():.3f} s")
     assert 25 <= len(some) <= 40
     assert np.abs(some - 0.521).max() < 0.006
 
