@@ -77,9 +77,9 @@ def test_an_edge_at_9_cm_must_be_harder_than_at_4_cm(job, monkeypatch):
                                                                       (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
                                                                       (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
 def test_errors_by_angle_are_judged_by_their_trend_and_by_side(job, monkeypatch, at_20, at_minus_20, trend, sides):
-    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, at_minus_20))
-            for s in flights(error, height="low", angle_deg=angle)]
-    monkeypatch.setattr(recorded, "scores", lambda _, name: (some, folds()))
+    scores = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, at_minus_20))
+              for s in flights(error, height="low", angle_deg=angle)]
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (scores, folds()))
     figure = conditions.by_angle(job)
     assert (verdict(figure, "angle"), verdict(figure, "angle-sides")) == (trend, sides)
 
@@ -138,9 +138,9 @@ def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
     collection = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
     monkeypatch.setattr(recorded.dataset, "collect", lambda _: collection)
     assert recorded.files(Job(tmp_path, tmp_path)) == collection
-    some = recorded.files(Job(tmp_path, tmp_path, quick=True))
-    count = [sum(f.condition.fold == fold for f in some) for fold in range(5)]
-    assert count == [9, 6, 6, 6, 6] and len({f.path for f in some}) == 33
+    quick = recorded.files(Job(tmp_path, tmp_path, quick=True))
+    count = [sum(f.condition.fold == fold for f in quick) for fold in range(5)]
+    assert count == [9, 6, 6, 6, 6] and len({f.path for f in quick}) == 33
 
 
 @pytest.mark.parametrize(("shortest", "resolution"),

@@ -140,9 +140,9 @@ def test_missed_edges_are_counted_by_height():
 
 def test_false_edges_are_counted_by_place():
     edges = (EdgeScore("entry", 100), EdgeScore("exit", 200))
-    some = [FlightScore("a", Condition(), edges, (20, 90, 150, 200, 300, 400), 6, 30.0),
+    scores = [FlightScore("a", Condition(), edges, (20, 90, 150, 200, 300, 400), 6, 30.0),
             FlightScore("b", Condition(), edges, (), 0, 30.0), FlightScore("c", Condition(), (), (5,), 1, 30.0)]
-    assert labelled_flights.false_by_place(some) == "3 / 1 / 3"
+    assert labelled_flights.false_by_place(scores) == "3 / 1 / 3"
 
 
 def test_smaller_draws_lie_within_larger_ones():

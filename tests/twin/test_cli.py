@@ -92,13 +92,13 @@ def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
         assert "\n" not in message
         return message
 
-    some = [log for _, log, _ in sweeps[:5]]
-    assert "4 are needed: fly straight over" in refusal("few", some[:2])
-    blind = [FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta) for log in some]
+    flights = [log for _, log, _ in sweeps[:5]]
+    assert "4 are needed: fly straight over" in refusal("few", flights[:2])
+    blind = [FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta) for log in flights]
     assert "no down range in this log; log range.zrange" in refusal("blind", blind)
-    assert "hover 5 s" in refusal("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
-    other = FlightLog(some[0].columns, {**some[0].meta, "vehicle": "quadrotor-450"})
-    assert "two vehicles" in refusal("two", [*some, other])
+    assert "hover 5 s" in refusal("hurried", [log.slice(course(log).entry - 100, len(log)) for log in flights])
+    other = FlightLog(flights[0].columns, {**flights[0].meta, "vehicle": "quadrotor-450"})
+    assert "two vehicles" in refusal("two", [*flights, other])
 
 
 def test_the_help_of_twin_says_what_to_fly_and_how_to_go_on():

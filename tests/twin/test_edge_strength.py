@@ -52,8 +52,8 @@ def test_it_stays_within_bounds_and_needs_flights(sweeps, responses):
 
 def test_every_class_of_height_comes_as_often(responses):
     of = {height_class(r.edges[0].height_after_m): r for r in responses}
-    some = [of["low"]] * 7 + [of["high"]] * 5
-    evened = edge_strength.balance_heights(some)
+    unbalanced = [of["low"]] * 7 + [of["high"]] * 5
+    evened = edge_strength.balance_heights(unbalanced)
     names = [height_class(r.edges[0].height_after_m) for r in evened]
     assert len(evened) == 12 and names.count("low") == names.count("high") == 6
     assert edge_strength.balance_heights([]) == []

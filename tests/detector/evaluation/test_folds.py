@@ -29,11 +29,11 @@ def test_the_authors_days_are_in_the_names(flights):
 
 
 def test_one_group_against_all_others():
-    some = files("aab")
-    assert folds.only(some, "b") == {0: some[2:]}
+    collection = files("aab")
+    assert folds.only(collection, "b") == {0: collection[2:]}
     for group in ("house", "c"):
         with pytest.raises(AirTouchError, match="of 3 flights are of this folder or day"):
-            folds.only(some, group)
+            folds.only(collection, group)
 
 
 def test_days_are_needed():

@@ -92,7 +92,7 @@ def made_flight(seed: int, n: int = 900) -> FlightLog:
 def test_training_learns_prunes_and_repeats_to_the_bit() -> None:
     flights = [made_flight(seed) for seed in range(6)]
     reports: list[tuple[str, int, int]] = []
-    model = training.train_paper(flights, epochs=6, progress=lambda *told: reports.append(told[:3]))
+    model = training.train_paper(flights, epochs=6, progress=lambda *report: reports.append(report[:3]))
     assert ("features", 6, 6) in reports and any(stage == "epochs" for stage, _, _ in reports)
     assert model.metadata["held_out_accuracy"]["int8"] > 0.75
     kernel = model.weights["dense1.kernel"]

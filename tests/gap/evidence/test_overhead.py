@@ -89,8 +89,8 @@ def test_the_rest_of_a_flight_is_apart_from_the_told_seconds(study, nominal_flig
         flight = replace(nominal_flight, acceleration=force)
         return overhead.with_overhead(study, flight, ((8.0, 18.0),)).scatter.passing[gates.TOLD][0]
 
-    told = (t >= 7.8) & (t < 18.2)
-    assert size(told) == size(np.zeros(len(t), bool)) < size(~told) - 0.02
+    near_overhead = (t >= 7.8) & (t < 18.2)
+    assert size(near_overhead) == size(np.zeros(len(t), bool)) < size(~near_overhead) - 0.02
 
 
 def test_sizes_scatter_as_those_that_are_looked_for(study, nominal_flight):

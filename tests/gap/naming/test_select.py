@@ -38,7 +38,7 @@ def test_where_nothing_is_nothing_is_found():
     assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
     assert selection.free_before == selection.free_after < 12.0
     assert not any(j.full for j in selection.singles.values())
-    assert not selection.assumed and selection.usual == 0.0
+    assert not selection.assumed and selection.nominal_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
     assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice == 0.0
@@ -76,7 +76,7 @@ def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_besid
     assert {t.name for t in selection.whole.terms} == {"imu_noise", "mass"} and selection.assumed
     push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
     assert [s.named for s in push_only.steps] == [False] and push_only.chosen is None and push_only.explained
-    assert push_only.usual == pytest.approx(12.0), "of a rate of 0"
+    assert push_only.nominal_gain == pytest.approx(12.0), "of a rate of 0"
 
 
 def test_of_two_that_gain_nearly_as_much_the_rarer_in_nominal_flights_is_named():
@@ -161,15 +161,15 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
         assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
 
 
-@pytest.mark.parametrize(("names", "usual", "mps2", "named"), [
+@pytest.mark.parametrize(("names", "nominal_sizes", "mps2", "named"), [
     (("mass",), {}, 0.5, ["mass"]), (("mass",), {"mass": [3.0]}, 0.5, ["downwash"]), (("imu_noise",), {}, 0.15, [])])
-def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, usual, mps2, named):
+def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, nominal_sizes, mps2, named):
     """A push for 25 of 30 s: its mass gains more; a mass that nominal flights have as well does not count, what
 
     follows the flight's own height does.
     """
     pushed = with_a_push(0.0 if mps2 == 0.5 else 2.0, 25.0, mps2=mps2)
-    selection, _ = select_from([pushed], names, scattered(**usual), ())
+    selection, _ = select_from([pushed], names, scattered(**nominal_sizes), ())
     assert [s.name for s in selection.named] == named
     assert ("downwash" in selection.singles) == ("downwash" in named)
 
@@ -295,6 +295,6 @@ def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)
     assert replace(same_models, assumed=True).allowed == pytest.approx(0.5 * 0.2 * 1000.0)
-    no_effects = replace(same_models, steps=(), usual=20.0)
+    no_effects = replace(same_models, steps=(), nominal_gain=20.0)
     assert no_effects.allowed == pytest.approx(12.0 * 7 / 5)
     assert replace(no_effects, simulated=False).allowed == pytest.approx(20.0)

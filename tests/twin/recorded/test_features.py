@@ -72,9 +72,9 @@ def test_channels_that_have_nothing_to_do_with_each_other_are_incoherent(long_fl
     log, sweep = long_flight
     rng = np.random.default_rng(2)
     values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rng.normal(0.0, 3.0, len(log))), sweep)
-    some = [values[k] for k in rows("coherency") if NAMES[k].startswith("gyro x with motor roll")]
+    coherencies = [values[k] for k in rows("coherency") if NAMES[k].startswith("gyro x with motor roll")]
     f, cross = csd(rng.normal(size=4000), rng.normal(size=4000), fs=100.0, nperseg=LENGTH)
-    assert np.abs(some).mean() < 0.1 and len(f) == len(cross)
+    assert np.abs(coherencies).mean() < 0.1 and len(f) == len(cross)
 
 
 def test_spectra_are_those_of_the_calm_half_of_a_hover(long_flight):
@@ -85,8 +85,8 @@ def test_spectra_are_those_of_the_calm_half_of_a_hover(long_flight):
     pushed = rate.copy()
     pushed[sweep.free.start + 2 * LENGTH::6 * LENGTH] += 400.0
     calm, steered = (features(noise_log(log, command, r), sweep) for r in (rate, pushed))
-    some = [k for k in rows("spectrum") if NAMES[k].startswith("gyro x")]
-    assert np.abs(steered[some] - calm[some]).max() < 2.0
+    places = [k for k in rows("spectrum") if NAMES[k].startswith("gyro x")]
+    assert np.abs(steered[places] - calm[places]).max() < 2.0
 
 
 def test_edge_means_are_those_of_the_channels(sweeps):

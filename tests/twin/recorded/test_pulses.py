@@ -53,10 +53,10 @@ def test_recorded_flights(flights):
     for row in rows:
         measured = course(logs.read(flights / "airtouch" / row["file"]))
         periods.append(measured.pulse_s)
-    some = np.array([p for p in periods if p])
-    print(f"{len(some)} of {len(periods)} flights, {some.min():.3f} to {some.max():.3f} s")
-    assert 25 <= len(some) <= 40
-    assert np.abs(some - 0.521).max() < 0.006
+    of_pulses = np.array([p for p in periods if p])
+    print(f"{len(of_pulses)} of {len(periods)} flights, {of_pulses.min():.3f} to {of_pulses.max():.3f} s")
+    assert 25 <= len(of_pulses) <= 40
+    assert np.abs(of_pulses - 0.521).max() < 0.006
 
 
 def test_pulses_need_velocity_control_and_a_period():

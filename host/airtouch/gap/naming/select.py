@@ -76,7 +76,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     last = steps[-1].terms if steps else ()
     assumed = bool(random_of(last)) if data.study.simulated else _assumes(data, last)
     found = Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, assumed,
-                      _usual(data), data.study.simulated, data.study.same_models,
+                      _nominal_gain(data), data.study.simulated, data.study.same_models,
                       clock_left(data, [t.name for t in last]))
     return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
 
@@ -194,7 +194,7 @@ def seconds(data: Data) -> float:
     return sum(len(f) for f in data.flights) * PERIOD_S
 
 
-def _usual(data: Data) -> float:
+def _nominal_gain(data: Data) -> float:
     """Log likelihood that a model without names gains in nominal flights as long as these."""
     scatter = data.study.scatter
     return scatter.allowed(seconds(data), UNKNOWN_GAIN) if scatter else 0.0

@@ -81,7 +81,7 @@ class Selection:
     least: Mapping[str, float]  #: evidence that each candidate needs as the first
     nominal: int
     assumed: bool
-    usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+    nominal_gain: float  #: log likelihood that a nameless model gains in nominal flights as long as these
     simulated: bool = False
     same_models: bool = False  #: whether the flights come from the models that effects are fitted with
     of_times: float = 0.0
@@ -123,10 +123,10 @@ class Selection:
         if self.inference is not None:
             return self.inference.limit
         if self.nominal < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.nominal_gain)
         gained = self.whole.gain if self.whole else 0.0
         share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.same_models else 1.0)
-        return max(self.least_left, share * gained, 0.0 if self.simulated else self.usual)
+        return max(self.least_left, share * gained, 0.0 if self.simulated else self.nominal_gain)
 
     @property
     def least_left(self) -> float:
