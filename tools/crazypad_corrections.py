@@ -12,13 +12,13 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
-from crazypad_labels import family, manifest
+from crazypad_labels import VEHICLE, family, manifest
 
 
 def show_corrections(folder: Path) -> None:
     """Print the fit of `hover_balance.ANSWER` to both drones and to each, and the rest of the powers by family."""
     rows = manifest(folder, "build")
-    vehicle = vehicles.load("crazyflie-2.1")
+    vehicle = vehicles.load(VEHICLE)
     table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
     drone = np.array([r["drone"] for r in rows])
     for k, power_name in enumerate(hover_balance.NAMES[4:6]):

@@ -10,6 +10,7 @@ import os
 import re
 from pathlib import Path
 
+VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
 #: families of conditions, in the order of the tables
 FAMILIES = ("normal", "rotor damage", "added weight", "slung load")
 #: mm cut off a rotor, both blades together, from which its flights must not be called normal; a goal of

@@ -28,9 +28,8 @@ from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_corrections import show_corrections
 from crazypad_figures import balanced, exact_rotors, show
-from crazypad_labels import family, manifest
+from crazypad_labels import VEHICLE, family, manifest
 
-VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
 SAME: Any = hover_balance.STEADY  #: unsteadiness and heave that do not tell a damage
 #: beliefs to choose from, round numbers below and above those of `hover_balance.BELIEFS`
 GRID = [hover_balance.Beliefs(own=own, worked_on=(*hover_balance.BELIEFS.worked_on[:3], yaw), hung=hung, **manner)

@@ -87,7 +87,7 @@ class Balances:
 
     def __init__(self, folder: Path, part: str) -> None:
         rows = labels.manifest(folder, part)
-        self.vehicle = vehicles.load("crazyflie-2.1")
+        self.vehicle = vehicles.load(labels.VEHICLE)
         table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle)
                           for r in rows])
         drone, normal = [r["drone"] for r in rows], np.array([labels.family(r["condition"]) == "normal" for r in rows])

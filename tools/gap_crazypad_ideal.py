@@ -98,7 +98,7 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
 def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
     rows = labels.manifest(folder, part)
-    vehicle = vehicles.load("crazyflie-2.1")
+    vehicle = vehicles.load(labels.VEHICLE)
     raw = np.array([described(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
     drone = np.array([r["drone"] for r in rows])
     normal = np.array([labels.family(r["condition"]) == "normal" for r in rows])

@@ -35,6 +35,7 @@ from airtouch.gap.diagnose import diagnose
 from airtouch.gap.result import Diagnosis
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
+from crazypad_labels import VEHICLE as CRAZYPAD_VEHICLE
 from crazypad_labels import building, family, manifest
 from gap_authors import VEHICLE as AUTHORS_VEHICLE
 from gap_authors import questions
@@ -135,7 +136,7 @@ def crazypad(folder: Path, part: str) -> Iterator[Case]:
     for r, build in zip(rows, building(rows), strict=True):
         if _in_part(part, build):
             others = tuple(str(own / o["file"]) for o in normal if o["drone"] == r["drone"] and o["file"] != r["file"])
-            yield Case("crazypad", family(r["condition"]), "crazyflie-2.1", str(own / r["file"]), others,
+            yield Case("crazypad", family(r["condition"]), CRAZYPAD_VEHICLE, str(own / r["file"]), others,
                        r["condition"])
 
 

@@ -40,10 +40,10 @@ from airtouch.gap.diagnose import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
+from gap_authors import VEHICLE
 from gap_passes import apart_db, pieces
 
-VEHICLE = "crazyflie-2.1-flow"  #: vehicle file of the authors' drone
-MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis uses 260 s at most
+MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis judges on 210 s at most
 #: names and parameters of effects
 Effects = list[tuple[str, dict[str, float]]]
 Flights = Mapping[dataset.FlightFile, FlightLog]

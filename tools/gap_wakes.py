@@ -132,10 +132,10 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         base = [ready(read(b), vehicle) for b in case.baseline]
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
         for seconds in seconds_of.get(kind[name], []):
-            known = overhead.with_overhead(study, flight, seconds)
-            wake = gates.gated(Data(known, [flight])).get(gates.TOLD)
+            data = Data(overhead.with_overhead(study, flight, seconds), [flight])
+            wake = gates.gated(data).get(gates.TOLD)
             trials += 1
-            if wake is not None and news(Data(known, [flight]), wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
+            if wake is not None and news(data, wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
                 alarms.append(name)
         print(f"{name}: {alarms.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
     share = wilson(len(alarms), trials)

@@ -22,6 +22,7 @@ from airtouch.logs.files import write_bytes
 from airtouch.twin.fitting import fly
 from airtouch.twin.fitting import levers as lever_set
 from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.recorded.channels import NORMAL
 from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import GROUPS, names
 from airtouch.vehicle import Vehicle
@@ -39,7 +40,6 @@ CLIP = 5.0  #: scatters, to which the difference of one flight is clipped
 MIN_FLIGHTS = 4  #: least number of recorded flights that must have a feature
 MAX_DIVERGED = 0.5  #: fraction of a round's flights that may diverge
 LAST_ROUNDS, LAST_FACTOR = 3, 0.5  #: rounds at the end whose steps are shortened, and by what
-NORMAL = 1.4826  #: standard deviation of a normal variable over its median absolute deviation
 #: weight of each group's misfit; "over" counts less, as its blocks are short
 GROUP_WEIGHT = {"trim": 1.0, "spectrum": 1.0, "coherency": 1.0, "over": 0.7, "entry": 1.0, "exit": 1.0}
 #: progress(round, rounds, misfit by group)

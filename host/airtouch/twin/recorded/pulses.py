@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.reference.finite import hold_finite
+from airtouch.twin.recorded.channels import NORMAL
 
 PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
 PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
@@ -16,7 +17,6 @@ MIN_PULSES = 4  #: periods that a hover must hold; no source: least for a scatte
 #: 0.52 s, the others 6.5 or less
 THRESHOLD = 7.0
 CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped; no source: round number
-NORMAL = 1.4826  #: standard deviation of a normal variable over its median absolute deviation
 RATE_HZ = 100.0  #: Hz, of the log
 
 
