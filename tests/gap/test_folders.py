@@ -11,7 +11,7 @@ ROOM = Path(gap.__file__).parent
 LINES = re.findall(r"^- `(\w+)`(.*?)(?=^- |\Z)", gap.__doc__.partition("Where each decision is made")[2], re.M | re.S)
 FOLDERS = [name for name, _ in LINES if (ROOM / name).is_dir()]
 #: Modules that stand beside the folders, and the first folder that may not import them
-BESIDE = {"workspace": None, "result": None, "measure": "answer", "diagnose": "sealed"}
+BESIDE = {"workspace": None, "second_process": None, "result": None, "measure": "answer", "diagnose": "sealed"}
 
 
 def test_every_module_is_on_the_map_in_its_folder():

@@ -5,7 +5,7 @@
 
 Where each decision is made; a folder imports only those above it:
 
-- `flights`, a log made ready: `flight`, `motion`; how hard it is flown: `hardness`.
+- `flights`, a log made ready: `flight`, `motion` with its `filters`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
   where there is none (a `posterior` of the baseline flights), `drawn` how simulated flights with it are drawn.
 - `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
@@ -32,7 +32,8 @@ Where each decision is made; a folder imports only those above it:
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.
-- `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`.
+- `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what
+  two cores may do at once goes through `second_process`.
 """
 
 import importlib

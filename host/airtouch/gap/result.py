@@ -173,7 +173,7 @@ class Diagnosis:
 
 def plain_cell(cell: Cell) -> dict[str, Any]:
     """A cell without the fields that it does not have."""
-    return {k: v for k, v in asdict(cell).items() if v is not None}
+    return {k: v for k, v in vars(cell).items() if v is not None}
 
 
 def rounded(value: Any) -> Any:

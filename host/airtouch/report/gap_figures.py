@@ -18,6 +18,7 @@ BEFORE, AFTER, FLOOR = OTHER, TRUE, MUTED
 STYLE = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10,
          "legend.frameon": False, "legend.fontsize": 9}
 WIDTH_IN = 4.4  #: inch, width of a plot; readable on a phone
+BELOW_IN, RIGHT_IN = 0.5, 0.15  #: inch, room below the lowest pane and to the right of all
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
@@ -25,8 +26,7 @@ def signals(signal: Signal) -> bytes:
     """PNG of one channel of one flight up to the band's upper end: measured, modelled, and below their difference."""
     rows = 1 if signal.measured is None else 2
     with style():
-        figure = Figure(figsize=(WIDTH_IN, 2.0 * rows + 0.8), layout="constrained")
-        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+        figure, axes = _panes(rows, 1.6, left_in=0.95, above_in=0.35)
         if signal.measured is not None:
             axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
             axes[0].plot(signal.time_s, signal.measured - signal.before, color=BEFORE, lw=1.0, label="model")
@@ -52,8 +52,7 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     """PNG of the gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
     rows = len(shown)
     with style():
-        figure = Figure(figsize=(WIDTH_IN, 1.75 * rows + 0.6), layout="constrained")
-        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+        figure, axes = _panes(rows, 1.35, legend_in=0.25)
         for ax, some in zip(axes, shown, strict=True):
             for key, colour, width in (("floor", FLOOR, 1.6), ("before", BEFORE, 1.3), ("after", AFTER, 1.3)):
                 if getattr(some, key) is not None:
@@ -75,8 +74,7 @@ def commands(curves: Mapping[str, Any]) -> bytes:
     f = np.array(curves["frequency_hz"])
     axes_named = [k for k in curves if isinstance(curves[k], Mapping)]
     with style():
-        figure = Figure(figsize=(WIDTH_IN, 1.6 * len(axes_named) + 0.6), layout="constrained")
-        axes = figure.subplots(len(axes_named), 1, sharex=True, squeeze=False)[:, 0]
+        figure, axes = _panes(len(axes_named), 1.2, legend_in=0.25)
         for ax, name in zip(axes, axes_named, strict=True):
             if "nominal" in curves[name]:
                 ax.loglog(f, curves[name]["nominal"], color=FLOOR, lw=1.6, label="baseline flights")
@@ -89,6 +87,19 @@ def commands(curves: Mapping[str, Any]) -> bytes:
         return _png(figure)
 
 
+def _panes(rows: int, pane_in: float, *, left_in: float = 0.75, above_in: float = 0.3, legend_in: float = 0.0,
+           ) -> tuple[Figure, np.ndarray]:
+    """A figure with panes (rows,) one below another, of a fixed layout: one that matplotlib finds is drawn twice.
+
+    pane_in: inch, height of each; left_in, above_in: room beside and above each; legend_in: above all.
+    """
+    height_in = BELOW_IN + rows * (pane_in + above_in) + legend_in
+    figure = Figure(figsize=(WIDTH_IN, height_in))
+    grid = {"left": left_in / WIDTH_IN, "right": 1.0 - RIGHT_IN / WIDTH_IN, "bottom": BELOW_IN / height_in,
+            "top": 1.0 - (above_in + legend_in) / height_in, "hspace": above_in / pane_in}
+    return figure, figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
+
+
 def _png(figure: Figure) -> bytes:
     """The figure as a PNG with 170 dots per inch, sharp on a phone."""
     buffer = io.BytesIO()
@@ -99,7 +110,7 @@ def _png(figure: Figure) -> bytes:
 def _legend(figure: Figure, ax: Axes) -> None:
     """One legend above all panes."""
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    figure.legend(handles, labels, loc="upper center", ncols=len(labels))
 
 
 def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:

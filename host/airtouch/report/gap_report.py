@@ -1,6 +1,7 @@
 """The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement and computes nothing."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from airtouch.gap.answer.advice import ADD_AN_EFFECT
 from airtouch.gap.answer.pictures import Pictures
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.second_process import shared
 from airtouch.gap.where import summary
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables
@@ -99,23 +101,25 @@ def _images(pictures: Pictures | None) -> list[dict[str, str]]:
         return []
     from airtouch.report import gap_figures
 
-    images = []
+    drawn: list[tuple[str, str, Callable[[], bytes]]] = []
     if pictures.signal is not None:
         one = pictures.signal
         name = gap_tables.capital(gap_tables.CHANNEL_WORDS[one.channel])
-        images.append({"title": f"{name}, up to {one.band_hz[1]:g} Hz", "data": embed(gap_figures.signals(one)),
-                       "text": f"Flight {Path(one.flight).name}. Grey: the floor; blue: take-off and landing; "
-                               "yellow: over a platform."})
+        drawn.append((f"{name}, up to {one.band_hz[1]:g} Hz",
+                      f"Flight {Path(one.flight).name}. Grey: the floor; blue: take-off and landing; "
+                      "yellow: over a platform.", partial(gap_figures.signals, one)))
     if pictures.spectra:
-        images.append({"title": "Spectra of the gap in the air",
-                       "data": embed(gap_figures.spectra(pictures.frequency_hz, pictures.spectra)),
-                       "text": "Mean over all blocks." + (
-                           " A random effect cannot be predicted sample by sample: its green curve is what is "
-                           "left of the power." if any(s.after is not None for s in pictures.spectra) else "")})
+        drawn.append(("Spectra of the gap in the air", "Mean over all blocks." + (
+            " A random effect cannot be predicted sample by sample: its green curve is what is "
+            "left of the power." if any(s.after is not None for s in pictures.spectra) else ""),
+            partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands:
-        images.append({"title": "Spectra of the motor commands", "data": embed(gap_figures.commands(pictures.commands)),
-                       "text": "Delays, gains and noise in the loop show here, as a shape that differs."})
-    return images
+        drawn.append(("Spectra of the motor commands",
+                      "Delays, gains and noise in the loop show here, as a shape that differs.",
+                      partial(gap_figures.commands, pictures.commands)))
+    files = shared(lambda one: one[2](), drawn)
+    return [{"title": title, "data": embed(file), "text": text}
+            for (title, text, _), file in zip(drawn, files, strict=True)]
 
 
 def _flights(names: Sequence[str], vehicle: str, baseline: Sequence[str]) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
@@ -174,6 +173,8 @@ def _follows(study: Study, over: Sequence[tuple[Flight, np.ndarray]]) -> list[st
         for name, values in _signals(study, flight).items():
             in_blocks = (values * air)[begin[:, None] + np.arange(LENGTH[AIR])]
             table.setdefault(name, []).append(np.nanmean(in_blocks, axis=1))
+    from scipy.stats import spearmanr  # slow to import, and seldom needed
+
     level = np.concatenate(power)[::2]  # every other block: they overlap by half
     if len(level) < FEWEST:
         return []

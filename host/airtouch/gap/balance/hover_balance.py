@@ -18,9 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
-from scipy.signal import welch
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.logs.flight_log import VELOCITY
@@ -89,6 +87,8 @@ def pattern(flight: Flight, vehicle: Vehicle, voltage_too: bool = True) -> np.nd
     beyond the acceleration, (m/s)^2; LEAST_POWER where the log has no velocity.
     voltage_too: take the lift at 1 V, for flights that log the voltage; else at the voltage flown.
     """
+    from scipy.signal import welch  # slow to import, and seldom needed
+
     weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
     thrust = vehicle.thrust(flight.pwm) / weight
     if voltage_too and flight.log.has("vbat_V"):
@@ -195,6 +195,8 @@ class Hypothesis:
 
 def hypotheses(vehicle: Vehicle, beliefs: Beliefs = BELIEFS) -> list[Hypothesis]:
     """No effect, one or two weak rotors, a weight at its place, a weight on a thread, something else."""
+    from scipy.stats import qmc  # slow to import, and seldom needed
+
     draw = qmc.Sobol(3, seed=1).random(SAMPLES)
     normal = ndtri(np.clip(draw, 1e-6, 1.0 - 1e-6))
     out = [Hypothesis("none", 0.125, (), np.zeros((1, 4)), STEADY, worked_on) for worked_on in (False, True)]

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import Fit, fit, judge, left_over
 from airtouch.gap.evidence.problem import Part, Problem, problem_of, whole_of
+from airtouch.gap.flights.filters import both_ways, highpass
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, LENGTH
@@ -160,7 +160,7 @@ def _bursts(data: Data) -> tuple[Gate, float]:
 
 def _highpassed(values: np.ndarray) -> np.ndarray:
     """Values (n,) freed of what is slower than LIVELY_HZ."""
-    return sosfiltfilt(butter(2, LIVELY_HZ * 2.0 * PERIOD_S, "highpass", output="sos"), values)
+    return both_ways(highpass(LIVELY_HZ * 2.0 * PERIOD_S), values)
 
 
 def _at_the_ends(data: Data, problem: Problem) -> np.ndarray:

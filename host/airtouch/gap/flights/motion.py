@@ -2,8 +2,8 @@
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, sosfiltfilt
 
+from airtouch.gap.flights.filters import both_ways, lowpass
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, POSITION, VELOCITY, FlightLog
 
 CROSSOVER_HZ = 0.4  #: below it the tilt comes from the acceleration over ground, above it from the gyro
@@ -35,10 +35,10 @@ def attitude(log: FlightLog, period_s: float) -> np.ndarray:
     if log.has(*GYRO):
         turned = np.cumsum(held(log.stack(GYRO)), axis=0) * period_s
         estimate[:, 2] = turned[:, 2] - turned[0, 2] if not log.has("yaw_rad") else 0.0
-        low = butter(2, CROSSOVER_HZ * 2.0 * period_s, output="sos")
+        low = lowpass(CROSSOVER_HZ * 2.0 * period_s)
         if n > 100:
-            estimate[:, :2] = turned[:, :2] - sosfiltfilt(low, turned[:, :2], axis=0)
-            estimate[:, :2] += sosfiltfilt(low, tilt, axis=0)
+            estimate[:, :2] = turned[:, :2] - both_ways(low, turned[:, :2])
+            estimate[:, :2] += both_ways(low, tilt)
     else:
         estimate[:, :2] = tilt
     for i, name in enumerate(ATTITUDE):

@@ -3,8 +3,8 @@
 from functools import cache
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
+from airtouch.gap.flights.filters import both_ways, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.loop.controller import AXES
 from airtouch.logs.segments import KINDS
@@ -70,8 +70,8 @@ def _judged() -> np.ndarray:
 
 def highpassed(values: np.ndarray) -> np.ndarray:
     """Values (n,) or (n, c) without what changes slower than HIGHPASS_HZ."""
-    low = butter(2, HIGHPASS_HZ * 2.0 * PERIOD_S, output="sos")
-    return values - sosfiltfilt(low, values, axis=0, padlen=min(60, len(values) - 2))
+    low = lowpass(HIGHPASS_HZ * 2.0 * PERIOD_S)
+    return values - both_ways(low, values, min(60, len(values) - 2))
 
 
 def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:

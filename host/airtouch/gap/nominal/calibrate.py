@@ -9,6 +9,7 @@ in the torque alone: it stays as declared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,12 +23,13 @@ from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
+from airtouch.gap.second_process import shared
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import Term, terms
-from airtouch.gap.signatures.nominal_scatter import scatter_of
+from airtouch.gap.signatures.nominal_scatter import Apparent, scatter_of
 from airtouch.gap.unnamed.generic import unnamed_floor
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -82,13 +84,18 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     study = replace(study, unnamed_floor=unnamed_floor(Data(study, flights)))
     if scatter:
-        study = replace(study, scatter=scatter_of([apparent(Data(study, [f]), without) for f in _some(flights)],
-                                                    any(_recorded(f) for f in flights), vehicle.name))
+        strengths = shared(partial(_apparent, study, without), _some(flights))
+        study = replace(study, scatter=scatter_of(strengths, any(_recorded(f) for f in flights), vehicle.name))
         if study.simulated:  # where every flight has the same trim: chance is in the lowest bin already
             study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond),
                             relations=library_for(vehicle, [features(f, vehicle) for f in flights]))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)), None if odd else as_declared)
+
+
+def _apparent(study: Study, without: Sequence[str], flight: Flight) -> Apparent:
+    """How strong every effect seems to be in one nominal flight."""
+    return apparent(Data(study, [flight]), without)
 
 
 def _recorded(flight: Flight) -> bool:

@@ -18,7 +18,7 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import poch, stdtrit
 
 from airtouch.gap.signatures.candidates import ALIKE, is_random
 from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, moments, standard_deviation, updated
@@ -139,7 +139,7 @@ class Scatter:
         """
         middle, spread = self.passing.get(name, (0.0, 0.0))
         far = max(size - middle, 0.0) / max(spread, LEAST_SPREAD)
-        limit = float(student.ppf(1.0 - FALSE_SHARE, self.freedom))
+        limit = float(stdtrit(self.freedom, 1.0 - FALSE_SHARE))
         rarity, limit_rarity = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
         return 0.5 * (self.freedom + 1.0) * (rarity - limit_rarity)
 
@@ -203,11 +203,18 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
         middle, spread = own.rate
-        total += float(student.logpdf(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
+        total += float(_student(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
         for name, (middle, spread) in own.passing.items():
             size = flight.passing.get(name, 0.0)
-            total += float(student.logpdf(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
+            total += float(_student(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
     return total
+
+
+def _student(x: float, freedom: float, middle: float, spread: float) -> float:
+    """Logarithm of Student's density; scipy.stats takes a second to import."""
+    far = (x - middle) / spread
+    top = np.log(poch(0.5 * freedom, 0.5)) - 0.5 * (np.log(freedom) + np.log(np.pi))
+    return top - 0.5 * (freedom + 1.0) * np.log1p(far * far / freedom) - np.log(spread)
 
 
 def _widest(classes: Sequence[Scatter]) -> Scatter:

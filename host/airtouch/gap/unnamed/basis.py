@@ -1,8 +1,8 @@
 """The flight's own signals, for a regression of a hypothesis's residual (gap.unnamed.generic)."""
 
 import numpy as np
-from scipy.signal import lfilter
 
+from airtouch.gap.flights.filters import lagged
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.simulation import signals as at
@@ -23,7 +23,7 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     row = prepare(vehicle, ())[0][0]
     air = ~flight.on_ground
     decay = float(np.exp(-PERIOD_S / row["motor_rise"]))
-    thrust = lfilter([1.0 - decay], [1.0, -decay], vehicle.thrust(flight.pwm), axis=0) @ MIX.T
+    thrust = lagged(decay, vehicle.thrust(flight.pwm)) @ MIX.T
     thrust /= 0.25 * float(row["mass"]) * vehicle.gravity_mps2
     changing = np.gradient(thrust, axis=0) / PERIOD_S * LAG_S
     speed = flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
