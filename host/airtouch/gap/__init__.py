@@ -12,8 +12,8 @@ Where each decision is made; a folder imports only those above it:
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
-- `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `slopes`, `least_squares`,
-  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `overhead` takes
+- `evidence`, how likely the flights are under an effect: `data`, `problem`, its `likelihood`, `fit` with `slopes`,
+  `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `overhead` takes
   its seconds from another vehicle's log, `clock` what only the log's times show.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.

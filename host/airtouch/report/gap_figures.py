@@ -26,7 +26,7 @@ def signals(signal: Signal) -> bytes:
     """PNG of one channel of one flight up to the band's upper end: measured, modelled, and below their difference."""
     rows = 1 if signal.measured is None else 2
     with style():
-        figure, axes = _panes(rows, 1.6, left_in=0.95, above_in=0.35)
+        figure, axes = _panes(rows, 1.6, left_in=0.85, above_in=0.35)
         if signal.measured is not None:
             axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
             axes[0].plot(signal.time_s, signal.measured - signal.before, color=BEFORE, lw=1.0, label="model")
@@ -44,7 +44,7 @@ def signals(signal: Signal) -> bytes:
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
-            ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+            ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.5)
         return _png(figure)
 
 

@@ -16,6 +16,7 @@ from scipy.special import exp1
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
+from airtouch.gap.evidence.likelihood import tailed
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY, Change
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
@@ -211,7 +212,7 @@ class Problem:
 
     def likelihood_of(self, size: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """The same, from the values' squared size: for one set of values and many powers."""
-        return float(self._each(size, added).sum())
+        return -OVERLAP_WEIGHT * tailed(size, self.power + added, self.tail, self._falls, self.known)
 
     def power_slopes(self, values: np.ndarray, added: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slope and expected curvature (own,) of the log likelihood against the expected power of each value.
@@ -226,36 +227,28 @@ class Problem:
 
     def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood of each value."""
-        return self._each(squared(values), added)
+        each = _each(squared(values), self.power + added, self.tail, self._falls)
+        each[~self.known] = 0.0
+        return each
 
     def likelihoods(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
         """`likelihood_of` of others + x * unit as a function of x: only what changes with x is computed anew."""
-        each = self._each(size, others)
-        own = np.flatnonzero((unit != 0.0) & self.known)
-        floor, tail, falls = self.power[own], self.tail[own], self._falls[own]
-        own_size, own_others, own_unit = size[own], others[own], unit[own]
+        grows = (unit != 0.0) & self.known
+        rest = tailed(size, self.power + others, self.tail, self._falls, self.known & ~grows)
+        own = np.flatnonzero(grows)
+        power, tail, falls, known = (x[own] for x in (self.power + others, self.tail, self._falls, self.known))
+        own_size, own_unit = size[own], unit[own]
 
         def at(x: float) -> float:
             """Log likelihood at x."""
-            each[own] = _each(own_size, floor + (own_others + x * own_unit), tail, falls)
-            return float(each.sum())
+            return -OVERLAP_WEIGHT * (rest + tailed(own_size, power + x * own_unit, tail, falls, known))
 
         return at
-
-    def _each(self, size: np.ndarray, added: np.ndarray | float) -> np.ndarray:
-        each = _each(size, self.power + added, self.tail, self._falls)
-        each[self._unknown] = 0.0
-        return each
 
     @functools.cached_property
     def _falls(self) -> np.ndarray:
         """Power of the tails' fall."""
         return self.freedom + 1.0
-
-    @functools.cached_property
-    def _unknown(self) -> np.ndarray:
-        """Indices of values that are not known."""
-        return np.flatnonzero(~self.known)
 
 
 def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, falls: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.gap.evidence.likelihood import tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.simulation import replay
@@ -138,16 +139,17 @@ def _over_floor(data: Any, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """Gain in log likelihood of lines of the best strength over none, and that strength (power)."""
-    size = STRENGTHS / max(float(shape.mean()), 1e-300)
+    strengths = STRENGTHS / max(float(shape.mean()), 1e-300)
+    size, flat = over.ravel(), shape.ravel()
+    tail, falls, known = (np.full(len(size), x) for x in (FREEDOM, FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
         """Log likelihood of lines of a strength (power)."""
-        power = 1.0 + strength * shape
-        return float((-np.log(power) - (FREEDOM + 1.0) * np.log1p(over / power / FREEDOM)).sum())
+        return -tailed(size, 1.0 + strength * flat, tail, falls, known)
 
-    levels = [likelihood(s) for s in size]
+    levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))
-    fine = size[best] * np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
+    fine = strengths[best] * np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
     fine_levels = [likelihood(s) for s in fine]
     return max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))])
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numba import float64, int64, njit, types
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 
@@ -58,16 +59,32 @@ def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarr
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     a = np.full(len(shapes), 1.0 / len(shapes))
-    model, over = np.empty(len(power)), np.empty(len(power))
-    for _ in range(steps):  # multiplicative updates for the Itakura-Saito divergence
-        np.matmul(a, shapes, out=model)
-        np.divide(1.0, model, out=over)
-        np.divide(power, np.square(model, out=model), out=model)
-        up = shapes @ model
-        up /= shapes @ over
-        a = np.maximum(a * np.sqrt(up, out=up), 1e-9)
+    _update(a, np.ascontiguousarray(shapes), np.ascontiguousarray(power), steps)
     e = power / (a @ shapes)
     return a * scale, float((e - np.log(e) - 1.0).sum()), controller
+
+
+@njit(types.void(float64[::1], float64[:, ::1], float64[::1], int64), cache=True, error_model="numpy")
+def _update(strengths, shapes, power, steps):
+    """Multiplicative updates of strengths (sources,) that lower the Itakura-Saito divergence, in place.
+
+    shapes (sources, bins): power for unit strengths; power (bins,): as measured.
+    """
+    sources, bins = shapes.shape
+    over, square = np.empty(bins), np.empty(bins)
+    for _ in range(steps):
+        for b in range(bins):
+            model = 0.0
+            for s in range(sources):
+                model += strengths[s] * shapes[s, b]
+            over[b] = 1.0 / model
+            square[b] = power[b] * over[b] * over[b]
+        for s in range(sources):
+            up, down = 0.0, 0.0
+            for b in range(bins):
+                up += shapes[s, b] * square[b]
+                down += shapes[s, b] * over[b]
+            strengths[s] = max(strengths[s] * np.sqrt(up / down), 1e-9)
 
 
 def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:

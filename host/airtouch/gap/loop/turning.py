@@ -1,6 +1,7 @@
 """Rotation per logged command, from noise and from steps of a set-point beside it."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,19 +92,24 @@ def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts
     logged, acceleration = transfers(c, row, np.maximum(f, 0.05), parts)
     cross, aliases = acceleration * logged.conj(), aliases_of(c, row, axis, f)
     turning = np.abs(acceleration) ** 2
-    folds = GYRO_FOLDS if len(aliases) else ()
-    for k in folds:  # noise of the gyro folds into the log
-        turning[0] += np.abs(_sensed(c, f, k)) ** 2
-    for k, alias in zip(FOLDS[1:], aliases, strict=False):  # and into the command alike
-        cross[0] += _sensed(c, f, k) * np.where(f + k / PERIOD_S < 0.0, alias, alias.conj())
+    if len(aliases):  # noise of the gyro folds into the log, and into the command alike
+        sensed = _sensed(c.chip_hz, f.tobytes())
+        for k in GYRO_FOLDS:
+            turning[0] += np.abs(sensed[k]) ** 2
+        for k, alias in zip(FOLDS[1:], aliases, strict=True):
+            cross[0] += sensed[k] * np.where(f + k / PERIOD_S < 0.0, alias, alias.conj())
     return cross, with_aliases(np.abs(logged) ** 2, aliases), turning
 
 
-def _sensed(c: Controller, f: np.ndarray, k: int) -> np.ndarray:
-    """Angular acceleration (bins,) that the log shows at f for noise of the gyro k times the log's rate above it."""
-    folded_hz = f + k / PERIOD_S
-    response = 1.0 / butterworth(2j * np.pi * np.abs(folded_hz), c.chip_hz)
-    return difference(f) * np.where(folded_hz < 0.0, np.conj(response), response)
+@lru_cache(16)
+def _sensed(chip_hz: float, frequencies: bytes) -> dict[int, np.ndarray]:
+    """Angular acceleration (bins,) that the log shows at frequencies for noise k times the log's rate above, by k."""
+    f, out = np.frombuffer(frequencies), {}
+    for k in GYRO_FOLDS:
+        folded_hz = f + k / PERIOD_S
+        response = 1.0 / butterworth(2j * np.pi * np.abs(folded_hz), chip_hz)
+        out[k] = difference(f) * np.where(folded_hz < 0.0, np.conj(response), response)
+    return out
 
 
 def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, over: np.ndarray,

@@ -13,11 +13,13 @@ from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, covariance_among_all, crossed, price_of
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, strength_term
 from airtouch.gap.signatures.nominal_scatter import Scatter
 
 HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
 FULL = 5  #: candidates that are fitted in full, after a first look at all
+Waiting = tuple[str, Hypothesis, float]  #: name, terms, and what the choice of the variant costs
 
 
 def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
@@ -34,7 +36,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
     alike = {n for t in held if not t.companion and (group := names_alike(t.name)) for n in group[0] if n != t.name}
     residuals, extra_power = _residuals(on, chosen)
-    looked, sure, with_random = [], [], []
+    looked, waiting, with_random = [], [], []
     for name, variants in candidates.items():
         progress(name)
         if name in alike:
@@ -47,7 +49,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                 gain, fitted, variances = first_order(on.screen, on.parts, residuals, extra_power, terms, held)
                 gain += before - price_of(terms) - choice
                 if gain < before + HOPELESS and _only_in_commands(on, terms):
-                    sure.append(crossed(on, name, terms, chosen, choice))
+                    waiting.append((name, terms, choice))
                     continue
                 own, k = terms[0], len(terms[0].free)
                 each = np.array(fitted)[:, :k]
@@ -57,14 +59,14 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
             elif random_of(terms):
                 with_random.append((name, terms, choice))
             else:
-                sure.append(crossed(on, name, terms, chosen, choice))
+                waiting.append((name, terms, choice))
     looked = _best_variants(looked)
-    tried = _with_random_parts(on, residuals, extra_power, chosen, with_random, looked, thorough)
-    sure += [j for j in tried if j.full]
-    looked += [j for j in tried if not j.full]
+    unpromising, promising_random = _random_parts(on, residuals, extra_power, chosen, with_random, looked, thorough)
+    looked += unpromising
     worth = [j for i, j in enumerate(looked)
              if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN) or j.name in promising]
-    sure += [crossed(on, j.name, j.terms[len(held):], chosen, j.choice) for j in worth]
+    waiting += promising_random + [(j.name, j.terms[len(held):], j.choice) for j in worth]
+    sure = shared(lambda one: crossed(on, one[0], one[1], chosen, one[2]), waiting)
     best = _best_of_each([*sure, *(j for j in looked if j not in worth)], len(held))
     if thorough:
         best = {n: _one_by_one(j, [k for k in sure if k.name == n]) for n, j in best.items()}
@@ -114,13 +116,12 @@ def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
                    covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]), apart=0.0)
 
 
-def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: Sequence[np.ndarray],
-                       chosen: Judged | None, hypotheses: Sequence[tuple[str, Hypothesis, float]],
-                       means: Sequence[Judged], thorough: bool) -> list[Judged]:
-    """Hypotheses with a random effect: the variant of each that a first look finds best is judged in full.
+def _random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: Sequence[np.ndarray],
+                  chosen: Judged | None, hypotheses: Sequence[Waiting], means: Sequence[Judged], thorough: bool,
+                  ) -> tuple[list[Judged], list[Waiting]]:
+    """Hypotheses with a random effect: those that promise little, and of the others the variant that looks best.
 
-    hypotheses: name, terms, and what the choice of the variant costs. means: looks at mean effects, best first; the
-    random part of one of these goes with its best variant.
+    means: looks at mean effects, best first; the random part of one of these goes with its best variant.
     """
     before, held = (chosen.gain, chosen.terms) if chosen else (0.0, ())
     mean = {j.name: j for j in reversed(means) if len(j.terms) == len(held) + 1}
@@ -132,7 +133,7 @@ def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: 
             random = random_of(terms)[0]
             gain, strength = random_look(on.screen, on.parts, residuals, extra_power, random)
             looks.setdefault(name, []).append((gain - choice, strength, terms, choice))
-    out = []
+    out, waiting = [], []
     for name, tried in looks.items():
         gain, strength, terms, choice = max(tried, key=lambda t: t[0])
         promising = gain > HOPELESS or name in mean and mean[name].gain - before > HOPELESS
@@ -142,8 +143,8 @@ def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: 
                                   strength=strength_term(terms).among_all(strength)))
             continue
         longer = [(t, c) for n, t, c in hypotheses if n == name and len(t) > len(terms) and _same(t[0], terms[0])]
-        out += [crossed(on, name, t, chosen, c) for t, c in ((terms, choice), *longer)]
-    return out
+        waiting += [(name, t, c) for t, c in ((terms, choice), *longer)]
+    return out, waiting
 
 
 def _only_in_commands(on: Trial, terms: Hypothesis) -> bool:

@@ -59,9 +59,9 @@ class EffectClass:
 
     def mean(self, strength: np.ndarray) -> np.ndarray:
         """Expected shift (n, Q) at strengths (n, parameters), in units of the class."""
-        parts = _parts(strength, self.signed)
-        return np.einsum("np,nk,pkq->nq", parts, _hats(np.linalg.norm(strength, axis=1), self.knots), self.table,
-                         optimize=True)
+        parts, hats = _parts(strength, self.signed), _hats(np.linalg.norm(strength, axis=1), self.knots)
+        together = parts[:, :, None] * hats[:, None]
+        return together.reshape(len(strength), -1) @ self.table.reshape(together[0].size, -1)
 
     @cached_property
     def grid(self) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numba import float64, njit
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import edge_response
@@ -170,12 +171,26 @@ class CommandView:
         covariance = np.linalg.inv(normal)
         amount = np.zeros((SHAPES, len(AXES)))
         for _ in range(ROUNDS):
-            e = e0 * np.exp(-self.shapes.T @ amount)
-            push = OVERLAP_WEIGHT * ((FREEDOM + 1.0) * e / (FREEDOM + e) - 1.0).sum(axis=0)
+            push = OVERLAP_WEIGHT * _push(e0, np.exp(-self.shapes.T @ amount))
             amount += covariance @ (self.shapes @ push - amount / spread[:, None] ** 2)
         cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
         cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
         return self.shapes.T @ amount, cost, count, covariance
+
+
+@njit(float64[:, ::1](float64[:, :, ::1], float64[:, ::1]), cache=True, error_model="numpy")
+def _push(over, factor):
+    """Slope (bins, axes) of the log likelihood of all blocks by the logarithm of their power.
+
+    over (blocks, bins, axes): power over the floor's, times a factor.
+    """
+    out = np.zeros(factor.shape)
+    for block in over:
+        for b in range(out.shape[0]):
+            for a in range(out.shape[1]):
+                e = block[b, a] * factor[b, a]
+                out[b, a] += (FREEDOM + 1.0) * e / (FREEDOM + e) - 1.0
+    return out
 
 
 def _shape(spectra: np.ndarray) -> tuple[int, int]:
