@@ -102,9 +102,10 @@ def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
     np.testing.assert_array_equal(covariance_among_all(offset, both), both)
 
 
-def by_relations(monkeypatch, explained):
+def by_relations(monkeypatch, explained, likeliest="mass"):
     """A selection as of a library of relations that holds for the flights, and the judgements that it is asked with."""
-    answer, inference, judgements = SimpleNamespace(explained=explained), object(), []
+    answer, judgements = SimpleNamespace(explained=explained), []
+    inference = SimpleNamespace(likeliest=likeliest)
 
     def related(on, candidates, alone, given, progress):
         assert given is inference
@@ -128,7 +129,13 @@ def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatc
 
 def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):
     data = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True)
-    answer, _ = by_relations(monkeypatch, explained=True)
+    answer, _ = by_relations(monkeypatch, explained=True, likeliest="downwash")
     assert select.select(data, candidates_of(["mass"])) is answer
-    by_relations(monkeypatch, explained=False)
+    by_relations(monkeypatch, explained=False, likeliest="downwash")
     assert [s.name for s in select.select(data, candidates_of(["mass"])).named] == ["downwash"]
+
+
+def test_a_wake_that_the_relations_of_signals_do_not_find_likeliest_is_not_named(monkeypatch):
+    data = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True)
+    answer, _ = by_relations(monkeypatch, explained=False, likeliest="mass")
+    assert select.select(data, candidates_of(["mass"])) is answer

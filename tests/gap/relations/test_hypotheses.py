@@ -25,7 +25,7 @@ def library():
                                 np.zeros(0)) for i, n in enumerate(NAMES))
     model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
     return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
-                   (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)))
+                   (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), 0.0)
 
 
 def noise(seed=1):
@@ -64,6 +64,29 @@ def test_a_withheld_effect_is_left():
     inference = infer(library().without(["mass"]), values)
     assert not inference.classes and inference.unexplained > 10.0 * inference.limit
     assert inference.evidence.keys() == set(NAMES[1:])
+
+
+@pytest.mark.parametrize("off", [0.0, 3.0, 4.0])
+def test_a_name_fails_where_the_flight_lies_off_it_by_more_than_right_names_do(off):
+    """The squared distance of 100 coordinates scatters by sqrt(200): the limit is 3.5 times half of that, in nats."""
+    scatter = 0.5 * np.sqrt(2.0 * Q)
+    values = 45.0 * np.eye(Q)[0]
+    values[60:] = np.sqrt((Q + 2.0 * off * scatter) / 40.0)  # as far from the effect as nominal flights, and more
+    found = infer(library(), values[None])
+    assert [c.name for c in found.classes] == ["mass"]
+    assert (found.unexplained < found.limit) is (off < 3.5)
+
+
+def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
+    values = noise() + 45.0 * np.eye(Q)[0]
+    values[60:] *= 2.5
+    exact = replace(library(), nameless_share=np.ones(len(NAMES)))  # so that the distance alone speaks
+    inexact = replace(exact, distance_scatter=np.full(len(NAMES), 0.1))
+    far, near = (infer(of, values[None]) for of in (exact, inexact))
+    assert far.unexplained == pytest.approx(near.unexplained)
+    assert far.limit < far.unexplained < near.limit
+    evidence = near.evidence["mass"]
+    assert near.limit == pytest.approx(3.5 * np.hypot(0.5 * np.sqrt(2.0 * Q), 0.1 * evidence))
 
 
 def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(monkeypatch):

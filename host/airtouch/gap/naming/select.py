@@ -54,7 +54,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
 
     Effects that come and go are tried first (gap.evidence.gates), but those of `without`. One that adds no more to the
     effects found after it than it does in nominal flights is taken back. Where a library of the signals' relations
-    holds and leaves nothing unexplained it decides alone (naming.related).
+    holds it decides alone (naming.related), but where it leaves something unexplained and the effect that it finds
+    likeliest comes and goes, or has more shapes than its class: then the replay may find that effect.
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
@@ -64,9 +65,11 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     if by_relations is not None and by_relations.explained:
         return by_relations
     passing = _passing(on, alone, need, without)
+    likeliest = inference.likeliest if inference is not None else ""
+    if by_relations is not None and likeliest not in SHAKES and (passing is None or passing.name != likeliest):
+        return by_relations
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    first = next((s.name for s in steps if s.named), "")
-    if by_relations is not None and passing is None and first not in SHAKES:  # these have more shapes than their class
+    if by_relations is not None and likeliest != next((s.name for s in steps if s.named), ""):
         return by_relations
     if passing is not None and any(s.named and s.name == passing.name and news(
             on.data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps):

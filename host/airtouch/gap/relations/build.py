@@ -14,14 +14,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from airtouch.gap.relations import exposure, space
-from airtouch.gap.relations.checks import checked
-from airtouch.gap.relations.density import coordinates_of, fit, unchanged
+from airtouch.gap.relations.checks import checked, two_of
 from airtouch.gap.relations.effect_class import CHANCE, learn_class
 from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly, scaled
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.gap.relations.space import Standard
-from airtouch.gap.signatures.candidates import interchangeable
 from airtouch.simulation.effects import EFFECTS, NAMES, Active
 from airtouch.vehicle import load
 
@@ -74,7 +72,7 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     axes, at = white.lower.T @ stored, standard(table) @ stored
     return _learned(scene, Library(scene.scenario, scene.vehicle.name, standard, stored, at.mean(axis=0),
                                    LearnedModel((), np.zeros((stored.shape[1], 0)), _of_nameless(nameless @ axes)),
-                                   (0.0, 1.0), np.zeros(0), np.zeros(0), np.zeros(0)), paired, middle, axes, say)
+                                   (0.0, 1.0), np.zeros(0), np.zeros(0), np.zeros(0), 0.0), paired, middle, axes, say)
 
 
 def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.ndarray, axes: np.ndarray, say: Say,
@@ -88,7 +86,7 @@ def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.
     say("checks")
     nothing = np.zeros(len(classes))
     return checked(scene, read(packed(replace(library, nameless_share=nothing, second_share=nothing,
-                                               distance_share=nothing))), say)
+                                               distance_scatter=nothing))), say)
 
 
 def _paired(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say) -> Paired:
@@ -141,10 +139,7 @@ def _interaction(scene: Scene, library: Library, paired: Sequence[Paired]) -> np
     relative, noise = [], []
     for i in range(PAIRS):
         rng = np.random.default_rng([SEED, 97, i])
-        while True:
-            a, b = (int(j) for j in rng.choice(len(paired), 2, replace=False))
-            if not interchangeable(paired[a].drawing.kind.effect, paired[b].drawing.kind.effect):
-                break
+        a, b = two_of([p.drawing for p in paired], rng)
         f = fly(scene, i, [_drawn(paired[j], rng) for j in (a, b)])
         if f is None:
             continue
@@ -174,10 +169,8 @@ def _drawn(paired: Paired, rng: np.random.Generator) -> Active:
 def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the size of the smaller one's shift."""
     one, two = library.model.classes[a], library.model.classes[b]
-    first = fit(one, values, unchanged(len(values)))
-    known = coordinates_of(first.factors())
     flown = FlightFeatures(values, library.model)
-    both = flown.refitted(flown.at_fits((first, fit(two, known(values - first.shift), known))))
+    both = flown.with_two(one, two)
     return flown.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
@@ -190,7 +183,7 @@ def main() -> None:
     given = parser.parse_args()
     made = build(Scene(given.scenario, load(given.vehicle)), lambda text: print(text, flush=True))
     save(made, given.out)
-    for c, left, more, far in zip(made.model.classes, made.nameless_share, made.second_share, made.distance_share,
+    for c, left, more, far in zip(made.model.classes, made.nameless_share, made.second_share, made.distance_scatter,
                                     strict=True):
         print(f"{c.name} {c.shape or ''}: left {left:.3f}, more {more:.3f}, far {far:.3f}")
 

@@ -81,6 +81,12 @@ class FlightFeatures:
                for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
 
+    def with_two(self, one: EffectClass, two: EffectClass) -> Hypothesis:
+        """The hypothesis of two classes: the second fitted beside the first, then both in turn."""
+        first = fit(one, self.values, unchanged(len(self.values)))
+        known = coordinates_of(first.factors())
+        return self.refitted(self.at_fits((first, fit(two, known(self.values - first.shift), known))))
+
     def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis with its effects fitted in turn, each beside the others."""
         best, fits = hypothesis, list(hypothesis.fits)

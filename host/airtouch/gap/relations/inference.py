@@ -17,16 +17,19 @@ from airtouch.simulation.effects import get
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
 #: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
-#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence
-LEAST_NAMELESS = 10.0
+#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence: where they are
+#: right, a likelihood ratio over them has the mean 1, so that it is above exp(7) in one of 1000 flights (Markov)
+LEAST_NAMELESS = 7.0
 #: nats by which two effects must be likelier than one with a disturbance without a name beside it; 36 of 44 wrong
 #: pairs, found where the right effect was left out, were not
 OVER_NAMELESS = 30.0
-#: shares of the effects' evidence, beside those of their classes, that a disturbance without a name may gain and that
-#: the flight may lie off, because no curve is exact; PAIR: the same for two effects, because they are not a sum; FAR:
-#: factor on the limit of the distance. With them 95 of 100 flights with an effect are named right, and 16 get a wrong
-#: name where it is left out (`learning.SEED`)
-CRUDE_NAMELESS, CRUDE_DISTANCE, PAIR_NAMELESS, PAIR_DISTANCE, FAR = 0.01, 0.02, 0.01, 0.07, 1.5
+#: shares of the effects' evidence, beside that of their classes, that a disturbance without a name may gain, because no
+#: curve is exact; PAIR: the same for two effects, because they are not a sum
+CRUDE_NAMELESS, PAIR_NAMELESS = 0.01, 0.01
+#: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
+#: below 10,000 nats lie farther, half of them because they hit something (2,750 flights of `learning.SEED`, scatters
+#: and limit by other halves)
+FAR = 3.5
 MOST_EFFECTS = 3
 BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn
 TEMPERATURE = 2.0  #: of the probabilities: the densities' tails are heavier than normal ones
@@ -51,6 +54,11 @@ class Inference:
     limit: float
     readings: Mapping[str, Reading] = field(default_factory=dict)
 
+    @property
+    def likeliest(self) -> str:
+        """The effect that alone gains most over none."""
+        return max(self.evidence, key=lambda name: self.evidence[name])
+
     def probabilities(self) -> dict[str, float]:
         """Probabilities of each effect alone and of `none`; they sum to 1."""
         names = [*self.evidence, "none"]
@@ -63,11 +71,11 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     many = len(coordinates)
     flight = FlightFeatures(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
     singles = flight.single_effects()
-    second, nameless, distance = (
+    second, nameless, scatter = (
         {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, shares, strict=True)}
-        for shares in (library.second_share, library.nameless_share, library.distance_share))
+        for shares in (library.second_share, library.nameless_share, library.distance_scatter))
     best = _likeliest(flight, singles, second)
-    against = _nameless(flight, best, nameless), _distance(flight, library, best, distance)
+    against = _nameless(flight, best, nameless), _distance(flight, library, best, scatter)
     return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flight.nameless_evidence(flight.none),
                      *max(against, key=lambda a: a[0] / a[1]), _readings(best))
 
@@ -88,10 +96,12 @@ def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> tuple
     return flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence
 
 
-def _distance(flight: FlightFeatures, library: Library, best: Hypothesis, shares: Shares) -> tuple[float, float]:
+def _distance(flight: FlightFeatures, library: Library, best: Hypothesis, scatters: Shares) -> tuple[float, float]:
     """Nats by which a flight lies farther from effects than nominal flights from none, and their limit."""
-    share = _largest(best, shares) + CRUDE_DISTANCE + PAIR_DISTANCE * (len(best.fits) > 1)
-    return library.excess(flight.squared_distance(best)), FAR * (library.usual_excess + share * best.evidence)
+    of_pairs = library.pair_scatter * (len(best.fits) > 1)
+    scatter = np.linalg.norm([library.nominal_scatter, _largest(best, scatters) * best.evidence,
+                              of_pairs * best.evidence])
+    return library.excess(flight.squared_distance(best)), FAR * float(scatter)
 
 
 def _largest(of: Hypothesis, shares: Shares) -> float:

@@ -19,8 +19,8 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-MOST_DEVIATIONS = 4.0  #: standard deviations of the squared distance of nominal flights beyond which a flight is none
-SHARES = ("nameless_share", "second_share", "distance_share")
+MOST_DEVIATIONS = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none
+SHARES = ("nameless_share", "second_share", "distance_scatter")
 STORED = np.float16  #: numbers of a file; their rounding moves a coordinate by less than a tenth of its deviation
 
 
@@ -32,7 +32,9 @@ class Library:
     less the middle. distance: median and standard deviation of the squared size of coordinates of nominal flights that
     were not learned from. The shares (classes,) are nats over the evidence for the class, as four of five flights with
     it have at most: nameless_share, what a disturbance without a name gains beside it; second_share, what a second
-    effect gains; distance_share, by how much the flight lies farther from it than nominal flights from none.
+    effect gains. distance_scatter (classes,): scatter of the nats by which a flight with it lies farther from it than
+    nominal flights from none, over the evidence, beside the scatter of nominal flights; pair_scatter: the same of two
+    effects, beside those of their classes.
     """
 
     scenario: str
@@ -44,16 +46,17 @@ class Library:
     distance: tuple[float, float]
     nameless_share: np.ndarray
     second_share: np.ndarray
-    distance_share: np.ndarray
+    distance_scatter: np.ndarray
+    pair_scatter: float
 
     def coordinates(self, features: np.ndarray) -> np.ndarray:
         """Coordinates (n, Q) of features (n, features)."""
         return self.standard(features) @ self.projection - self.middle
 
     @property
-    def usual_excess(self) -> float:
-        """Nats of excess distance that hardly any nominal flight has."""
-        return 0.5 * MOST_DEVIATIONS * self.distance[1]
+    def nominal_scatter(self) -> float:
+        """Standard deviation of the excess distance of nominal flights, nats."""
+        return 0.5 * self.distance[1]
 
     def excess(self, squared: float) -> float:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
@@ -62,7 +65,7 @@ class Library:
     def nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
         middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < self.usual_excess
+        return self.excess(middle) < MOST_DEVIATIONS * self.nominal_scatter
 
     @property
     def effects(self) -> frozenset[str]:
@@ -75,7 +78,7 @@ class Library:
         keep = np.array([c.effect not in out for c in self.model.classes])
         classes = tuple(c for c in self.model.classes if c.effect not in out)
         return replace(self, model=replace(self.model, classes=classes), nameless_share=self.nameless_share[keep],
-                       second_share=self.second_share[keep], distance_share=self.distance_share[keep])
+                       second_share=self.second_share[keep], distance_scatter=self.distance_scatter[keep])
 
 
 def save(library: Library, path: Path) -> None:
@@ -94,6 +97,7 @@ def packed(library: Library) -> bytes:
         if c.readout is not None:
             arrays |= {f"{i}.strength": c.readout.strength, f"{i}.amount": c.readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
+             "pair_scatter": library.pair_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
              "readouts": [c.readout and c.readout.parameters for c in model.classes]}
     exact = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
@@ -114,7 +118,8 @@ def read(content: bytes) -> Library:
     middle, deviation = words["distance"]
     return Library(words["scenario"], words["vehicle"], Standard(a["standard.middle"], a["standard.deviation"]),
                    a["projection"], a["middle"], LearnedModel(classes, a["interaction"], a["nameless"]),
-                   (middle, deviation), *(a[name] for name in SHARES))
+                   (middle, deviation), a["nameless_share"], a["second_share"], a["distance_scatter"],
+                   words["pair_scatter"])
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:
