@@ -29,6 +29,7 @@ from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, fre
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import scatter_of
 from airtouch.gap.unnamed.generic import unnamed_floor
+from airtouch.robust import MAD_TO_SIGMA
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -189,7 +190,7 @@ def _alike(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[list[Flight], l
         return list(flights), []
     means = np.array([residual(f, vehicle)[(f.phase > 0) & f.usable][:, :6].mean(axis=0) for f in flights])
     away = np.abs(means - np.median(means, axis=0))
-    limit = np.maximum(ODD * 1.4826 * np.median(away, axis=0), FAR)
+    limit = np.maximum(ODD * MAD_TO_SIGMA * np.median(away, axis=0), FAR)
     odd = (away > limit).any(axis=1)
     if odd.sum() > len(flights) // 3:
         return list(flights), []
@@ -206,7 +207,7 @@ def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
     names = ("forward force", "sideways force", "lift", "roll torque", "pitch torque", "yaw torque")
     means = np.array([residual(f, study.vehicle, study.calibration)[(f.phase > 0) & f.usable][:, :6].mean(axis=0)
                       for f in flights])
-    spread = 1.4826 * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
+    spread = MAD_TO_SIGMA * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
     for f, row in zip(flights, means, strict=True):
         far = np.abs(row - np.median(means, axis=0)) / np.maximum(spread, 1e-9)
         i = int(np.argmax(far))
