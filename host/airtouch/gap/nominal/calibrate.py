@@ -34,7 +34,8 @@ from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-#: effect, its variant, and the prior's standard deviation of each free parameter in its own unit
+#: effect, its variant, and the prior's standard deviation of each free parameter in its own unit: chosen, what two
+#: vehicles of one kind may differ by; no measurement
 PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     *(("weak_motor", {"rotor": float(i)}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
     ("motor_lag", {}, {"factor": 0.5}),
@@ -42,10 +43,12 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
-ODD = 6.0  #: usual deviations from the others' mean by which a nominal flight is left out, and at least
-FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])  #: this, m/s^2 and rad/s^2
+#: a nominal flight is left out where its mean lies off the others' median by ODD of their deviations, and by FAR at
+#: least, m/s^2 and rad/s^2; chosen
+ODD = 6.0
+FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
 SCATTER_FLIGHTS = 4  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
-SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
+SENSITIVE = 3.0  #: half the deviations from the others' median beyond which a baseline flight is named; chosen
 
 
 @dataclass(frozen=True)
