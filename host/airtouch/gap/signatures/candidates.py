@@ -185,7 +185,6 @@ def unit(p) -> float:
 
 def neutral_of(p: Parameter) -> float:
     """The value of a parameter at which its effect does nothing; 0 where it has none."""
-    """The value at which a parameter does nothing, 0 where it has none."""
     return 0.0 if p.neutral is None else p.neutral
 
 
