@@ -77,7 +77,7 @@ def test_baseline_takes_every_file_up_to_the_next_option(folder, tmp_path):
     assert "Ranking" in result.output
 
 
-MAGNET = '''
+MADE_UP_PULL = '''
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench
 
@@ -85,23 +85,23 @@ from airtouch.simulation.effects import Effect, Parameter, wrench
 def pull(p, s, memory, stream, out):
     out[2] -= p[0] / (1.0 + (s[at.HEIGHT] / 0.2) ** 2)
 
-EFFECT = Effect("magnet", "a magnet in the floor",
+EFFECT = Effect("made_up_pull", "a magnet in the floor",
                 (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, "at the floor"),), wrench=pull)
 '''
 
 
 def test_each_flight_alone_with_an_effect_of_the_users_own(folder, tmp_path):
-    mine, out = tmp_path / "magnet.py", tmp_path / "out.json"
-    mine.write_text(MAGNET)
+    mine, out = tmp_path / "made_up_pull.py", tmp_path / "out.json"
+    mine.write_text(MADE_UP_PULL)
     left_out = [word for name in EFFECTS if name != "mass" for word in ("--without", name)]
     try:
         result = run("diagnose", f"{folder}/real_*", "--each", "--effects-file", mine, "--json", out, *left_out)
     finally:
-        unregister("magnet")
+        unregister("made_up_pull")
     assert result.exit_code == 0, result.output
     cases = json.loads(out.read_text(), parse_constant=no_constant)["cases"]
     assert [len(c["flights"]) for c in cases] == [1, 1]
-    assert all({r["name"] for r in c["ranking"]} == {"mass", "magnet", "none", "unknown"} for c in cases)
+    assert all({r["name"] for r in c["ranking"]} == {"mass", "made_up_pull", "none", "unknown"} for c in cases)
     assert "real_0.csv.gz" in result.output
 
 

@@ -13,6 +13,7 @@ from airtouch.vehicle import load
 from hovers import STIFF
 
 PAGE = Path(__file__).parents[2] / "host/docs/effects.md"
+NAME = "made_up_magnet"  #: not the page's: who follows it to its end has a magnet in the package
 FORCE_N = 0.02
 
 
@@ -20,8 +21,8 @@ FORCE_N = 0.02
 def magnet(tmp_path):
     """The docs' own example, registered for one test."""
     code = re.search(r"```python\n(\"\"\"A made-up effect.*?)```", PAGE.read_text(encoding="utf-8"), re.S).group(1)
-    file = tmp_path / "magnet.py"
-    file.write_text(code, encoding="utf-8")
+    file = tmp_path / f"{NAME}.py"
+    file.write_text(code.replace('"magnet"', f'"{NAME}"'), encoding="utf-8")
     (effect,) = effects.load_file(file)
     yield effect
     effects.unregister(effect.name)
@@ -33,18 +34,18 @@ def fly(count, seed, chosen=()):
 
 def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     vehicle = load("crazyflie-2.1-flow")
-    nominal, real = fly(4, 1), fly(1, 2, [("magnet", {"force": FORCE_N})])
+    nominal, real = fly(4, 1), fly(1, 2, [(NAME, {"force": FORCE_N})])
     assert len(Path(PAGE).read_text().split("```python")[1].split("```")[0].splitlines()) < 60
     diagnosis = diagnose(real, vehicle, nominal)
-    assert diagnosis.verdict == "effect" and diagnosis.effects[0].name == "magnet"
+    assert diagnosis.verdict == "effect" and diagnosis.effects[0].name == NAME
     force = diagnosis.effects[0].parameters["force"]
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
     assert diagnosis.shrink.value > 0.8
     assert abs(diagnosis.control["shrink"]["value"]) < 0.2
-    (switch_on,) = [step.command for step in diagnosis.next if "magnet" in step.text]
-    assert "magnet.py --effect magnet:force=" in switch_on  # without its file the command would be refused
-    left_out = brief(diagnosis.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
-    assert "magnet" not in [r.name for r in left_out.ranking]
+    (switch_on,) = [step.command for step in diagnosis.next if NAME in step.text]
+    assert f"{NAME}.py --effect {NAME}:force=" in switch_on  # without its file the command would be refused
+    left_out = brief(diagnosis.held[0], list(measure.usable(real, vehicle, [])), (NAME,))  # the same calibration
+    assert NAME not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > diagnosis.gap["after"]
     unknown, nearest, *_ = left_out.ranking
     assert left_out.verdict == unknown.name == "unknown" and unknown.shrink.value == 0.0  # as nothing is named

@@ -1,15 +1,32 @@
 """Every operation: NumPy, Keras, the window and int8 are one function; a convolution is SciPy's filter."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from airtouch.detector.best.operations import CONV, HEAD, OPERATIONS
+from airtouch.detector.best import operations
+from airtouch.detector.best.operations import CONV, HEAD
+from airtouch.reference.networks.int8_network import Int8Layer, requantise
 from airtouch.reference.networks.stream_graph import StreamLayer, taps_of
 from airtouch.reference.networks.stream_int8 import int8_layer
 from skips import needs
 
 ROWS, WIDTH = 40, 4
+PAGE = Path(__file__).parents[3] / "host/docs/change-the-network.md"
+
+
+def of_the_page():
+    """The operation that the page adds, as its reader has it in `operations`."""
+    (code,) = re.findall(r"```python\n(DEPTHWISE = .*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    scope = {**vars(operations), "Int8Layer": Int8Layer, "requantise": requantise}
+    exec(code, scope)
+    return {scope["DEPTHWISE"]: scope["DEPTHWISE_OPERATION"]}
+
+
+OPERATIONS = operations.OPERATIONS | of_the_page()
 
 
 def case(name):

@@ -5,12 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from airtouch.gap.answer.unexplained import fails
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.gates import TOLD
+from airtouch.gap.evidence.gates import TOLD, gated
 from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
@@ -18,7 +19,7 @@ from airtouch.gap.naming.selection import Judged, probabilities
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter, size_of
+from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Scatter, size_of
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
@@ -172,6 +173,35 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
     selection, _ = select_from([pushed], names, scattered(**nominal_sizes), ())
     assert [s.name for s in selection.named] == named
     assert ("downwash" in selection.singles) == ("downwash" in named)
+
+
+@pytest.mark.parametrize(("less", "named"), [(judging.LEAST_GAIN - 1.0, []), (judging.LEAST_GAIN + 1.0, ["downwash"])])
+def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
+    """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
+    flights, study = [with_a_push(9.0, 15.0)], scattered()
+    gain = gated(Data(study, flights, slow=True))["downwash"].gain
+    monkeypatch.setattr("airtouch.gap.naming.select.height_gain", lambda *_: gain - less)
+    assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
+
+
+def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_nominal_flights_have():
+    """A push all along, harder for half of the flight: the harder half alone gains most, and less beside a mass."""
+    harder = with_a_push(8.0, 23.0, mps2=0.35)
+    flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
+    selection, data = select_from(flights, ("mass",), scattered(), ())
+    wake, mass = selection.steps
+    assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
+    least, share, gain = (size_of(nats / seconds(data), wake.strength) for nats in (mass.share, wake.share, wake.gain))
+
+    def names_where_nominal_flights_have(size):
+        """FALSE_SHARE of the nominal flights have a larger one."""
+        study, spread = scattered(), 0.1
+        middle = size - spread * student.ppf(1.0 - FALSE_SHARE, study.scatter.freedom)
+        study = replace(study, scatter=replace(study.scatter, passing={"downwash": (middle, spread)}))
+        return {s.name for s in select_from(flights, ("mass",), study, ())[0].steps}
+
+    assert names_where_nominal_flights_have(0.5 * (share + gain)) == {"mass"}
+    assert names_where_nominal_flights_have(0.5 * (least + share)) == {"mass", "downwash"}
 
 
 @pytest.mark.parametrize(("overhead", "key", "since_s"), [((9.0, 12.0), TOLD, 9.0), ((20.0, 22.0), "downwash", 9.04)])

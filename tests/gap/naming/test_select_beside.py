@@ -9,13 +9,26 @@ from scipy.signal import lfilter
 from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
-from airtouch.gap.naming.select import nameless
+from airtouch.gap.naming.select import nameless, select
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, fly, noise
-from hovers import DOWN, FLOOR, LIFT_N, STIFF, candidates_of, hover, own_gain, scattered, select_from, swaying, weak
+from hovers import (
+    ALWAYS,
+    DOWN,
+    FLOOR,
+    LIFT_N,
+    STIFF,
+    candidates_of,
+    hover,
+    own_gain,
+    scattered,
+    select_from,
+    swaying,
+    weak,
+)
 
 
 @pytest.fixture(scope="module")
@@ -219,6 +232,18 @@ def test_what_an_effect_adds_includes_its_companion():
     assert shares["gust"] == pytest.approx(selection.whole.gain - own_gain(data, [mass]), abs=0.3)
     of_gust = own_gain(data, [gust, drag]) - judging.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
     assert shares["mass"] == pytest.approx(selection.whole.gain - of_gust, abs=0.3)
+
+
+def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
+    """Gusts that have no drag beside them, and the rotors' drag: what gusts add is all but what the drag gains."""
+    without_companion = all_candidates(without=("rotor_drag",))["gust"]
+    data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)], slow=True)
+    selection = select(data, {**candidates_of(["rotor_drag"]), "gust": without_companion}, without=ALWAYS)
+    shares = {s.name: s.share for s in selection.named}
+    assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.whole.terms)
+    drag = [t for t in selection.whole.terms if t.name == "rotor_drag"]
+    of_drag = own_gain(data, drag) - judging.PRICE  # a second axis of drag
+    assert shares["gust"] == pytest.approx(selection.whole.gain - of_drag, abs=0.5), "a fit that began elsewhere"
 
 
 def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():

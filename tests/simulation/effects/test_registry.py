@@ -121,7 +121,7 @@ def pull(p, s, memory, generator, out):
 
 
 EFFECT = Effect(
-    "magnet", "a magnet in the floor",
+    "made_up_pull", "a magnet in the floor",
     (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, "at the floor"),
      Parameter("reach", "m", 0.2, 0.01, 1.0, None, "height at which half is left")),
     wrench=pull)
@@ -130,19 +130,19 @@ EFFECT = Effect(
 
 def test_an_effect_of_your_own_is_one_short_file(tmp_path, short, vehicle, signals):
     assert len(OWN.splitlines()) < 60
-    path = tmp_path / "magnet.py"
+    path = tmp_path / "made_up_pull.py"
     path.write_text(OWN)
     (effect,) = effects.load_file(path)
     try:
-        pulled, nominal = short({"magnet": {"force": 0.02}}), short()
+        pulled, nominal = short({"made_up_pull": {"force": 0.02}}), short()
         extra_thrust = vehicle.thrust(pulled.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1) - vehicle.thrust(
             nominal.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1)
         assert extra_thrust[150:].mean() > 0.001
         signals[:, at.HEIGHT] = 0.2
-        force = replay.wrench_of(effects.activate({"magnet": {"force": 0.02}})[0], signals)
+        force = replay.wrench_of(effects.activate({"made_up_pull": {"force": 0.02}})[0], signals)
         np.testing.assert_allclose(force[:, 2], -0.01)
     finally:
-        effects.unregister("magnet")
+        effects.unregister("made_up_pull")
     assert effect.name not in effects.EFFECTS
 
 

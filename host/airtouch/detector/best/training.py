@@ -30,6 +30,8 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         free_air: Sequence[Flight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
     """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
 
+    The order of TensorFlow's sums, and so the bits, depends on how many threads it has: all processors, or
+    TF_NUM_INTRAOP_THREADS.
     free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
     resume: file that holds the state, written every KEEP_EVERY steps; a call with the same arguments goes on from
     there, to the same bits. It is removed at the end.

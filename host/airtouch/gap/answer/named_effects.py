@@ -14,9 +14,9 @@ from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import Found
 from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term
 
-SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data
+SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
 RESTARTS = 12  #: of a fit of several parameters, at most
-#: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong
+#: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong; chosen
 MODEL_ERROR = 0.1
 #: fraction of an effect's only parameter by which the loop's model may be wrong, where the relations of signals measure
 #: it too: replayed inertia and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets

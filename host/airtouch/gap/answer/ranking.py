@@ -12,8 +12,9 @@ from airtouch.gap.result import Found, Quantity, Ranked
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import CLOCK
 
-AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none
-CLOSE = 3.0  #: nats of held-out log likelihood; two candidates that differ by less cannot be told apart
+AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
+#: nats of held-out log likelihood; two candidates that differ by less cannot be told apart: odds of 20, chosen
+CLOSE = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> str:

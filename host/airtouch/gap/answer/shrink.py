@@ -19,8 +19,8 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import Term
 
-SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor
-MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has
+SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
+MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
 FEWEST = 12  #: values that a cell needs
 DRAWS = 400  #: bootstrap samples of the shrink
 PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws

@@ -25,9 +25,9 @@ TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Ma
 LEAST_DAMPING, CALMED = 0.01, 0.1  #: damping after a step that failed; factor on it after a step that gained
 TURNS, SETTLED = 6, 0.3  #: most turns of fitting mean, then random effects; nats that a further turn must gain
 ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn
-PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
-COMMAND_PRIOR = 1.5  #: the same for effects that only the commands show
-CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell
+PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps; chosen: it says next to nothing
+COMMAND_PRIOR = 1.5  #: the same for effects that only the commands show; chosen
+CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
 CLOSE = 0.05  #: scaled parameter at which the fit of a new effect begins: some have no slope at neutral itself
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: scaled parameters from which effects of the loop may start
 

@@ -22,6 +22,7 @@ from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import Term, random_of
 from airtouch.logs.segments import KINDS
 
+#: no number here has a source unless it says so: all were chosen
 MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
 WORST = 0.25  #: share of the blocks, those explained worst, that an effect is first fitted to
 ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches

@@ -22,7 +22,7 @@ from airtouch.logs.segments import runs
 PLACE = ("x_m", "y_m", "z_m")
 #: where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-APART_S = 0.1  #: stretches with less between them are one
+APART_S = 0.1  #: stretches with less between them are one; like those below it was chosen
 LEAST_S = 0.05  #: shorter ones are none
 SHIFTS = 8  #: of the told seconds around the rest of the flight
 MARGIN_S = 0.25  #: around the told seconds, in which a wake may already or still act

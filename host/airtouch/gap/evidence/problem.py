@@ -28,11 +28,12 @@ from airtouch.simulation.effects import Active
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
-DOUBT = 0.25  #: relative error of the loop model in a change of the torque by effects that change the loop
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell
+#: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
+DOUBT = 0.25
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell: about octaves; no other source
 REST_VIEW, COMMAND_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
 GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
-FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail
+FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 
 
 @dataclass(frozen=True)

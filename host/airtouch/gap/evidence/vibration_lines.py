@@ -23,8 +23,8 @@ from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import hover_speed
 
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
-WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one
-SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place
+WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one; chosen
+SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place, tried one by one; chosen
 KNOWN_SPEED = 0.02  #: relative error of a rotor's speed where the vehicle declares thrust over speed squared
 RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: below it forces of other origin are strong

@@ -17,8 +17,8 @@ from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, strength_term
 from airtouch.gap.signatures.nominal_scatter import Scatter
 
-HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
-FULL = 5  #: candidates that are fitted in full, after a first look at all
+HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer in this view; chosen
+FULL = 5  #: candidates that are fitted in full, after a first look at all; chosen for time
 Waiting = tuple[str, Hypothesis, float]  #: name, terms, and what the choice of the variant costs
 
 

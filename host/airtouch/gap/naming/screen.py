@@ -16,8 +16,8 @@ from airtouch.gap.evidence.problem import Part, Problem, problem_of
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.signatures.candidates import MEAN, Term
 
-STEP = 0.25  #: of a parameter's natural step, at which the change is taken
-ROUNDS = 3
+STEP = 0.25  #: of a parameter's natural step, at which the change is taken; chosen
+ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen
 NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none
 
 

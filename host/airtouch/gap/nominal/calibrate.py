@@ -31,11 +31,13 @@ from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, fre
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import Apparent, scatter_of
 from airtouch.gap.unnamed.generic import unnamed_floor
+from airtouch.robust import MAD_TO_SIGMA
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-#: effect, its variant, and the prior's standard deviation of each free parameter in its own unit
+#: effect, its variant, and the prior's standard deviation of each free parameter in its own unit: chosen, what two
+#: vehicles of one kind may differ by; no measurement
 PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     *(("weak_motor", {"rotor": float(i)}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
     ("motor_lag", {}, {"factor": 0.5}),
@@ -43,10 +45,12 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
-ODD = 6.0  #: usual deviations from the others' mean by which a nominal flight is left out, and at least
-FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])  #: this, m/s^2 and rad/s^2
+#: a nominal flight is left out where its mean lies off the others' median by ODD of their deviations, and by FAR at
+#: least, m/s^2 and rad/s^2; chosen
+ODD = 6.0
+FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
 SCATTER_FLIGHTS = 4  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
-SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
+SENSITIVE = 3.0  #: half the deviations from the others' median beyond which a baseline flight is named; chosen
 
 
 @dataclass(frozen=True)
@@ -196,7 +200,7 @@ def _alike(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[list[Flight], l
         return list(flights), []
     means = np.array([residual(f, vehicle)[(f.phase > 0) & f.usable][:, :6].mean(axis=0) for f in flights])
     away = np.abs(means - np.median(means, axis=0))
-    limit = np.maximum(ODD * 1.4826 * np.median(away, axis=0), FAR)
+    limit = np.maximum(ODD * MAD_TO_SIGMA * np.median(away, axis=0), FAR)
     odd = (away > limit).any(axis=1)
     if odd.sum() > len(flights) // 3:
         return list(flights), []
@@ -213,7 +217,7 @@ def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
     names = ("forward force", "sideways force", "lift", "roll torque", "pitch torque", "yaw torque")
     means = np.array([residual(f, study.vehicle, study.calibration)[(f.phase > 0) & f.usable][:, :6].mean(axis=0)
                       for f in flights])
-    spread = 1.4826 * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
+    spread = MAD_TO_SIGMA * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
     for f, row in zip(flights, means, strict=True):
         far = np.abs(row - np.median(means, axis=0)) / np.maximum(spread, 1e-9)
         i = int(np.argmax(far))

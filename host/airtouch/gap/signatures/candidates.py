@@ -18,7 +18,7 @@ from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, get
 #: how an effect shows: in the mean of the gap, in its spectrum, in the logged times alone
 MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
-RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter whose default is neutral
+RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter whose default is neutral; chosen
 #: parameters that a fit frees, by effect; the others have the same effect in most logs
 _FREE = {
     "ground_effect": ("strength",), "rotor_drag": ("horizontal", "vertical"), "wind": ("x", "y", "z"),
@@ -34,7 +34,8 @@ _FREE = {
 #: effects that do not show in the mean
 _KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
          "time_jitter": CLOCK, "packet_loss": CLOCK}
-#: values of parameters that are tried one by one, in their units (m, s, fractions, number of the rotor)
+#: values of parameters that are tried one by one, in their units (m, s, fractions, number of the rotor); chosen, a
+#: factor of two to five apart, so that a fit between two of them loses little
 _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "ground_effect": tuple({"fade": x} for x in (0.0, 0.06, 0.0875, 0.129)),
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
@@ -184,7 +185,6 @@ def unit(p) -> float:
 
 def neutral_of(p: Parameter) -> float:
     """The value of a parameter at which its effect does nothing; 0 where it has none."""
-    """The value at which a parameter does nothing, 0 where it has none."""
     return 0.0 if p.neutral is None else p.neutral
 
 

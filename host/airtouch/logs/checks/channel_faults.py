@@ -4,6 +4,7 @@ import numpy as np
 
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, AXES, GYRO, PWM, RANGES, FlightLog
+from airtouch.robust import MAD_TO_SIGMA
 
 STUCK_S = 0.5  #: s; a sensor or motor value that does not change for longer in flight is stuck
 GYRO_LIMIT = np.deg2rad(2000.0)  #: rad/s, full scale of the BMI088's gyro as the firmware configures it
@@ -96,7 +97,7 @@ def spikes(log: FlightLog) -> dict[str, list[int]]:
     with np.errstate(invalid="ignore", over="ignore"):
         steps = np.diff([log.columns[name] for name in names])
         left, right = steps[:, :-1], -steps[:, 1:]
-        limits = np.maximum(floors, SPIKE_NOISE * 1.4826 * _medians(np.abs(left)))[:, None]
+        limits = np.maximum(floors, SPIKE_NOISE * MAD_TO_SIGMA * _medians(np.abs(left)))[:, None]
         out = (np.minimum(np.abs(left), np.abs(right)) > limits) & (left * right > 0)
         out &= np.abs(left - right) < limits / 3
     return {name: (np.flatnonzero(one) + 1).tolist() for name, one in zip(names, out, strict=True) if one.any()}

@@ -19,10 +19,10 @@ from scipy.optimize import lsq_linear
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
+from airtouch.robust import MAD_TO_SIGMA
 from airtouch.twin.fitting import fly
 from airtouch.twin.fitting import levers as lever_set
 from airtouch.twin.fitting.levers import Lever
-from airtouch.twin.recorded.channels import NORMAL
 from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import GROUPS, names
 from airtouch.vehicle import Vehicle
@@ -81,7 +81,7 @@ def target_of(courses: Sequence[Course], features: np.ndarray) -> Target:
     for k, feature in enumerate(names()):
         values = features[np.isfinite(features[:, k]), k]
         if len(values) >= MIN_FLIGHTS:
-            deviation = 0.0 if feature.paired else NORMAL * np.median(np.abs(values - np.median(values)))
+            deviation = 0.0 if feature.paired else MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))
             scatter[k] = max(deviation, feature.least)
     return Target(list(courses), features, scatter)
 

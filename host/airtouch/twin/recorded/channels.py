@@ -24,7 +24,6 @@ LAG_S, DELAY = 0.06, 2  #: first-order lag (s) and delay (samples) of thrust, as
 #: percentile of the lagged thrust, and fraction of it from which the drone flies; no source: round numbers
 FLIGHT_PERCENTILE, FLIGHT_FRACTION = 90, 0.5
 RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
-NORMAL = 1.4826  #: standard deviation of a normal variable over its median absolute deviation
 #: motors 1 to 4 to roll, pitch, yaw and mean
 MIX = np.array([[-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1], [0.25, 0.25, 0.25, 0.25]])
 

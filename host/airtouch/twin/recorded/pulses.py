@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.reference.finite import hold_finite
-from airtouch.twin.recorded.channels import NORMAL
+from airtouch.robust import MAD_TO_SIGMA
 
 PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
 PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
@@ -25,7 +25,7 @@ def period(log: FlightLog, start: int, stop: int) -> float:
     if stop - start < MIN_PULSES * PERIODS_S[0] * RATE_HZ:
         return 0.0
     jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)
-    size = NORMAL * np.median(np.abs(jumps - np.median(jumps)))
+    size = MAD_TO_SIGMA * np.median(np.abs(jumps - np.median(jumps)))
     if size <= 0.0:
         return 0.0
     jumps = np.clip(jumps / size, -CLIP, CLIP)
