@@ -58,8 +58,8 @@ def _bias(s: float, rng: np.random.Generator) -> Values:
             for a, v in zip("xyz", part, strict=True)}
 
 
-#: each effect as it is drawn; the number is its highest plausible strength, in the unit of the parameter that it scales,
-#: chosen for a small quadrotor that still flies; no measurement
+#: each effect as it is drawn; the number is its highest plausible strength, in the unit of the parameter that it
+#: scales, chosen for a small quadrotor that still flies; no measurement
 KINDS: dict[str, Kind] = {
     "ground_effect": Kind("ground_effect", 2.0, lambda s, rng: {"strength": s, "turbulence": 0.3}),
     "rotor_drag": Kind("rotor_drag", 0.06, _one("horizontal")),
