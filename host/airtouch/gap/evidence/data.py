@@ -49,7 +49,7 @@ class Study:
 
     @property
     def recorded(self) -> bool:
-        """Whether they are not; neither where there are none."""
+        """Whether its nominal flights are recorded ones. Without nominal flights this is False, as `simulated` is."""
         return self.scatter is not None and not self.scatter.exact
 
 

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
+from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
+from airtouch.gap.signatures.candidates import Term
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
@@ -26,7 +28,7 @@ LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is
 SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
-def growth(term: Any, x: float) -> float:
+def growth(term: Term, x: float) -> float:
     """Added power at scaled strength x over that at 1."""
     if term.name == "imu_noise":
         values = term.at(np.array([x])), term.at(np.array([1.0]))
@@ -34,7 +36,7 @@ def growth(term: Any, x: float) -> float:
     return x * x
 
 
-def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
+def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     of_unit = data.workspace.once("random", (term.name, *sorted(unit.values.items())),
@@ -49,7 +51,7 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
     return [{r: scale * v for r, v in f.items()} for f in of_unit]
 
 
-def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
+def _covered(data: Data, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
     """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[regime], data.first[i][regime]
@@ -58,7 +60,7 @@ def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, fl
     return (windows @ weight / weight.sum())[:, None, None]
 
 
-def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """PSD (blocks, bins, COUNT) by regime that a random effect of unit strength adds to flight i."""
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
     maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
@@ -69,7 +71,7 @@ def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     return power_by_regime
 
 
-def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+def _imu_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
     """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
     row = prepare(data.study.vehicle, ())[0][0]
     extra = term.values["factor"] ** 2 - 1.0
@@ -101,7 +103,7 @@ def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
     return 2.0 * PERIOD_S * total / filters.noise_gain(b) ** 2
 
 
-def _gyro_share(study: Any) -> np.ndarray:
+def _gyro_share(study: Study) -> np.ndarray:
     """Share (bins, 3) of the gyro's noise in what moves the roll and pitch commands of nominal flights.
 
     The commands' noise is what the floor of the angular acceleration holds beyond the gyro's own.
@@ -124,7 +126,7 @@ def _difference(regime: str) -> np.ndarray:
     return 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
 
 
-def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+def _motor_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
     """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing."""
     flight, study = data.flights[i], data.study
     row = prepare(study.vehicle, study.calibration)[0][0]
@@ -151,7 +153,7 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
     return out
 
 
-def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+def _vibration(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
     """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
     out = {r: np.zeros(s) for r, s in shape.items()}
     if not len(data.base[i][AIR]):
@@ -172,7 +174,7 @@ def _over_a_sample() -> np.ndarray:
     return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
 
 
-def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """Power by regime of an effect that is run on the flight's own signals with several seeds.
 
     A channel has one shape of the spectrum, at the strength of each block.

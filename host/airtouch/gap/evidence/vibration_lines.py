@@ -11,10 +11,10 @@ stand, so that flights of one vehicle differ: each has its own share of the powe
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.likelihood import tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH
@@ -46,7 +46,7 @@ class Lines:
     spread_hz: float
 
 
-def lines(data: Any) -> Lines:
+def lines(data: Data) -> Lines:
     """The lines of the flights of `data` (`data.Data`); computed once."""
     return data.workspace.once("lines", (), lambda: _search(data))
 
@@ -81,7 +81,7 @@ def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
     return out
 
 
-def speeds(flight: Flight, study: Any) -> np.ndarray:
+def speeds(flight: Flight, study: Study) -> np.ndarray:
     """Rotor speeds (n, 4), rad/s: logged ones, or those of the mean command with each rotor's trim."""
     if flight.log.has(*RPM):
         return np.nan_to_num(flight.log.stack(RPM)) * np.pi / 30.0
@@ -91,7 +91,7 @@ def speeds(flight: Flight, study: Any) -> np.ndarray:
     return common + (replayed - common)[flight.phase != GROUND].mean(axis=0)
 
 
-def _search(data: Any) -> Lines:
+def _search(data: Data) -> Lines:
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
     each = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
@@ -112,7 +112,7 @@ def _search(data: Any) -> Lines:
 class _Sample:
     """Some blocks of all flights, and how well lines at a place explain them."""
 
-    def __init__(self, data: Any, each: list[np.ndarray]) -> None:
+    def __init__(self, data: Data, each: list[np.ndarray]) -> None:
         blocks = np.concatenate([b[AIR][:, :, :3] for b in data.base])
         chosen = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).astype(int)) if len(blocks) else []
         self.share, self.floor = _over_floor(data, blocks[chosen])
@@ -129,7 +129,7 @@ def _judged() -> np.ndarray:
     return (f >= LOWEST_HZ) & (f < f[-1])
 
 
-def _over_floor(data: Any, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Power (blocks, bins) of the three axes over their floor, mean of them, and that floor (bins,)."""
     floor = data.study.floor.power[AIR][_judged(), :3]
     with np.errstate(invalid="ignore"):
@@ -154,7 +154,7 @@ def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     return max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))])
 
 
-def _with_flight_shares(data: Any, power: list[np.ndarray]) -> list[np.ndarray]:
+def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]:
     """Lines of several flights, each with its share of the power; 1 on average."""
     if len(power) < 2:
         return power

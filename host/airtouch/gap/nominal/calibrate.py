@@ -50,7 +50,8 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
 ODD = 6.0
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
 SCATTER_FLIGHTS = 4  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
-SENSITIVE = 3.0  #: half the deviations from the others' median beyond which a baseline flight is named; chosen
+#: half of the deviations from the others' median beyond which a note names a baseline flight; chosen
+SENSITIVE = 3.0
 
 
 @dataclass(frozen=True)
