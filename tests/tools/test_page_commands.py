@@ -88,7 +88,9 @@ def understood_by_click(command: click.Command, arguments: list[str], typed: boo
     """Raise click.UsageError if the command would: for options, values, and what is missing in a typed one."""
     context = click.Context(command)
     while isinstance(command, click.Group) and arguments and not arguments[0].startswith("-"):
-        name, command, arguments = command.resolve_command(context, arguments)
+        name, found, arguments = command.resolve_command(context, arguments)
+        assert found is not None  # resolve_command raises for a name that it does not know
+        command = found
         context = click.Context(command, info_name=name, parent=context)
     given, rest, _ = command.make_parser(context).parse_args(list(arguments))
     if rest and not isinstance(command, click.Group):
