@@ -24,6 +24,7 @@ from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.reference.edge_decoder import DecoderConfig
 
 MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: round number, 1 s at 0.3 m/s
@@ -125,6 +126,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/sensor_figures.py")
     options = parser.parse_args()
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
+    if not flights:
+        raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
     settings = candidates(options.count, np.random.default_rng(0), options.hold)
     results = [outcomes(flights, config) for config in track(settings, "settings")]
     show("as shipped", flights, outcomes(flights, best.DECODER))
@@ -159,4 +162,5 @@ def _text(f: dict[str, float]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("choose_decoder"):
+        main()

@@ -18,7 +18,7 @@ import numpy as np
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.twin.comparison.two_sample import MIN_FLIGHTS, two_sample, windows
 from airtouch.twin.recorded.channels import channels
 from airtouch.twin.recorded.course import PHASES, Course, course
@@ -70,4 +70,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("days_apart"):
+        main()

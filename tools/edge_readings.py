@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import vehicle
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.simulation.firmware import range_module, settings
 from airtouch.simulation.flight import Diverged, fly
 from airtouch.twin import files
@@ -171,4 +171,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("edge_readings"):
+        main()

@@ -184,6 +184,7 @@ def main() -> None:
     made_by = engine(options.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
+    print(f"compiling {', '.join(names)}", file=sys.stderr, flush=True)
     programs = build(names, made_by, flags=LONG)
     if options.replay:
         sys.exit(max(subprocess.run([programs[name], *options.replay]).returncode for name in names))

@@ -1,7 +1,7 @@
 """CrazyPAD: every flight diagnosed alone, calibrated on the other normal flights of its drone.
 
-    python tools/gap_crazypad.py FOLDER [--json cases.jsonl] [--leave-one-out]
-    python tools/gap_crazypad.py FOLDER --corrections
+    python tools/gap_crazypad.py [FOLDER] [--json cases.jsonl] [--leave-one-out]
+    python tools/gap_crazypad.py [FOLDER] --corrections
 
 FOLDER holds the flights and their manifest.csv. The label is read after the diagnosis. With
 --json, cases that the file holds already are not diagnosed again. What the diagnosis
@@ -14,6 +14,7 @@ believes beforehand (`hover_balance.Beliefs`) was chosen with these conditions i
 import argparse
 import itertools
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -106,11 +107,14 @@ def _diagnosed(rows: list[dict], patterns: list[np.ndarray], vehicle: vehicles.V
 def main() -> None:
     """Diagnose every flight, or fit the answer to corrections, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", nargs="?", type=Path, help="with a manifest.csv (FLIGHTS/crazypad)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
     parser.add_argument("--json", type=Path, help="cases already done are read from here, new ones appended")
     parser.add_argument("--leave-one-out", action="store_true", help="also with beliefs chosen by the others")
     parser.add_argument("--corrections", action="store_true", help="only fit the answer to corrections of the estimate")
     options = parser.parse_args()
+    if not (options.folder / "manifest.csv").is_file():
+        parser.error(f"{options.folder} has no manifest.csv: give CrazyPAD's folder, or set AIRTOUCH_FLIGHTS")
     if options.corrections:
         show_corrections(options.folder)
         return

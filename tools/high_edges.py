@@ -27,7 +27,7 @@ from airtouch.detector.best.network import float_logits
 from airtouch.detector.best.recipe import STRIDE
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.shared import training_set
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import NAMES
 from airtouch.simulation import scenario
@@ -191,4 +191,5 @@ def print_responses(groups: Groups, twin: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("high_edges"):
+        main()

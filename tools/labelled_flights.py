@@ -39,7 +39,7 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.detector.shared import sensors, training_set
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
@@ -278,4 +278,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("labelled_flights"):
+        main()

@@ -18,6 +18,7 @@ from airtouch.detector.best.batches import channels_of
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import reliability_of
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
@@ -37,7 +38,10 @@ def main() -> None:
     options = parser.parse_args()
     folder = need_flights()
     file = next(f for f in dataset.collect([folder]) if f.path.name == options.flight)
-    path = next(iter(sorted(options.models.glob(f"best_fold{file.condition.fold}_*.npz"))))
+    path = min(options.models.glob(f"best_fold{file.condition.fold}_*.npz"), default=None)
+    if path is None or not options.json.is_file():
+        raise AirTouchError(f"{options.models if path is None else options.json} is not there: airtouch crossval "
+                            f"--out {options.models} --json {options.json}")
     write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
     scores = [FlightScore.from_dict(s) for s in json.loads(options.json.read_text())["per_flight"]]
     write_bytes(reliability({"best": reliability_of(scores)}), options.out / "reliability.png", force=True)
@@ -74,4 +78,5 @@ def draw(log, model, name: str) -> bytes:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("picture"):
+        main()

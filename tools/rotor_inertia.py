@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from airtouch import logs, vehicle
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation.body.rigid_body import SPIN
@@ -102,4 +102,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("rotor_inertia"):
+        main()

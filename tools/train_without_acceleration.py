@@ -20,6 +20,7 @@ from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.shared import sensors
+from airtouch.errors import in_one_line
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
@@ -67,4 +68,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("train_without_acceleration"):
+        main()

@@ -5,6 +5,7 @@ their first use, so `import airtouch` is fast.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from airtouch.gap.measure import Measurement
     from airtouch.gap.result import Diagnosis
     from airtouch.simulation.scenario import Scenario
-    from airtouch.twin.adapt import Adapted
+    from airtouch.twin.adapt import Adapted, Progress
     from airtouch.vehicle import Vehicle
 
     Flight: TypeAlias = str | Path | FlightLog | DataFrame
@@ -180,12 +181,14 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
 
 
 def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin: str | Path | None = None,
-          speed_mps: float | None = None, seed: int = 0, hold_out: bool = True, force: bool = False) -> "Adapted":
+          speed_mps: float | None = None, seed: int = 0, hold_out: bool = True, force: bool = False,
+          progress: "Progress | None" = None) -> "Adapted":
     """Train a detector for the drone of these flights, and write it to `out`. The same call continues after a stop.
 
     twin: a folder of `airtouch twin`, None for the plain simulator. speed_mps: commanded speed, if no manifest states
-    it. hold_out: also measure the errors by cross-validation. Raises AirTouchError without the extra 'train', without
-    a flight that crosses an edge, and for an `out` that exists, without `force`.
+    it. hold_out: also measure the errors by cross-validation. progress: called as progress(stage, done, total, note),
+    since this takes minutes. The result's `plain()` says what was done. Raises AirTouchError without the extra
+    'train', without a flight that crosses an edge, and for an `out` that exists, without `force`.
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
@@ -205,9 +208,9 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
     craft = vehicles.load(Path(twin) / files.VEHICLE if twin else DEFAULT_VEHICLE)
     adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed,
-                           hold_out=hold_out, command="airtouch.adapt(...)")
+                           hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
-    return adapted
+    return replace(adapted, left_out=left_out)
 
 
 def _flown_speed(log: FlightLog) -> float | None:

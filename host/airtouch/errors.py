@@ -1,7 +1,9 @@
 """The exception that users see, and functions that prepare text for its message."""
 
 import difflib
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class AirTouchError(ValueError):
@@ -9,6 +11,16 @@ class AirTouchError(ValueError):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+@contextmanager
+def in_one_line(program: str) -> Iterator[None]:
+    """For a program of its own, as those in `tools`: an AirTouchError ends it with its line and exit code 2."""
+    try:
+        yield
+    except AirTouchError as error:
+        print(f"{program}: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 def printable(text: str, most: int = 40) -> str:

@@ -4,6 +4,7 @@ The C header `firmware/kernels/airtouch_parameters.h` is generated from here
 (`python -m airtouch.parameters`); a test fails when it is stale.
 """
 
+import argparse
 from dataclasses import asdict, dataclass, fields
 
 
@@ -48,4 +49,5 @@ def c_header(parameters: Parameters = DEFAULT) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print(c_header(), end="")

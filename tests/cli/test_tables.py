@@ -1,13 +1,16 @@
 """What commands print fits the terminal: nothing is cut off, and a command can be copied."""
 
 import io
+import re
 import subprocess
 import sys
+import time
 
 import pytest
 from rich.console import Console
 
 from airtouch.cli.gap import show
+from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
 from airtouch.gap import diagnose, example
 from airtouch.logs import read
@@ -60,3 +63,12 @@ def test_the_bar_of_a_long_command_needs_nothing_slow():
             "print(sorted({'scipy', 'numba', 'airtouch.gap'} & set(sys.modules)))")
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert process.stdout.strip() == "[]", process.stderr
+
+
+def test_a_long_command_without_a_terminal_says_by_lines_where_it_is(monkeypatch, capsys):
+    monkeypatch.setattr(Bar, "LINE_S", 0.05)
+    with Bar(3, "diagnosing") as bar:
+        bar("flight_1.csv")
+        time.sleep(0.3)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines and all(re.fullmatch(r"\[ +\d+ s\] flight_1\.csv, step 1 of 3", line) for line in lines)

@@ -1,14 +1,10 @@
 """Pages agree with one another and link to what is there."""
 
 import re
-import shlex
 from itertools import pairwise
 from pathlib import Path
 
-import click
 import pytest
-
-from airtouch.cli import airtouch
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "host/docs"
@@ -97,31 +93,6 @@ def test_tables_and_lists_stand_apart_for_the_site(page):
         if above.strip() and not above.startswith(("#", "<!--")):
             assert not line.startswith("|") or above.startswith("|"), line
             assert not re.match(r"(- |1\. )", line) or re.match(r"(- |\d+\. |  )", above), line
-
-
-def commands(page):
-    """Words of each `airtouch` command in a page's blocks, up to a pipe, a redirection or a comment."""
-    for block in re.findall(r"^```(?:sh|bash)?\n(.*?)^```", page.read_text("utf-8"), re.S | re.M):
-        for line in re.sub(r"\\\n\s*", " ", block).splitlines():
-            if re.match(r"(\.venv/bin/)?airtouch ", line):
-                yield shlex.split(re.split(r" [|>&;]", line)[0], comments=True)[1:]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_commands_of_a_page_and_their_options_exist(page):
-    for words in commands(page):
-        context, group, arguments = click.Context(airtouch), airtouch, words
-        while isinstance(group, click.Group) and not arguments[0].startswith("-"):
-            name, group, arguments = group.resolve_command(context, arguments)
-            context = click.Context(group, info_name=name, parent=context)
-        try:
-            group.make_parser(context).parse_args(list(arguments))
-        except click.UsageError as error:
-            pytest.fail(f"{page.name}: airtouch {shlex.join(words)}: {error.format_message()}")
-
-
-def test_commands_are_found_in_the_pages():
-    assert sum(len(list(commands(page))) for page in PAGES) > 80
 
 
 #: pages that tell a newcomer which files to open

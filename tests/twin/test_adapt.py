@@ -266,3 +266,14 @@ def test_readable_takes_the_speed_from_the_log(sweeps, tmp_path):
     assert len(usable) == 1 and len(left_out) == 1
     assert usable[0].file.condition.speed_mps == pytest.approx(np.hypot(log["vx_mps"], log["vy_mps"])[-800:].max(),
                                                                abs=0.3)
+
+
+def test_the_result_says_what_was_done():
+    model = best.load(None)
+    model = replace(model, metadata={**model.metadata, "adapted": {"twin": {}, "labelled": 3, "pseudo_labelled": 1}})
+    left_out = [("bad.csv", "bad.csv: no gyro")]
+    result = adapt.Adapted(model, [], [], [], left_out)
+    assert result.plain() == {"twin": {}, "labelled": 3, "pseudo_labelled": 1,
+                              "left_out": [["bad.csv", "bad.csv: no gyro"]],
+                              "twin_only": None, "held_out_half": None, "held_out": None}
+    assert len(repr(result)) < 200 and "3 flights labelled" in repr(result) and "1 left out" in repr(result)

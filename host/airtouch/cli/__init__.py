@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError, nearest
 SECTIONS = {
     "First": {
         "demo": ("demo", "Train, detect and report once: the whole pipeline in two minutes."),
-        "gap": ("gap", "Diagnose the gap between real flights and the simulator (`gap demo`: half a minute)."),
+        "gap": ("gap", "Diagnose the gap between real flights and the simulator (`gap demo`: one minute)."),
     },
     "Flights": {
         "logs": ("logs", "Look at, convert and check flight logs."),

@@ -9,25 +9,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.mission import LANDING_MPS, Leg
 
 RESEND_S = 0.3  #: s without an answer, after which a command is sent again
 TRIES = 8  #: times that a command is sent; after that it counts as accepted if log packets still arrive
 SETTLE_S = 1.0  #: s from the end of a landing to the stop of the motors
 BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
-CODES = {"take-off": 7, "land": 8, "go": 12, "stop": 3}  #: command numbers in the answers; go is 4 before protocol 8
-
-
-@dataclass(frozen=True)
-class Command:
-    """One command for the high-level commander: kind take-off, go, land or stop; metres, radians, seconds."""
-
-    kind: str
-    x_m: float = 0.0
-    y_m: float = 0.0
-    z_m: float = 0.0
-    yaw_rad: float = 0.0
-    seconds: float = 0.0
 
 
 @dataclass(frozen=True)

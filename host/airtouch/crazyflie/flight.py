@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from threading import Event
 from typing import Protocol
 
-from airtouch.crazyflie.autopilot import Autopilot, Command
+from airtouch.crazyflie.autopilot import Autopilot
 from airtouch.crazyflie.checks import CONFLICTS, LOWEST_V
+from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.connection.drone import drain
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample

@@ -7,7 +7,7 @@ flights.
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -80,13 +80,30 @@ class SimulatedFlights:
 class Adapted:
     """The model, and scores of held-out flights after training on all others and on half of them (both may be empty).
 
-    twin_only: scores of all labelled flights by the detector that was trained on the twin alone.
+    twin_only: scores of all labelled flights by the detector that was trained on the twin alone. left_out: (file,
+    reason) of flights that could not be used. `plain()` says all of it in figures.
     """
 
     model: BestModel
     held_out: list[FlightScore]
     held_out_half: list[FlightScore]
     twin_only: list[FlightScore]
+    left_out: list[tuple[str, str]] = field(default_factory=list)
+
+    def plain(self) -> dict[str, Any]:
+        """What was done: the twin, flights labelled, pseudo-labelled and left out, and the errors to expect.
+
+        Each of `twin_only`, `held_out_half` and `held_out` has the figures of `airtouch evaluate --json`, or is None
+        where nothing was scored.
+        """
+        scores = {name: getattr(self, name) for name in ("twin_only", "held_out_half", "held_out")}
+        return {**self.model.metadata.get("adapted", {}), "left_out": [list(pair) for pair in self.left_out],
+                **{name: summary.summarise(given) if given else None for name, given in scores.items()}}
+
+    def __repr__(self) -> str:
+        training = self.model.metadata.get("adapted", {})
+        return (f"Adapted({training.get('labelled')} flights labelled by their down range, "
+                f"{training.get('pseudo_labelled')} by the detector, {len(self.left_out)} left out; plain() says more)")
 
 
 def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,

@@ -6,6 +6,7 @@ About a minute of processor time a thousand crops at full width. Same seed, same
 their last bits from machine to machine.
 """
 
+import argparse
 import time
 from pathlib import Path
 from typing import Any
@@ -98,4 +99,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     main()

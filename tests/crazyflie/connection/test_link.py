@@ -1,6 +1,8 @@
 """Connecting where nobody answers."""
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 
@@ -42,3 +44,17 @@ def test_a_stop_ends_the_attempts(silent):
     stop.set()
     with pytest.raises(AirTouchError, match="stopped before anybody answered"):
         Drone(silent, patience_s=30.0, unanswered=waiting(silent, stop))
+
+
+def test_a_monitor_without_a_drone_waits_for_no_import_of_the_simulator(silent):
+    """The simulator takes seconds to import, and the remedy is due within three."""
+    script = f"""import sys
+from airtouch.cli import airtouch
+from airtouch.crazyflie.connection import link
+def say_imports(uri):
+    print(*sys.modules.keys() & {{"numba", "airtouch.simulation"}})
+    sys.exit()
+link.remedy = say_imports
+airtouch(["monitor", "--uri", "{silent}"])"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "" and "connecting" in done.stderr

@@ -27,18 +27,19 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
 
     Where another program flies the drone over the same radio, let that one log instead.
     """
-    click.echo(f"connecting to {uri}", err=True)  # the imports may take seconds
-    from airtouch.crazyflie import monitor
+    click.echo(f"connecting to {uri}", err=True)
     from airtouch.crazyflie.checks import parse_setting
     from airtouch.crazyflie.connection.drone import Drone
-    from airtouch.crazyflie.connection.intake import Intake
     from airtouch.crazyflie.connection.link import default_cache
-    from airtouch.crazyflie.view import board as boards
 
     pairs = [parse_setting(text) for text in settings]
     with stopping(quiet=True) as stop:
         drone = Drone(uri, cache or default_cache(), unanswered=waiting(uri, stop))
         try:
+            from airtouch.crazyflie import monitor  # takes seconds: only once somebody has answered
+            from airtouch.crazyflie.connection.intake import Intake
+            from airtouch.crazyflie.view import board as boards
+
             for name, text in pairs:
                 drone.set_parameter(name, text)
             slow, detector = monitor.start(drone, host_detector)

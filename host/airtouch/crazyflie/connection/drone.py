@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from airtouch.crazyflie.autopilot import CODES, Command
 from airtouch.crazyflie.checks import representable
 from airtouch.crazyflie.connection.blocks import Block
+from airtouch.crazyflie.connection.commands import CODES, Command
 from airtouch.crazyflie.connection.link import connect, disconnect
 from airtouch.crazyflie.connection.log_blocks import LogBlocks, Sample
 from airtouch.errors import AirTouchError

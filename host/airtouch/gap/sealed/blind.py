@@ -107,8 +107,8 @@ def open_key(folder: Path, answers_sha256: str, key: Path | None = None) -> dict
     try:
         sealed = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))["key_sha256"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with `airtouch gap blind "
-                            "make`") from None
+        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
+                            "`airtouch gap blind make`") from None
     try:
         content = key.read_bytes()
     except OSError as error:

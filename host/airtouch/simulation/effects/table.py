@@ -1,9 +1,9 @@
 """The tables of effects, signals and plant fields in host/docs/effects.md:
 `python -m airtouch.simulation.effects.table FILE`."""
 
+import argparse
 import inspect
 import re
-import sys
 from pathlib import Path
 
 from airtouch.simulation import plant, signals
@@ -65,5 +65,7 @@ def _between(text: str, begin: str, end: str, middle: str) -> str:
 
 
 if __name__ == "__main__":
-    page = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("page", type=Path, help="host/docs/effects.md: the parts between its marks are replaced")
+    page = parser.parse_args().page
     page.write_text(updated(page.read_text(encoding="utf-8")), encoding="utf-8")
