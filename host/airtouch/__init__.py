@@ -25,13 +25,14 @@ _FROM = {"AirTouchError": "airtouch.errors", "FlightLog": "airtouch.logs.flight_
                          "airtouch.api")}
 
 
-def __getattr__(name: str) -> Any:
-    """What is asked for, imported now."""
-    if name in ("gap", "logs"):
-        return importlib.import_module(f"airtouch.{name}")
-    if name in _FROM:
-        return getattr(importlib.import_module(_FROM[name]), name)
-    raise AttributeError(f"module 'airtouch' has no attribute {name!r}")
+if not TYPE_CHECKING:  # so that a type checker tells a name that is not there
+    def __getattr__(name: str) -> Any:
+        """What is asked for, imported now."""
+        if name in ("gap", "logs"):
+            return importlib.import_module(f"airtouch.{name}")
+        if name in _FROM:
+            return getattr(importlib.import_module(_FROM[name]), name)
+        raise AttributeError(f"module 'airtouch' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

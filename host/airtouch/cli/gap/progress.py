@@ -45,7 +45,7 @@ class Bar:
 
     LINE_S = 10.0  #: between two lines without a terminal: a log of hours stays short
 
-    def __init__(self, total: int | None = None, text: str = "loading") -> None:
+    def __init__(self, total: int | None = None, text: str = "loading; the first time compiles, for a minute") -> None:
         console = Console(stderr=True)
         self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(),
                                  TimeElapsedColumn(), console=console, transient=True)

@@ -4,6 +4,7 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,9 @@ def read(path: Path) -> bytes:
         if path.stat().st_size > LARGEST:
             raise AirTouchError(f"{path}: too large for a model file")
         return path.read_bytes()
+    except FileNotFoundError as error:
+        shipped = resources.files("airtouch") / "models"
+        raise AirTouchError(f"{path}: cannot be read: {error.strerror}; the shipped models are in {shipped}") from None
     except OSError as error:
         raise AirTouchError(f"{path}: cannot be read: {error.strerror or error}") from None
 

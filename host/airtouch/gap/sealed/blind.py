@@ -56,9 +56,11 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     vehicle = load(VEHICLE)
     text = (resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes()
     write_bytes(text, out / "vehicle.toml", True)
+    progress("nominal flights")
     cal = nominal(vehicle, CAL_FIRST, CAL, seed)
     for i, log in enumerate(cal):
         write(log, out / f"cal_{i}.csv.gz", force=True)
+    progress("calibration")
     study = study_of(vehicle, cal)
     levels = strengths(study, seed, kinds, progress)
     rng = np.random.default_rng([seed, 1])
