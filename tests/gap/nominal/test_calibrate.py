@@ -1,0 +1,46 @@
+"""Which baseline flights are left out: one whose mean lies off the others', by less where flights are simulated."""
+
+from dataclasses import replace
+
+import pytest
+
+from airtouch.gap.nominal.calibrate import calibrated
+from gap_flights import VEHICLE, fly
+
+LAST = 100  #: samples: the landing
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    return fly(4, seed=91)
+
+
+def with_a_push(flight, metres_per_second2):
+    """The flight with a lift in its last second in the air, as where it lands on an edge."""
+    air = ((flight.phase > 0) & flight.usable).nonzero()[0][-LAST:]
+    acceleration = flight.acceleration.copy()
+    acceleration[air, 2] += metres_per_second2
+    return replace(flight, name="landing on an edge", acceleration=acceleration)
+
+
+def recorded(flight):
+    return replace(flight, log=replace(flight.log, meta={**flight.log.meta, "format": "usd"}))
+
+
+def test_nominal_simulated_flights_all_count(nominal):
+    assert not calibrated(VEHICLE, nominal, scatter=False)[1].notes
+
+
+def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal):
+    """Its mean lift is off by 0.08 m/s^2, as no nominal simulated flight's; the others' floor stays."""
+    flights = [*nominal, with_a_push(nominal[0], 2.0)]
+    study, calibration = calibrated(VEHICLE, flights, scatter=False)
+    (note,) = calibration.notes
+    assert note.startswith("landing on an edge: declared nominal") and note.endswith("left out")
+    alone, _ = calibrated(VEHICLE, nominal, scatter=False)
+    assert study.floor.offset == pytest.approx(alone.floor.offset)
+
+
+def test_recorded_flights_differ_by_as_much_and_count(nominal):
+    flights = [recorded(f) for f in (*nominal, with_a_push(nominal[0], 2.0))]
+    assert not [n for n in calibrated(VEHICLE, flights, scatter=False)[1].notes if "left out" in n]
