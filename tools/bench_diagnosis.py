@@ -1,0 +1,51 @@
+"""Seconds of `airtouch gap diagnose` of the packaged flight of 25 s, four baseline flights, JSON and report.
+
+    python tools/bench_diagnosis.py [--runs 5]
+
+Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles. Nothing else
+should run beside it.
+"""
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from importlib import resources
+from pathlib import Path
+
+
+def seconds(processors: set[int], out: Path) -> float:
+    """Wall time of one diagnosis on some processors."""
+    example = resources.files("airtouch.gap.example")
+    baseline = [str(example / f"nominal_{i}.csv.gz") for i in range(4)]
+    command = [sys.executable, "-m", "airtouch", "gap", "diagnose", str(example / "real.csv.gz"),
+               "--baseline", *baseline, "--json", str(out / "it.json"),
+               "--report", str(out / "it.html"), "--force"]
+    start = time.perf_counter()
+    subprocess.run(command, check=True, capture_output=True, preexec_fn=lambda: os.sched_setaffinity(0, processors))
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    """Time it and print medians."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=5)
+    runs = parser.parse_args().runs
+    if runs < 1:
+        parser.error("--runs must be at least 1")
+    every = os.sched_getaffinity(0)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        print("warming up: the first time compiles", file=sys.stderr, flush=True)
+        seconds(every, out)
+        pairs = [(seconds(every, out), seconds({min(every)}, out)) for _ in range(runs)]
+    for name, column in zip((f"{len(every)} processors", "1 processor"), zip(*pairs, strict=True), strict=True):
+        print(f"{name}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")
+    print(f"ratio of the pairs, median: {statistics.median(b / a for a, b in pairs):.2f}")
+
+
+if __name__ == "__main__":
+    main()
