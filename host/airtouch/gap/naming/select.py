@@ -29,7 +29,7 @@ from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SHAKES, Term, is_random, random_of
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
@@ -54,8 +54,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
 
     Effects that come and go are tried first (gap.evidence.gates), but those of `without`. One that adds no more to the
     effects found after it than it does in nominal flights is taken back. Where a library of the signals' relations
-    holds it decides alone (naming.related), but where it leaves something unexplained and the effect that it finds
-    likeliest comes and goes, or has more shapes than its class: then the replay may find that effect.
+    holds it decides alone (naming.related), but where it leaves something unexplained: then the replay may find a wake
+    of some seconds, and what else comes and goes or has more shapes than its class if that is likeliest there as well.
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
@@ -66,10 +66,12 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         return by_relations
     passing = _passing(on, alone, need, without)
     likeliest = inference.likeliest if inference is not None else ""
-    if by_relations is not None and likeliest not in SHAKES and (passing is None or passing.name != likeliest):
+    wake = passing is not None and passing.name == OVERHEAD  # of seconds, which the relations of a whole flight dilute
+    if by_relations is not None and not wake and likeliest not in SHAKES and (
+            passing is None or passing.name != likeliest):
         return by_relations
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    if by_relations is not None and likeliest != next((s.name for s in steps if s.named), ""):
+    if by_relations is not None and not wake and likeliest != next((s.name for s in steps if s.named), ""):
         return by_relations
     if passing is not None and any(s.named and s.name == passing.name and news(
             on.data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps):

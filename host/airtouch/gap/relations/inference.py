@@ -55,8 +55,8 @@ class Inference:
 
     @property
     def likeliest(self) -> str:
-        """The effect that alone gains most over none."""
-        return max(self.evidence, key=lambda name: self.evidence[name])
+        """The effect that alone gains most over none; "" where there is none."""
+        return max(self.evidence, key=lambda name: self.evidence[name], default="")
 
     def probabilities(self) -> dict[str, float]:
         """Probabilities of each effect alone and of `none`; they sum to 1."""
