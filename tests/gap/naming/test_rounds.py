@@ -105,7 +105,7 @@ def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
 def by_relations(monkeypatch, explained, likeliest="mass"):
     """A selection as of a library of relations that holds for the flights, and the judgements that it is asked with."""
     answer, judgements = SimpleNamespace(explained=explained), []
-    inference = SimpleNamespace(likeliest=likeliest)
+    inference = SimpleNamespace(likeliest=likeliest, evidence={likeliest: 100.0})
 
     def related(on, candidates, alone, given, progress):
         assert given is inference

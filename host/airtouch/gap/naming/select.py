@@ -28,6 +28,7 @@ from airtouch.gap.naming.judging import (
 from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
@@ -43,6 +44,9 @@ ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 RANDOM_SHARE = 0.25
 CERTAIN = 20.0  #: evidence beyond which more says no more
 CHANCE_LOSS = 1.0  #: log likelihood that a right effect may lose in a cell by chance
+#: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
+#: that fill a flight have 0.09 to 0.10, four motor noises that the replay took for one 0.01 to 0.02
+WAKE_SHARE = 0.05
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 WORTH_AGAIN = 0.25  #: of what the first effect must gain; candidates below it are not judged again beside a deviation
@@ -55,7 +59,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     Effects that come and go are tried first (gap.evidence.gates), but those of `without`. One that adds no more to the
     effects found after it than it does in nominal flights is taken back. Where a library of the signals' relations
     holds it decides alone (naming.related), but where it leaves something unexplained: then the replay may find a wake
-    of some seconds, and what else comes and goes or has more shapes than its class if that is likeliest there as well.
+    of some seconds, what else comes and goes if it is likeliest there as well, and what has more shapes than its class.
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
@@ -65,13 +69,11 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     if by_relations is not None and by_relations.explained:
         return by_relations
     passing = _passing(on, alone, need, without)
-    likeliest = inference.likeliest if inference is not None else ""
-    wake = passing is not None and passing.name == OVERHEAD  # of seconds, which the relations of a whole flight dilute
-    if by_relations is not None and not wake and likeliest not in SHAKES and (
-            passing is None or passing.name != likeliest):
+    if by_relations is not None and inference is not None and not _may_be(passing, inference):
         return by_relations
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    if by_relations is not None and not wake and likeliest != next((s.name for s in steps if s.named), ""):
+    first = next((s.name for s in steps if s.named), "")
+    if by_relations is not None and inference is not None and first not in (*SHAKES, inference.likeliest):
         return by_relations
     if passing is not None and any(s.named and s.name == passing.name and news(
             on.data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps):
@@ -84,6 +86,18 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
                       _nominal_gain(data), data.study.simulated, data.study.same_models,
                       clock_left(data, [t.name for t in last]))
     return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
+
+
+def _may_be(passing: Judged | None, inference: Inference) -> bool:
+    """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
+
+    A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
+    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely.
+    """
+    if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
+        return True
+    most = max(inference.evidence.values(), default=0.0)
+    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
 
 
 def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: Mapping[str, Judged],
