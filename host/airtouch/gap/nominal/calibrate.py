@@ -31,7 +31,7 @@ from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, fre
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import Apparent, scatter_of
 from airtouch.gap.unnamed.generic import unnamed_floor
-from airtouch.robust import MAD_TO_SIGMA
+from airtouch.robust import deviation
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -82,7 +82,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     Flights that cannot be nominal like the others (a touch of the ground, a swapped
     propeller) are left out and named, as long as most agree.
     """
-    flights, odd = _alike(vehicle, flights)
+    flights, odd = _alike(vehicle, flights, FAR)
     study = as_declared = declared(vehicle, flights)
     chosen, prior = _terms()
     for _ in range(2):
@@ -95,6 +95,10 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         strengths = shared(partial(_apparent, study, without), _some(flights))
         study = replace(study, scatter=scatter_of(strengths, any(_recorded(f) for f in flights), vehicle.name))
         if study.simulated:  # where every flight has the same trim: chance is in the lowest bin already
+            alike, unlike = _alike(vehicle, flights, FAR_SIMULATED)
+            if unlike:
+                study, again = calibrated(vehicle, alike, without=without)
+                return study, replace(again, notes=(*odd, *unlike, *again.notes), declared=None)
             study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond),
                             relations=library_for(vehicle, [features(f, vehicle) for f in flights]))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
@@ -198,20 +202,25 @@ def _quantities(chosen: Sequence[Term], scaled: np.ndarray, covariance: np.ndarr
     return out
 
 
-def _alike(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[list[Flight], list[str]]:
-    """The flights whose mean force and torque agree with most others', and words on the rest."""
+def _alike(vehicle: Vehicle, flights: Sequence[Flight], least: np.ndarray) -> tuple[list[Flight], list[str]]:
+    """The flights whose mean force and torque agree with most others', and words on the rest.
+
+    least (6,): by which they must differ at least, m/s^2 and rad/s^2.
+    """
     if len(flights) < 3:
         return list(flights), []
-    means = np.array([residual(f, vehicle)[(f.phase > 0) & f.usable][:, :6].mean(axis=0) for f in flights])
-    away = np.abs(means - np.median(means, axis=0))
-    least = FAR if any(_recorded(f) for f in flights) else FAR_SIMULATED
-    limit = np.maximum(ODD * MAD_TO_SIGMA * np.median(away, axis=0), least)
-    odd = (away > limit).any(axis=1)
+    means = _means(flights, vehicle)
+    odd = (np.abs(means - np.median(means, axis=0)) > np.maximum(ODD * deviation(means), least)).any(axis=1)
     if odd.sum() > len(flights) // 3:
         return list(flights), []
     words = [f"{f.name}: declared nominal, yet unlike the others (lift {m[2] - np.median(means[:, 2]):+.2g} m/s^2); "
              "left out" for f, m, o in zip(flights, means, odd, strict=True) if o]
     return [f for f, o in zip(flights, odd, strict=True) if not o], words
+
+
+def _means(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:
+    """Mean force and torque (flights, 6) in the air that the model leaves, m/s^2 and rad/s^2."""
+    return np.array([residual(f, vehicle, calibration)[(f.phase > 0) & f.usable][:, :6].mean(axis=0) for f in flights])
 
 
 def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
@@ -220,9 +229,8 @@ def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
         return []
     notes = []
     names = ("forward force", "sideways force", "lift", "roll torque", "pitch torque", "yaw torque")
-    means = np.array([residual(f, study.vehicle, study.calibration)[(f.phase > 0) & f.usable][:, :6].mean(axis=0)
-                      for f in flights])
-    spread = MAD_TO_SIGMA * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
+    means = _means(flights, study.vehicle, study.calibration)
+    spread = deviation(means)
     for f, row in zip(flights, means, strict=True):
         far = np.abs(row - np.median(means, axis=0)) / np.maximum(spread, 1e-9)
         i = int(np.argmax(far))
