@@ -15,7 +15,7 @@ class AirTouchError(ValueError):
 
 @contextmanager
 def in_one_line(program: str) -> Iterator[None]:
-    """For a program of its own, as those in `tools`: an AirTouchError ends it with its line and exit code 2."""
+    """For a program, `airtouch` or one in `tools`: an AirTouchError ends it with its line and exit code 2."""
     try:
         yield
     except AirTouchError as error:

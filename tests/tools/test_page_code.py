@@ -29,10 +29,11 @@ def complaints(sources: dict[str, str], folder: Path) -> str:
         # `at.gap.diagnose` is a module that can be called, which mypy takes for Any: check the function that it calls
         typed = re.sub(r"\bat\.gap\.(diagnose|measure)\(", r"airtouch.api.\1(", source)
         (folder / f"{name}.py").write_text("import airtouch.api\n" + typed, "utf-8")
-    said, errors, _ = mypy.run([*(str(folder / f"{name}.py") for name in sources), "--disable-error-code=name-defined",
-                                f"--config-file={ROOT / 'pyproject.toml'}", f"--cache-dir={ROOT / 'build/mypy-pages'}"])
+    messages, errors, _ = mypy.run([
+        *(str(folder / f"{name}.py") for name in sources), "--disable-error-code=name-defined",
+        f"--config-file={ROOT / 'pyproject.toml'}", f"--cache-dir={ROOT / 'build/mypy-pages'}"])
     assert not errors
-    return said
+    return messages
 
 
 def test_the_python_of_the_pages_fits_the_types(tmp_path, monkeypatch):
@@ -40,16 +41,17 @@ def test_the_python_of_the_pages_fits_the_types(tmp_path, monkeypatch):
     sources = {f"{page.stem.replace('-', '_')}_{number}": block
                for page in PAGES for number, block in enumerate(blocks(page, "python"))}
     assert len(sources) > 7
-    said = complaints(sources, tmp_path)
-    assert said.startswith("Success"), said
+    messages = complaints(sources, tmp_path)
+    assert messages.startswith("Success"), messages
 
 
 def test_python_that_does_not_fit_is_told(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     wrong = ("import airtouch as at", "found = at.gap.diagnose(given)", "found.verdikt", "at.adopt('a', 'b')",
              "at.evaluate('flights', detektor='best')", "from airtouch import logz")
-    said = complaints({"wrong": "\n".join(wrong)}, tmp_path)
-    assert all(word in said for word in ("verdikt", "adopt", "detektor", "logz")) and "Found 4 errors" in said, said
+    messages = complaints({"wrong": "\n".join(wrong)}, tmp_path)
+    assert all(word in messages for word in ("verdikt", "adopt", "detektor", "logz")), messages
+    assert "Found 4 errors" in messages, messages
 
 
 def test_the_toml_of_the_pages_is_accepted(tmp_path):
@@ -70,6 +72,6 @@ def test_the_table_of_functions_has_their_arguments_and_defaults():
     assert {name for name, _ in rows} == {*api.__all__} - {"diagnose", "measure"} | {"gap.diagnose", "gap.measure"}
     for name, listed in rows:
         function = getattr(api, name.removeprefix("gap."))
-        given = [argument if parameter.default is inspect.Parameter.empty else f"{argument}={parameter.default!r}"
+        parameters = [argument if parameter.default is inspect.Parameter.empty else f"{argument}={parameter.default!r}"
                  for argument, parameter in inspect.signature(function).parameters.items()]
-        assert listed.replace('"', "'") == ", ".join(given), name
+        assert listed.replace('"', "'") == ", ".join(parameters), name

@@ -66,7 +66,7 @@ def commands(page: Path) -> list[Command]:
     if page.suffix == ".ipynb":
         text = "\n\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
     block = re.compile(r"^```(\w*)\n(.*?)^```", re.S | re.M)
-    found, given = [], {}
+    commands_of_page, variables = [], {}
     for language, lines in block.findall(text) if page.suffix != ".py" else ():
         if language in ("", "sh", "bash"):
             joined = re.sub(r"\\\n\s*", " ", lines)
@@ -74,30 +74,30 @@ def commands(page: Path) -> list[Command]:
             for line in joined.split("\n"):
                 assigned = re.match(r"([A-Z]+)=(\".*\"|'.*')\s*$", line)
                 if assigned:
-                    given[f"${assigned[1]}"] = assigned[2].strip("\"'")
-                line = functools.reduce(lambda a, b: a.replace(*b), given.items(), line)
+                    variables[f"${assigned[1]}"] = assigned[2].strip("\"'")
+                line = functools.reduce(lambda a, b: a.replace(*b), variables.items(), line)
                 if re.match(rf"\s*(\$ )?([A-Z_]+=\S* )*{PROGRAMS} \S", line):
-                    found += split(line.strip().removeprefix("$ "), True)
+                    commands_of_page += split(line.strip().removeprefix("$ "), True)
     for inline in re.findall(r"(?<!`)`([^`\n]+(?:\n[^`\n]+)?)`(?!`)", block.sub("", text)):
         if re.match(rf"([A-Z_]+=\S* )*{PROGRAMS} [\w.'/-]", inline) and not re.search(r"[{\\]", inline):
-            found += split(re.sub(r"\s*\n(//|#)?\s*", " ", inline), False)
-    return found
+            commands_of_page += split(re.sub(r"\s*\n(//|#)?\s*", " ", inline), False)
+    return commands_of_page
 
 
 def understood_by_click(command: click.Command, arguments: list[str], typed: bool) -> None:
     """Raise click.UsageError if the command would: for options, values, and what is missing in a typed one."""
     context = click.Context(command)
     while isinstance(command, click.Group) and arguments and not arguments[0].startswith("-"):
-        name, found, arguments = command.resolve_command(context, arguments)
-        assert found is not None  # resolve_command raises for a name that it does not know
-        command = found
+        name, subcommand, arguments = command.resolve_command(context, arguments)
+        assert subcommand is not None  # resolve_command raises for a name that it does not know
+        command = subcommand
         context = click.Context(command, info_name=name, parent=context)
-    given, rest, _ = command.make_parser(context).parse_args(list(arguments))
+    values, rest, _ = command.make_parser(context).parse_args(list(arguments))
     if rest and not isinstance(command, click.Group):
         raise click.UsageError(f"unexpected: {rest}")
     for parameter in command.params:
-        value = given.get(parameter.name)
-        asked = any(p.name in given for p in command.params if p.is_eager)
+        value = values.get(parameter.name)
+        asked = any(p.name in values for p in command.params if p.is_eager)
         if typed and parameter.required and value in (None, (), []) and not asked:
             raise click.UsageError(f"missing: {parameter.name}")
         texts = [value] if isinstance(value, str) else value if isinstance(value, (list, tuple)) else ()

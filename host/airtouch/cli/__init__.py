@@ -7,7 +7,7 @@ import sys
 import click
 
 from airtouch import __version__
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import in_one_line, nearest
 
 #: heading -> command -> (module in this package, one line of help)
 SECTIONS = {
@@ -92,9 +92,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a caller may have replaced it
             stream.reconfigure(errors="backslashreplace")
     try:
-        airtouch()
-    except AirTouchError as error:
-        click.echo(f"airtouch: {error}", err=True)
-        sys.exit(2)
+        with in_one_line("airtouch"):
+            airtouch()
     except BrokenPipeError:
         sys.exit(141)

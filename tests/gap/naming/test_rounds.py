@@ -143,6 +143,6 @@ def test_a_wake_of_some_seconds_is_named_though_another_effect_is_likeliest_in_t
 
 def test_a_wind_that_comes_and_goes_is_named_only_if_it_is_likeliest_in_the_whole_flight(monkeypatch):
     data, passing = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True), select._passing
-    monkeypatch.setattr(select, "_passing", lambda *given: replace(passing(*given), name="wind"))
+    monkeypatch.setattr(select, "_passing", lambda *arguments: replace(passing(*arguments), name="wind"))
     answer, _ = by_relations(monkeypatch, explained=False, likeliest="mass")
     assert select.select(data, candidates_of(["mass"])) is answer

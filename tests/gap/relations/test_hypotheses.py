@@ -72,9 +72,9 @@ def test_a_name_fails_where_the_flight_lies_off_it_by_more_than_right_names_do(o
     scatter = 0.5 * np.sqrt(2.0 * Q)
     values = 45.0 * np.eye(Q)[0]
     values[60:] = np.sqrt((Q + 2.0 * off * scatter) / 40.0)  # as far from the effect as nominal flights, and more
-    found = infer(library(), values[None])
-    assert [c.name for c in found.classes] == ["mass"]
-    assert (found.unexplained < found.limit) is (off < 3.5)
+    inference = infer(library(), values[None])
+    assert [c.name for c in inference.classes] == ["mass"]
+    assert (inference.unexplained < inference.limit) is (off < 3.5)
 
 
 def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():

@@ -15,6 +15,7 @@ from airtouch.gap.signatures.nominal_scatter import (
     measured,
     scatter_of,
     size_of,
+    student_log_density,
     table,
 )
 from airtouch.gap.signatures.posterior import LEAST
@@ -271,3 +272,8 @@ def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed(
     assert scatter.exact and 0.05 < scatter.rms["ground_effect"][0] < 0.2
     ratios = [scatter.rms[k] / v for k, v in class_rms.items() if k in flights[0].strengths and k != "ground_effect"]
     assert 0.8 < np.median(np.concatenate(ratios)) < 1.3  # those that scatter as the class does stay with it
+
+
+@pytest.mark.parametrize(("x", "freedom", "middle", "spread"), [(0.3, 3.0, 0.0, 1.0), (12.0, 4.0, -2.0, 0.5)])
+def test_students_density_is_scipys(x, freedom, middle, spread):
+    assert student_log_density(x, freedom, middle, spread) == pytest.approx(student.logpdf(x, freedom, middle, spread))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.signals.channels import COUNT
@@ -73,3 +74,9 @@ def test_without_a_baseline_the_spread_between_flights_counts_beside_the_sensor(
     sensor = np.full((len(BANDS_HZ), COUNT), 0.3)
     level, _ = cell_tables.spreads_of(sums, sensor)[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(np.hypot(0.3, np.std(offsets, ddof=1)))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+def test_chi_square_is_scipys(share):
+    freedom = np.array([1.0, 2.5, 40.0, 900.0])
+    np.testing.assert_allclose(cell_tables.chi_square(share, freedom), chi2.ppf(share, freedom), rtol=1e-10)

@@ -56,7 +56,10 @@ class Bar:
         self._say(text)
 
     def __enter__(self) -> "Bar":
-        (self.lines.thread if self.lines else self.timer).start()
+        if self.lines:
+            self.lines.__enter__()
+        else:
+            self.timer.start()
         return self
 
     def __exit__(self, *_: object) -> None:

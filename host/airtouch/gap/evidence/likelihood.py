@@ -20,9 +20,9 @@ def tailed(size, power, tail, falls, known):
         if not known[i]:
             continue
         if falls[i] != fall or not (powers > LEAST and powers < MOST and rises < MOST):
-            more = np.log(powers) + fall * np.log(rises) - lost
-            new = total + more
-            lost = (new - total) - more
+            term = np.log(powers) + fall * np.log(rises) - lost
+            new = total + term
+            lost = (new - total) - term
             total = new
             powers, rises, fall = 1.0, 1.0, falls[i]
         powers *= power[i]

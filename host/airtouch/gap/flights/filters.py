@@ -6,29 +6,23 @@ As `butter`, `sosfiltfilt` and `lfilter` of scipy.signal, whose import takes a s
 import numpy as np
 from numba import float64, njit, types
 
+from airtouch.simulation.sensors.filters import lowpass_coefficients
+
 _TABLE = float64[:, ::1]
 
 
 def lowpass(share: float) -> np.ndarray:
     """Coefficients (6,), b0 to b2 and 1 to a2, of a low-pass; share: its frequency over half of the sampling rate."""
-    k, scale = _warped(share)
-    return _section(k * k / scale, 2.0, k, scale)
+    b = np.zeros(5)
+    lowpass_coefficients(share, 0.5, b)
+    return np.array([*b[:3], 1.0, *b[3:]])
 
 
 def highpass(share: float) -> np.ndarray:
-    """Coefficients (6,) of a high-pass; see `lowpass`."""
-    k, scale = _warped(share)
-    return _section(1.0 / scale, -2.0, k, scale)
-
-
-def _warped(share: float) -> tuple[float, float]:
-    k = float(np.tan(0.5 * np.pi * share))
-    return k, 1.0 + np.sqrt(2.0) * k + k * k
-
-
-def _section(gain: float, middle: float, k: float, scale: float) -> np.ndarray:
-    return np.array([gain, middle * gain, gain, 1.0, 2.0 * (k * k - 1.0) / scale,
-                     (1.0 - np.sqrt(2.0) * k + k * k) / scale])
+    """Coefficients (6,) of a high-pass; see `lowpass`. It has the same poles, and passes half of the rate whole."""
+    _, _, _, _, a1, a2 = lowpass(share)
+    gain = 0.25 * (1.0 - a1 + a2)
+    return np.array([gain, -2.0 * gain, gain, 1.0, a1, a2])
 
 
 def both_ways(section: np.ndarray, values: np.ndarray, pad: int = 9) -> np.ndarray:

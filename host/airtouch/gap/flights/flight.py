@@ -15,7 +15,7 @@ from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import KINDS, PLATFORM_STEP_M, segments
-from airtouch.robust import MAD_TO_SIGMA
+from airtouch.robust import deviation
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.body.rotation import as_matrix
@@ -252,8 +252,7 @@ def _knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:
     out = np.zeros(len(rest), bool)
     if rest.any():
         away = np.abs(force[rest] - np.median(force[rest], axis=0))
-        usual = MAD_TO_SIGMA * np.median(away, axis=0)
-        out[rest] = (away > KNOCK * np.maximum(usual, 1e-3)).any(axis=1)
+        out[rest] = (away > KNOCK * np.maximum(deviation(force[rest]), 1e-3)).any(axis=1)
     return out
 
 
@@ -263,7 +262,7 @@ def _jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.n
     turning = np.zeros((len(air), 0)) if rates is None else np.diff(rates, axis=0, prepend=rates[:1])
     for values in (*force.T, *turning.T):
         away = np.abs(values - np.median(values[air]))
-        out |= air & (away > JOLT * max(MAD_TO_SIGMA * float(np.median(away[air])), 1e-6))
+        out |= air & (away > JOLT * max(float(deviation(values[air])), 1e-6))
     wide = int(CONTACT_S / PERIOD_S)
     out = np.convolve(out, np.ones(2 * wide + 1), "same") > 0.5
     return out if out[air].mean() < MOST_JOLTED else np.zeros_like(out)

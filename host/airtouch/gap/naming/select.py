@@ -69,7 +69,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     if by_relations is not None and by_relations.explained:
         return by_relations
     passing = _passing(on, alone, need, without)
-    if by_relations is not None and inference is not None and not _may_be(passing, inference):
+    if by_relations is not None and inference is not None and not _replay_may_name(passing, inference):
         return by_relations
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
     first = next((s.name for s in steps if s.named), "")
@@ -88,7 +88,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
 
 
-def _may_be(passing: Judged | None, inference: Inference) -> bool:
+def _replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
 
     A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
@@ -96,7 +96,7 @@ def _may_be(passing: Judged | None, inference: Inference) -> bool:
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True
-    most = max(inference.evidence.values(), default=0.0)
+    most = inference.evidence.get(inference.likeliest, 0.0)
     return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import t
+from scipy.stats import t as student
 
 from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
@@ -13,6 +13,7 @@ from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly,
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.signatures.candidates import interchangeable
+from airtouch.gap.signatures.drawn import log_uniform
 from airtouch.simulation.effects import EFFECTS, NAMES, Active
 
 #: nominal flights; flights of each class; of them, those beside whose effect a second one is tried; flights of a pair
@@ -75,7 +76,7 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
     rng = np.random.default_rng([SEED, 95, place])
     numbers = iter(range(FIRST_CALIBRATION + 1000 * place, FIRST_CALIBRATION + 1000 * (place + 1)))
 
-    def flown(strength: float) -> tuple[Active, FlightFeatures, Hypothesis] | None:
+    def fitted(strength: float) -> tuple[Active, FlightFeatures, Hypothesis] | None:
         """A flight with the effect at a strength, and the class fitted to it; None where it does not end well."""
         active = drawing.active(strength, rng)
         flight = _flown(scene, library, next(numbers), [active])
@@ -83,16 +84,16 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
 
     low = high
     for _ in range(HALVINGS):
-        ended = [f for f in (flown(low) for _ in range(3)) if f is not None]
+        ended = [f for f in (fitted(low) for _ in range(3)) if f is not None]
         if ended and np.mean([here.evidence > LEAST_EVIDENCE for _, _, here in ended]) < 0.5:
             break
         low /= 2.0
     shown: list[Calibrated] = []
     for strength in np.exp(rng.uniform(np.log(min(low, 0.5 * high)), np.log(high), CALIBRATION)):
-        found = flown(strength)
-        if found is None or found[2].evidence <= LEAST_EVIDENCE:
+        flight_and_fit = fitted(strength)
+        if flight_and_fit is None or flight_and_fit[2].evidence <= LEAST_EVIDENCE:
             continue
-        active, flight, here = found
+        active, flight, here = flight_and_fit
         second = None if len(shown) >= SECONDS else flight.with_one_more(
             here, lambda c, _: not interchangeable(c.effect, own.effect))[0].evidence - here.evidence
         shown.append(Calibrated(here.fits[0].strength, scaled(drawing, active), here.evidence,
@@ -113,7 +114,7 @@ def scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | floa
     """
     def against(logarithm: float) -> float:
         """Minus the log likelihood of a scatter."""
-        return -float(t.logpdf(excess, TAIL, 0.0, np.hypot(nominal, np.exp(logarithm) * evidence)).sum())
+        return -float(student.logpdf(excess, TAIL, 0.0, np.hypot(nominal, np.exp(logarithm) * evidence)).sum())
 
     return float(np.exp(minimize_scalar(against, bounds=(np.log(LEAST_SCATTER), 0.0), method="bounded").x))
 
@@ -129,11 +130,12 @@ def _readout(drawing: Drawing, shown: Sequence[Calibrated]) -> Readout | None:
 
 def _scatter_of_pairs(scene: Scene, library: Library, drawings: Sequence[Drawing]) -> float:
     """`Library.pair_scatter`: by flights with two effects, each hypothesis started from either."""
-    excess, evidence, known = [], [], []
+    excess, evidence, of_classes = [], [], []
     for i in range(PAIRS):
         rng = np.random.default_rng([SEED, 98, i])
         a, b = two_of(drawings, rng)
-        active = [drawings[j].active(_strength(drawings[j], rng), rng) for j in (a, b)]
+        active = [d.active(log_uniform(d.kind.highest / RANGE, d.kind.highest, rng), rng)
+                  for d in (drawings[a], drawings[b])]
         flight = _flown(scene, library, FIRST_OF_PAIR + i, active)
         if flight is None:
             continue
@@ -144,8 +146,8 @@ def _scatter_of_pairs(scene: Scene, library: Library, drawings: Sequence[Drawing
             continue  # the weaker one does not show
         excess.append(library.excess(flight.squared_distance(both)))
         evidence.append(both.evidence)
-        known.append(np.hypot(library.nominal_scatter, max(library.distance_scatter[[a, b]]) * both.evidence))
-    return scatter(np.array(excess), np.array(evidence), np.array(known))
+        of_classes.append(library.scatter(max(library.distance_scatter[[a, b]]), both.evidence))
+    return scatter(np.array(excess), np.array(evidence), np.array(of_classes))
 
 
 def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, int]:
@@ -154,10 +156,6 @@ def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, 
         a, b = (int(j) for j in rng.choice(len(drawings), 2, replace=False))
         if not interchangeable(drawings[a].kind.effect, drawings[b].kind.effect):
             return a, b
-
-
-def _strength(drawing: Drawing, rng: np.random.Generator) -> float:
-    return float(np.exp(rng.uniform(np.log(drawing.kind.highest / RANGE), np.log(drawing.kind.highest))))
 
 
 def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightFeatures | None:

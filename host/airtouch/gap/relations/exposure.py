@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from airtouch.gap.signatures.drawn import log_uniform
 from airtouch.simulation import plant
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, wrench
@@ -125,7 +126,7 @@ def draw(rng: np.random.Generator) -> list[Active]:
     if rng.random() >= WRENCHES:
         every = properties()
         which = int(rng.integers(len(every)))
-        size = float(np.exp(rng.uniform(*np.log(FACTOR))))
+        size = log_uniform(*FACTOR, rng)
         amount = ADDED[every[which]] * size / FACTOR[1] if every[which] in ADDED else np.exp(size * rng.choice([-1, 1]))
         where = float(rng.integers(-1, 4))
         return [Active(PROPERTY, {"property": float(which), "which": where, "amount": float(amount)})]
@@ -137,10 +138,10 @@ def draw(rng: np.random.Generator) -> list[Active]:
         way[:3] = 0.0
     elif parts == 2:
         way *= np.arange(6) == rng.integers(6)
-    way *= np.exp(rng.uniform(*np.log(FORCE_N))) / np.linalg.norm(way)
+    way *= log_uniform(*FORCE_N, rng) / np.linalg.norm(way)
     way[3:] *= LEVER_M
     time = {LOW: (0.02, 0.4), WAVE: (0.025, 5.0), NOISE: (0.004, 2.0)}.get(kind)
-    scale = float(np.exp(rng.uniform(*np.log(time)))) if time else float(rng.integers(4))
+    scale = log_uniform(*time, rng) if time else float(rng.integers(4))
     begin = float(rng.uniform(2.0, 20.0))
     stretch = (0.0, 1e9) if rng.random() < ALWAYS else (begin, begin + float(rng.uniform(1.0, 8.0)))
     return [Active(DISTURBANCE, dict(zip(NAMES, map(float, (3 * kind + axis, *way, scale, *stretch)), strict=True)))]

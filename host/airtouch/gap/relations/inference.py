@@ -97,10 +97,8 @@ def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> tuple
 
 def _distance(flight: FlightFeatures, library: Library, best: Hypothesis, scatters: Shares) -> tuple[float, float]:
     """Nats by which a flight lies farther from effects than nominal flights from none, and their limit."""
-    of_pairs = library.pair_scatter * (len(best.fits) > 1)
-    scatter = np.linalg.norm([library.nominal_scatter, _largest(best, scatters) * best.evidence,
-                              of_pairs * best.evidence])
-    return library.excess(flight.squared_distance(best)), FAR * float(scatter)
+    share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
+    return library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence)
 
 
 def _largest(of: Hypothesis, shares: Shares) -> float:

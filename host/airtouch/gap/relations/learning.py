@@ -11,7 +11,7 @@ from airtouch.gap.relations import exposure
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.readout import amount_of
 from airtouch.gap.signatures.candidates import all_candidates, free_of
-from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of
+from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of, log_uniform
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import Active, get
@@ -79,7 +79,7 @@ def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float]
     """Number, effect and features of flights with an effect whose strengths are log-uniform between two."""
     for number in range(count):
         rng = np.random.default_rng([SEED, number, *drawing.name.encode(), int(1e6 * (drawing.shape or 0.0))])
-        active = drawing.active(float(np.exp(rng.uniform(*np.log(strengths)))), rng)
+        active = drawing.active(log_uniform(*strengths, rng), rng)
         made = fly(scene, number, [active])
         if made is not None:
             yield number, active, made

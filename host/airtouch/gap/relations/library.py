@@ -58,6 +58,10 @@ class Library:
         """Standard deviation of the excess distance of nominal flights, nats."""
         return 0.5 * self.distance[1]
 
+    def scatter(self, share: float, evidence: float) -> float:
+        """Standard deviation of the excess distance of flights with effects, nats; share: of it over the evidence."""
+        return float(np.hypot(self.nominal_scatter, share * evidence))
+
     def excess(self, squared: float) -> float:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
         return 0.5 * (squared - self.distance[0])

@@ -16,6 +16,11 @@ from airtouch.simulation.effects import Active, Effect
 Values = dict[str, float]
 
 
+def log_uniform(low: float, high: float, rng: np.random.Generator) -> float:
+    """A number between two, whose logarithm is as likely anywhere."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
 @dataclass(frozen=True)
 class Kind:
     """An effect, or one variant of it, as it is drawn: highest plausible strength, and values of a strength.

@@ -203,15 +203,15 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
         middle, spread = own.rate
-        total += float(_student(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
+        total += float(student_log_density(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
         for name, (middle, spread) in own.passing.items():
             size = flight.passing.get(name, 0.0)
-            total += float(_student(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
+            total += float(student_log_density(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
     return total
 
 
-def _student(x: float, freedom: float, middle: float, spread: float) -> float:
-    """Logarithm of Student's density; scipy.stats takes a second to import."""
+def student_log_density(x: float, freedom: float, middle: float, spread: float) -> float:
+    """Logarithm of Student's density about a middle, of a spread; scipy.stats takes a second to import."""
     far = (x - middle) / spread
     top = np.log(poch(0.5 * freedom, 0.5)) - 0.5 * (np.log(freedom) + np.log(np.pi))
     return top - 0.5 * (freedom + 1.0) * np.log1p(far * far / freedom) - np.log(spread)

@@ -19,7 +19,7 @@ from scipy.optimize import lsq_linear
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
-from airtouch.robust import MAD_TO_SIGMA
+from airtouch.robust import deviation
 from airtouch.twin.fitting import fly
 from airtouch.twin.fitting import levers as lever_set
 from airtouch.twin.fitting.levers import Lever
@@ -81,8 +81,7 @@ def target_of(courses: Sequence[Course], features: np.ndarray) -> Target:
     for k, feature in enumerate(names()):
         values = features[np.isfinite(features[:, k]), k]
         if len(values) >= MIN_FLIGHTS:
-            deviation = 0.0 if feature.paired else MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))
-            scatter[k] = max(deviation, feature.least)
+            scatter[k] = max(0.0 if feature.paired else deviation(values), feature.least)
     return Target(list(courses), features, scatter)
 
 

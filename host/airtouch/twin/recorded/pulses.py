@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.reference.finite import hold_finite
-from airtouch.robust import MAD_TO_SIGMA
+from airtouch.robust import deviation
 
 PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
 PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
@@ -25,19 +25,19 @@ def period(log: FlightLog, start: int, stop: int) -> float:
     if stop - start < MIN_PULSES * PERIODS_S[0] * RATE_HZ:
         return 0.0
     jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)
-    size = MAD_TO_SIGMA * np.median(np.abs(jumps - np.median(jumps)))
+    size = deviation(jumps)
     if size <= 0.0:
         return 0.0
     jumps = np.clip(jumps / size, -CLIP, CLIP)
     sample = np.arange(len(jumps))
-    deviation, best, best_s = jumps.std(), THRESHOLD, 0.0
+    scatter, best, best_s = jumps.std(), THRESHOLD, 0.0
     for seconds in PERIODS_S:
         samples = seconds * RATE_HZ
         if len(jumps) < MIN_PULSES * samples:
             break
         phase = (sample % samples).astype(int)
         mean = np.bincount(phase, jumps)[:int(samples)] / np.bincount(phase)[:int(samples)]
-        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / deviation
+        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / scatter
         if score > best:
             best, best_s = score, float(seconds)
     return round(best_s, 3)
