@@ -3,7 +3,7 @@
     python tools/gap_peers.py [FLIGHTS/peers]
 
 Each case is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
-Names of one thing (`candidates.ALIKE`) count as one.
+Names of one thing (`alike.ALIKE`) count as one.
 """
 
 import argparse

@@ -129,7 +129,7 @@ def _evenly_spaced(items: list) -> list:
 
 def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     """The table as TOML."""
-    lines = ["# Root mean square of the apparent strength of every effect, in its natural steps (candidates.Term), in",
+    lines = ["# Root mean square of the apparent strength of every effect, in its natural steps (term.Term), in",
              "# nominal flights held against others; made by tools/nominal_scatter.py.", ""]
     for name, s in classes.items():
         lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),

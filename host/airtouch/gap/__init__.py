@@ -6,8 +6,9 @@
 Where each decision is made; a folder imports only those above it:
 
 - `flights`, a log made ready: `flight`, `motion` with its `filters`; how hard it is flown: `hardness`.
-- `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
-  where there is none (a `posterior` of the baseline flights), `drawn` how simulated flights with it are drawn.
+- `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
+  which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none (a
+  `posterior` of the baseline flights), `drawn` how simulated flights with it are drawn.
 - `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.

@@ -26,7 +26,8 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.candidates import CLOCK, Term
+from airtouch.gap.signatures.signature import CLOCK, MEAN
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
 from airtouch.logs.flight_log import FlightLog
@@ -161,7 +162,7 @@ def _of_the_loop(data: Data, selection: Selection) -> bool:
     law, chosen = data.study.controller, selection.chosen
     if law is None or chosen is None or len(selection.named) != 1:
         return False
-    terms = [t for t in chosen.terms if t.kind == candidates.MEAN and not t.gate]
+    terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
     return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
 
 
@@ -177,7 +178,7 @@ def _start(terms: Sequence[Term], chosen: Judged) -> np.ndarray | None:
     if not chosen.fits:
         return None
     return np.concatenate([np.zeros(0),
-                           *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == candidates.MEAN)])
+                           *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == MEAN)])
 
 
 def _control(data: Data, selection: Selection, cells: Cells) -> dict[str, object]:

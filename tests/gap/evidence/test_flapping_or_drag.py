@@ -11,6 +11,7 @@ from airtouch.gap.flights import flight
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind import SCENARIO
 from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.alike import names_alike
 from airtouch.simulation import replay, scenario
 from airtouch.simulation import signals as at
 from airtouch.simulation.batch import flights as simulated
@@ -56,7 +57,7 @@ def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, most_nats):
                       for name in ("blade_flapping", "rotor_drag"))
     assert min(flapping, drag) > 40.0
     assert abs(flapping - drag) < most_nats
-    assert candidates.names_alike("rotor_drag")[0] == candidates.names_alike("blade_flapping")[0]
+    assert names_alike("rotor_drag")[0] == names_alike("blade_flapping")[0]
 
 
 def test_gusts_have_no_drag_of_their_own_when_drag_is_left_out():

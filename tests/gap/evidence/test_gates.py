@@ -18,6 +18,7 @@ from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.signature import GATED
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
@@ -135,7 +136,7 @@ def test_a_wake_of_some_width_pushes_under_its_axis_only():
 
 
 def test_every_gated_effect_is_one_of_the_registry():
-    assert set(candidates.gated()) == set(candidates.GATED) <= set(effects.EFFECTS)
+    assert set(candidates.gated()) == set(GATED) <= set(effects.EFFECTS)
     assert "wind" not in candidates.gated(["wind"])
 
 
@@ -146,7 +147,7 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
     force = nominal_flight.acceleration.copy()
     force[on, 1] += 1.5 * np.sin(2.0 * np.pi * 4.0 * t[on]) + 0.1 * rng.normal(size=on.sum())
     odd = replace(nominal_flight, acceleration=force)
-    selection = select(Data(study, [odd]), {}, without=tuple(candidates.GATED))
+    selection = select(Data(study, [odd]), {}, without=tuple(GATED))
     cell = Cell("force_y", (2.0, 6.0), "cruise", 0.5, 0.1, "m/s^2")
     first, = unexplained(study, [odd], selection, [cell])
     assert (first["channel"], first["flight"]) == ("force_y", nominal_flight.name)

@@ -14,8 +14,8 @@ from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
-from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
 

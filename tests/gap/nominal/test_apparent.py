@@ -4,7 +4,8 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent
-from airtouch.gap.signatures.candidates import MEAN, all_candidates, strength_term
+from airtouch.gap.signatures.candidates import all_candidates, strength_term
+from airtouch.gap.signatures.signature import MEAN
 from gap_flights import fly
 
 

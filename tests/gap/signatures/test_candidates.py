@@ -1,12 +1,67 @@
-"""Effects as hypotheses."""
+"""Which hypotheses the diagnosis tries of each effect."""
 
-import numpy as np
+from dataclasses import replace
+
 import pytest
 
-from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.alike import interchangeable, names_alike
+from airtouch.gap.signatures.candidates import all_candidates, gated, is_random, kind_of, strength_term, terms
+from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
+from airtouch.simulation.effects import EFFECTS, get
 
 
-def test_lines_of_four_rotors_scatter_as_their_phases_do():
-    phases = np.random.default_rng(3).uniform(0.0, 2.0 * np.pi, (50_000, 4))
-    amplitude = np.abs(np.exp(1j * phases).sum(axis=1))
-    assert candidates.OWN_SCATTER["vibration"] == pytest.approx(amplitude.std() / amplitude.mean(), rel=0.1)
+def kinds(variant):
+    return [(t.name, t.kind, t.companion) for t in variant]
+
+
+def test_every_effect_of_the_registry_is_a_candidate_but_those_left_out():
+    assert list(all_candidates()) == list(EFFECTS)
+    assert set(EFFECTS) - all_candidates(["mass", "wind"]).keys() == {"mass", "wind"}
+
+
+def test_a_weak_motor_is_tried_at_each_rotor():
+    assert [t.values["rotor"] for t in terms("weak_motor")] == [1, 2, 3, 4]
+
+
+def test_gains_are_tried_together_and_one_by_one():
+    together, *alone = terms("controller_gain")
+    assert [t.free for t in alone] == [(p,) for p in together.free] and len(together.free) == 4
+
+
+def test_a_ground_effect_is_tried_without_and_with_its_random_part():
+    variants = all_candidates()["ground_effect"]
+    half = len(variants) // 2
+    assert all(kinds(v) == [("ground_effect", MEAN, False)] for v in variants[:half])
+    assert [v[:1] for v in variants[half:]] == variants[:half]
+    assert all(kinds(v[1:]) == [("ground_effect", SPECTRUM, True)] for v in variants[half:])
+    assert all(v[0].values["turbulence"] == 0.0 for v in variants)
+
+
+def test_a_wake_is_never_tried_without_its_random_part():
+    for variants in (all_candidates()["downwash"], gated()["downwash"]):
+        assert [kinds(v) for v in variants] == [[("downwash", MEAN, False), ("downwash", SPECTRUM, True)]]
+    assert strength_term(variants[0]) is variants[0][1]
+    assert is_random("downwash") and not is_random("ground_effect")
+
+
+def test_moving_air_has_drag_beside_it_unless_drag_is_left_out():
+    for name in ("wind", "gust"):
+        variants = all_candidates()[name]
+        assert [len(v) for v in variants] == [1] * len(terms(name)) + [2] * len(terms(name))
+        assert kinds(variants[-1])[1] == ("rotor_drag", MEAN, True)
+        assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + gated()[name])
+
+
+@pytest.mark.parametrize(("name", "kind"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
+def test_an_effect_shows_where_its_record_says(name, kind):
+    assert kind_of(get(name)) == kind and all(t.kind == kind for t in terms(name))
+
+
+@pytest.mark.parametrize(("like", "kind"), [("gust", SPECTRUM), ("rotor_drag", MEAN), ("time_jitter", MEAN)])
+def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(like, kind):
+    assert kind_of(replace(get(like), name="of one's own")) == kind
+
+
+def test_mass_and_thrust_are_two_names_of_one_thing():
+    assert interchangeable("mass", "thrust_coefficient") and interchangeable("wind", "wind")
+    assert not interchangeable("mass", "inertia") and names_alike("inertia") is None

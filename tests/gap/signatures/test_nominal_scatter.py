@@ -6,7 +6,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
-from airtouch.gap.signatures.candidates import ALIKE
+from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.nominal_scatter import (
     FALSE_SHARE,
     LEAST_RECORDED,

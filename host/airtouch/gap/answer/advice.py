@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.result import Cell, Found, Step
-from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where.gap_map import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
@@ -81,7 +81,7 @@ def collect(mission: str) -> str:
 
 def _apart(group: tuple[str, ...]) -> Step:
     """What tells the effects of a group from one another."""
-    alike_group = candidates.names_alike(group[0])
+    alike_group = names_alike(group[0])
     if alike_group and alike_group[0] <= frozenset(group):
         return Step(f"To tell {' from '.join(sorted(alike_group[0]))}: {alike_group[1]}.")
     tell, mission = next((t for k, t in SEPARATES.items() if k <= frozenset(group)),

@@ -12,7 +12,8 @@ from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import Found
-from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term
+from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM, signature_of
+from airtouch.gap.signatures.term import Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
 RESTARTS = 12  #: of a fit of several parameters, at most
@@ -140,12 +141,13 @@ def _mean_of_halves(chosen: Judged) -> np.ndarray | None:
 def _of_clock(term: Term, samples: int) -> np.ndarray:
     """Variance (1, 1) of the scaled strength of an effect of the logged times, from so many samples.
 
-    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of a COUNTED effect is the
-    variance of a Poisson number of bursts.
+    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of an effect counted in
+    bursts is the variance of a Poisson number of bursts.
     """
     count = 2.0 * samples / 10.0
-    if term.name in COUNTED:
-        share, burst = (term.values[p] for p in COUNTED[term.name])
+    bursts = signature_of(term.effect).bursts
+    if bursts is not None:
+        share, burst = (term.values[p] for p in bursts)
         count = share * samples / (2.0 * burst - 1.0)
     return np.diag(term.scaled(term.values) ** 2 / max(count, 1.0))
 
@@ -161,5 +163,6 @@ def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.n
     if len(pairs) == 2:
         between = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
     loop = law is not None and law.changes_loop((term.active(),))
-    error = max(of_loop if loop else MODEL_ERROR if term.kind == SPECTRUM else 0.0, OWN_SCATTER.get(term.name, 0.0))
+    error = max(of_loop if loop else MODEL_ERROR if term.kind == SPECTRUM else 0.0,
+                signature_of(term.effect).own_scatter)
     return covariance + between + np.diag((error * term.scaled(term.values)) ** 2)

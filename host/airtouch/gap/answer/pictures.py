@@ -15,7 +15,9 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
-from airtouch.gap.signatures.candidates import MEAN, Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle

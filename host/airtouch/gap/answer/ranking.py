@@ -9,8 +9,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Selection, probabilities
 from airtouch.gap.result import Found, Quantity, Ranked
-from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.candidates import CLOCK
+from airtouch.gap.signatures.alike import names_alike
+from airtouch.gap.signatures.signature import CLOCK
 
 AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
 #: nats of held-out log likelihood; two candidates that differ by less cannot be told apart: odds of 20, chosen
@@ -83,7 +83,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named:
-        group = candidates.names_alike(step.name)
+        group = names_alike(step.name)
         if group and not any(step.name in g for g in groups):
             groups.append(tuple(sorted(group[0])))
     return tuple(groups)

@@ -17,7 +17,7 @@ from airtouch.gap.evidence.problem import GROUPS, Part
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 
 SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen

@@ -13,7 +13,7 @@ from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
-from airtouch.gap.signatures.candidates import MEAN
+from airtouch.gap.signatures.signature import MEAN
 from airtouch.simulation import signals as at
 
 MOST_CELLS = 5  #: cells that are reported

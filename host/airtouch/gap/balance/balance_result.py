@@ -11,7 +11,7 @@ from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
-from airtouch.gap.signatures.candidates import names_alike
+from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where import summary
 from airtouch.simulation.effects import get
 from airtouch.vehicle import Vehicle

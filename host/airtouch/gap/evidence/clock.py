@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 
 LEAST_CLOCK_S = 2e-4  #: s, rms of a clock that nothing disturbs
 JITTER, LOSS = "time_jitter", "packet_loss"

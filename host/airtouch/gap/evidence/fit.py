@@ -16,7 +16,9 @@ from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, w
 from airtouch.gap.evidence.problem import GROUPS, LOOP, Part, Problem, problem_of
 from airtouch.gap.evidence.slopes import Slopes, active_at
 from airtouch.gap.signals.spectra import squared
-from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import MEAN, SPECTRUM
+from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8

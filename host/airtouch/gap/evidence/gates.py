@@ -19,7 +19,9 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.candidates import Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import OVERHEAD
+from airtouch.gap.signatures.term import Term
 from airtouch.logs.segments import KINDS
 
 #: no number here has a source unless it says so: all were chosen
@@ -66,7 +68,7 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     level, bursts = {wide: judge(data, whole, (), wide) for wide in (False, True)}, _bursts(data)
     out = {}
     for name, variants in candidates.gated(without).items():
-        if name == candidates.OVERHEAD and data.study.overhead:
+        if name == OVERHEAD and data.study.overhead:
             wake = _best(data, whole, name, variants, data.study.overhead, level, len(without_effect))
             out[TOLD] = replace(wake, key=TOLD)
         judged = [_judged(data, whole, name, terms, gate, cost, level, len(without_effect)) for variant in variants

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 
 
 def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:

@@ -14,8 +14,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.gates import TOLD, Gate, within
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
 

@@ -22,7 +22,9 @@ from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
-from airtouch.gap.signatures.candidates import MEAN, Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 

@@ -18,7 +18,7 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects import Active
 
 STEP = 0.02  #: change of a scaled parameter over which slopes are taken

@@ -15,7 +15,9 @@ from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.screen import Screen
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signals.spectra import AIR, REST
-from airtouch.gap.signatures.candidates import CLOCK, MEAN, Term, random_of, strength_term
+from airtouch.gap.signatures.candidates import random_of, strength_term
+from airtouch.gap.signatures.signature import CLOCK, MEAN
+from airtouch.gap.signatures.term import Term
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s; chosen
 #: nats of held-out data that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap.md)

@@ -14,8 +14,11 @@ from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound,
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.second_process import shared
-from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, strength_term
+from airtouch.gap.signatures.alike import names_alike
+from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.signature import COMPANIONS, MEAN
+from airtouch.gap.signatures.term import Term
 
 HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer in this view; chosen
 FULL = 5  #: candidates that are fitted in full, after a first look at all; chosen for time

@@ -14,7 +14,8 @@ from airtouch.gap.evidence.fit import strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import Part, Problem, problem_of
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY
-from airtouch.gap.signatures.candidates import MEAN, Term
+from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken; chosen
 ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen

@@ -30,8 +30,10 @@ from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES, Term, is_random, random_of
+from airtouch.gap.signatures.candidates import is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.signature import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models

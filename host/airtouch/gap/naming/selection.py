@@ -8,7 +8,8 @@ import numpy as np
 from airtouch.gap.evidence.fit import Fit
 from airtouch.gap.evidence.problem import Part
 from airtouch.gap.relations.inference import Inference
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, Term
+from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
+from airtouch.gap.signatures.term import Term
 
 #: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0

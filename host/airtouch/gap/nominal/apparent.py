@@ -12,8 +12,9 @@ from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless, seconds
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, all_candidates, strength_term
+from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.nominal_scatter import Apparent, size_of
+from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
 
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing

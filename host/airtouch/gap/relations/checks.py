@@ -12,7 +12,7 @@ from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
-from airtouch.gap.signatures.candidates import interchangeable
+from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.drawn import log_uniform
 from airtouch.simulation.effects import EFFECTS, NAMES, Active
 

@@ -11,7 +11,7 @@ from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Reading, read_out
-from airtouch.gap.signatures.candidates import interchangeable
+from airtouch.gap.signatures.alike import interchangeable
 from airtouch.simulation.effects import get
 
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.signatures.candidates import neutral_of, parameter_of, unit
+from airtouch.gap.signatures.term import neutral_of, parameter_of, unit
 from airtouch.simulation.effects import Effect
 
 LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors

@@ -11,7 +11,8 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.sealed.blind_severity import SEEN
-from airtouch.gap.signatures.candidates import interchangeable, terms
+from airtouch.gap.signatures.alike import interchangeable
+from airtouch.gap.signatures.candidates import terms
 
 Case = Mapping[str, Any]
 LEVELS = ("weakest", "2x", "4x")

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.signatures.candidates import free_of, neutral_of, unit
+from airtouch.gap.signatures.signature import free_of
+from airtouch.gap.signatures.term import neutral_of, unit
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active, Effect
 

@@ -20,7 +20,8 @@ from importlib import resources
 import numpy as np
 from scipy.special import poch, stdtrit
 
-from airtouch.gap.signatures.candidates import ALIKE, is_random
+from airtouch.gap.signatures.alike import ALIKE
+from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, moments, standard_deviation, updated
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly

@@ -15,7 +15,9 @@ from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
-from airtouch.gap.signatures.candidates import MEAN, Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS, basis
 
 CHANNELS = 9  #: that are regressed: force, torque, rate

@@ -13,7 +13,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import Part, whole_of
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, UnnamedFloor, answerable, no_floor
 from airtouch.gap.unnamed.powers import power_floor, power_gain

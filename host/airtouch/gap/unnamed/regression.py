@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import Part, problem_of
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Cell, UnnamedFloor, cells_of, no_floor
 from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
-from airtouch.gap.signatures.candidates import WITHIN_90
+from airtouch.gap.signatures.term import WITHIN_90
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
 from airtouch.logs.segments import KINDS
 

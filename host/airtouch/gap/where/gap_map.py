@@ -18,7 +18,9 @@ from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import frequencies
-from airtouch.gap.signatures.candidates import MEAN, Term, random_of
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
 from airtouch.gap.where.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.logs.segments import KINDS

@@ -1,0 +1,131 @@
+"""What the diagnosis knows of each effect: one record an effect, for what the registry does not say.
+
+An effect without a record (a user's own) has every parameter with a neutral value free; `candidates` finds out whether
+it is random.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from airtouch.simulation.effects import Effect
+
+#: how an effect shows: in the mean of the gap, in its spectrum, in the logged times alone
+MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
+OVERHEAD = "downwash"  #: the effect of another vehicle overhead
+
+
+class Shape(NamedTuple):
+    """A parameter that half of the data can hardly tell: all the data choose one of these values in the end."""
+
+    parameter: str
+    values: tuple[float, ...]
+
+
+class Bursts(NamedTuple):
+    """Names of two parameters: share of the samples, and how many of them go in a row.
+
+    Bursts are Poisson's, their lengths geometric.
+    """
+
+    share: str
+    length: str
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How one effect is fitted, and how it shows; values in the units of the effect's parameters.
+
+    free: parameters that a fit frees; the others have the same effect in most logs.
+    shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
+    variants: values of parameters that are tried one by one.
+    free_later: parameters that are freed once a fit of the others is close.
+    shape: a shape that all the data choose in the end; None for an effect without.
+    alone_too: whether each free parameter is also tried alone.
+    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; none
+    for an effect without a random part.
+    always_random: whether the effect is only tried with its random part, because the mean alone has other names.
+    comes_and_goes: whether it may act in a part of a flight only.
+    companion: the effect that a variant has beside it; "" without one.
+    own_scatter: relative standard deviation of its strength from flight to flight that no likelihood shows.
+    bursts: for what is counted in bursts, the parameters that say so.
+    """
+
+    free: tuple[str, ...]
+    shows_in: str = MEAN
+    variants: tuple[Mapping[str, float], ...] = ({},)
+    free_later: tuple[str, ...] = ()
+    shape: Shape | None = None
+    alone_too: bool = False
+    steady: Mapping[str, float] | None = None
+    always_random: bool = False
+    comes_and_goes: bool = False
+    companion: str = ""
+    own_scatter: float = 0.0
+    bursts: Bursts | None = None
+
+
+def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
+    """A variant for each value of a parameter."""
+    return tuple({parameter: value} for value in values)
+
+
+#: by name. The values of variants and shapes (m, s, fractions, number of the rotor) were chosen a factor of 1.2 to five
+#: apart, so that a fit between two of them loses little
+SIGNATURES: dict[str, Signature] = {
+    "ground_effect": Signature(
+        ("strength",), variants=_each("fade", 0.0, 0.06, 0.0875, 0.129),
+        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), steady={"turbulence": 0.0},
+        # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of
+        # opened sealed sets
+        own_scatter=0.07),
+    "rotor_drag": Signature(("horizontal", "vertical")),
+    "wind": Signature(
+        ("x", "y", "z"), comes_and_goes=True,
+        variants=({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
+        companion="rotor_drag"),  # air moves the vehicle through its rotors' drag
+    "gust": Signature(
+        ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), comes_and_goes=True, companion="rotor_drag"),
+    "blade_flapping": Signature(("tilt",)),
+    "motor_lag": Signature(("factor",)),
+    "motor_noise": Signature(("rms",), SPECTRUM, _each("time", 0.005, 0.02, 0.1)),
+    "thrust_coefficient": Signature(("loss",)),
+    "weak_motor": Signature(("thrust_loss",), variants=_each("rotor", 1, 2, 3, 4)),
+    "battery_sag": Signature(
+        ("strength",), free_later=("charge", "capacity"),
+        variants=tuple({"charge": x, "capacity": c} for x in (0.95, 0.8, 0.6, 0.4) for c in (0.2, 1.0))),
+    "mass": Signature(("fraction",)),
+    "com_offset": Signature(("x", "y")),
+    "inertia": Signature(("fraction",)),
+    "slung_load": Signature(("load",), variants=_each("length", 0.1, 0.2, 0.4), free_later=("length",)),
+    "imu_bias": Signature(("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z")),
+    "imu_noise": Signature(("factor",), SPECTRUM),
+    # lines of four rotors at nearly one speed add up as their phases happen to stand: Rayleigh, sqrt(4 / pi - 1)
+    "vibration": Signature(("amplitude",), SPECTRUM, own_scatter=0.52),
+    "sensor_latency": Signature(("delay",)),
+    "actuator_delay": Signature(("delay",)),
+    "time_jitter": Signature(("rms",), CLOCK),
+    "packet_loss": Signature(("share",), CLOCK, bursts=Bursts("share", "burst")),
+    "range_step": Signature(("residual", "kick")),
+    "flow_scale": Signature(("share", "transient")),
+    "downwash": Signature(
+        ("strength",), steady={"turbulence": 0.0, "width": 0.0}, always_random=True, comes_and_goes=True),
+    "controller_gain": Signature(("rate", "attitude", "position", "height"), alone_too=True),
+}
+#: effects that may come and go within a flight
+GATED = tuple(name for name, s in SIGNATURES.items() if s.comes_and_goes)
+#: effects that are only tried with their random part
+SHAKES = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
+#: effects with a variant that has another effect beside it, and that other
+COMPANIONS = {name: s.companion for name, s in SIGNATURES.items() if s.companion}
+
+
+def signature_of(effect: Effect) -> Signature:
+    """The record of an effect; of one without, each parameter with a neutral value is free."""
+    known = SIGNATURES.get(effect.name)
+    return known or Signature(tuple(p.name for p in effect.parameters if p.neutral is not None))
+
+
+def free_of(effect: Effect) -> tuple[str, ...]:
+    """Names of the parameters of an effect that a fit begins with."""
+    return signature_of(effect).free
