@@ -3,9 +3,13 @@
 A random force and torque that follows one of the flight's own signals, a wave or coloured noise, for the whole flight
 or for some seconds; or a property of the plant that no effect of the registry changes. Such flights say what `unknown`
 looks like (outlier exposure: Hendrycks, Mazeika, Dietterich, ICLR 2019).
+
+Shares, weights and ranges were chosen with the library of 2026-11-24; no measurement says how often real disturbances
+are of each kind, and no other values are recorded as tried.
 """
 
 import math
+from enum import IntEnum
 from functools import cache
 
 import numpy as np
@@ -18,62 +22,91 @@ from airtouch.simulation.effects import NAMES as PACKAGE
 from airtouch.simulation.random_generator import normal
 from airtouch.vehicle import load
 
-KIND, FORCE, TIME, BEGIN, END = 0, 1, 7, 8, 9  #: places of the wrench's parameters; force and torque are six
-CONSTANT, VELOCITY, SPEED, THRUST, ROLLED, PITCHED, RATE, LOW, LATER, WAVE, NOISE, TILT, PLACE, DRAG, ROTOR = range(15)
-#: kinds and how often each is drawn: those that have three axes three times
-DRAWN = (CONSTANT, *(VELOCITY,) * 3, SPEED, THRUST, ROLLED, PITCHED, *(RATE,) * 3, LOW, LATER, WAVE, *(NOISE,) * 3,
-         TILT, TILT, PLACE, DRAG, ROTOR)
-WRENCHES = 0.75  #: share of the disturbances that are a force and torque
-ALWAYS = 0.7  #: share of these that act for the whole flight
-FORCE_N = (1e-4, 7e-3)  #: size of a wrench; of a torque with LEVER_M
-LEVER_M = 0.01
-ANY_VEHICLE = "crazyflie-2.1-flow"  #: one on which it is tried which properties effects change
-FACTOR = (0.003, 0.5)  #: logarithm of the factor of a property
+
+class Follows(IntEnum):
+    """What a force and torque is in proportion to. The numbers are parameters of flights: they stay as they are."""
+
+    CONSTANT = 0
+    VELOCITY = 1  #: one component, body axes
+    SPEED = 2
+    THRUST = 3  #: beyond the weight
+    ROLL_THRUST = 4  #: thrust of the rotors on one side less that on the other
+    PITCH_THRUST = 5
+    BODY_RATE = 6  #: one component
+    NEAR_GROUND = 7  #: exponential in the height
+    TIME = 8  #: of the flight
+    WAVE = 9  #: sine of a period
+    NOISE = 10  #: first-order, of a correlation time
+    TILT = 11  #: one horizontal component of the thrust's direction
+    POSITION = 12  #: x
+    SQUARED_VELOCITY = 13  #: forwards
+    ONE_ROTOR = 14  #: its thrust beyond a quarter of the weight
+
+
+WEIGHT = {Follows.VELOCITY: 3, Follows.BODY_RATE: 3, Follows.NOISE: 3, Follows.TILT: 2}  #: times as often as the others
+DRAWN = tuple(f for f in Follows for _ in range(WEIGHT.get(f, 1)))  #: each as often as it is drawn
+#: height (m), period (s) and correlation time (s) of those that have one, between which it is log-uniform
+SCALE = {Follows.NEAR_GROUND: (0.02, 0.4), Follows.WAVE: (0.025, 5.0), Follows.NOISE: (0.004, 2.0)}
+WRENCH_SHARE = 0.75  #: share of the disturbances that are a force and torque, not a property
+WHOLE_FLIGHT_SHARE = 0.7  #: share of these that act for the whole flight
+BEGIN_S, DURATION_S = (2.0, 20.0), (1.0, 8.0)  #: of the others, uniform
+FORCE_N = (1e-4, 7e-3)  #: length of a wrench's six numbers, log-uniform
+LEVER_M = 0.01  #: torque in N m for a number in N
+FACTOR = (0.003, 0.5)  #: logarithm of the factor of a property, log-uniform
+#: of properties that are 0, what is added at most, in their units
 ADDED = {"range_drift": 0.03, "range_dip": 0.02, "motor_hiss": 0.01, "motor_slowness": 0.01, "motor_dead_zone": 150.0,
-         "range_mixed": 1.0}  #: of properties that are 0, what is added at most
+         "range_mixed": 1.0}
+#: properties whose default is 0 although every vehicle has a value
+OF_VEHICLES = frozenset({"rotor_x", "rotor_y", "rotor_inertia", "yaw_torque_over_thrust"})
 #: properties that are no vehicle's, or of parts that these flights do not have
 LEFT_OUT = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_voltage", "voltage_exponent", "firmware",
                       "battery_cells", "power_per_thrust15", "motor_noise_time", "motor_hiss_time", "range_bias_fade",
                       "thrust_curve", "thrust_scale", "rate_scale", "thrust_per_speed2", "loss_burst"})
+ANY_VEHICLE = "crazyflie-2.1-flow"  #: one on which it is tried which properties effects change
+
+#: parameters of the wrench; kind: three times a `Follows`, and the axis (0 to 2); time: its SCALE, or number of a rotor
+NAMES = ("kind", "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "time", "begin", "end")
+KIND, FORCE, TIME, BEGIN, END = (NAMES.index(n) for n in ("kind", "force_x", "time", "begin", "end"))
 
 
 @wrench
 def _disturbance(p, s, memory, stream, out):
+    """Force and torque in proportion to a signal x that is about 1 in an ordinary flight."""
     if s[at.TIME] < p[BEGIN] or s[at.TIME] > p[END]:
         return
     kind, weight, x = int(p[KIND]) // 3, s[at.MASS] * s[at.GRAVITY], 0.0
     axis = int(p[KIND]) - 3 * kind
     t = at.THRUST
     vx, vy, vz = s[at.VELOCITY], s[at.VELOCITY + 1], s[at.VELOCITY + 2]
-    if kind == CONSTANT:
+    if kind == Follows.CONSTANT:
         x = 1.0
-    elif kind == VELOCITY:
+    elif kind == Follows.VELOCITY:
         x = s[at.VELOCITY + axis] / 0.3
-    elif kind == SPEED:
+    elif kind == Follows.SPEED:
         x = math.sqrt(vx * vx + vy * vy + vz * vz) / 0.3
-    elif kind == THRUST:
+    elif kind == Follows.THRUST:
         x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / 0.05
-    elif kind == ROLLED:
+    elif kind == Follows.ROLL_THRUST:
         x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / 0.02
-    elif kind == PITCHED:
+    elif kind == Follows.PITCH_THRUST:
         x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / 0.02
-    elif kind == RATE:
+    elif kind == Follows.BODY_RATE:
         x = s[at.RATES + axis] / 0.2
-    elif kind == LOW:
+    elif kind == Follows.NEAR_GROUND:
         x = math.exp(-s[at.HEIGHT] / p[TIME])
-    elif kind == LATER:
+    elif kind == Follows.TIME:
         x = s[at.TIME] / 10.0
-    elif kind == WAVE:
+    elif kind == Follows.WAVE:
         x = math.sin(2.0 * math.pi * s[at.TIME] / p[TIME])
-    elif kind == NOISE:
+    elif kind == Follows.NOISE:
         keep = math.exp(-s[at.STEP] / p[TIME])
         memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
         x = memory[0]
-    elif kind == TILT:
+    elif kind == Follows.TILT:
         x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / 0.05
-    elif kind == PLACE:
+    elif kind == Follows.POSITION:
         x = s[at.POSITION]
-    elif kind == DRAG:
+    elif kind == Follows.SQUARED_VELOCITY:
         x = vx * abs(vx) / 0.09
     else:
         x = 4.0 * s[t + min(int(p[TIME]), 3)] / weight - 1.0
@@ -85,7 +118,6 @@ def _number(name: str) -> Parameter:
     return Parameter(name, "1", 0.0, -1e9, 1e9, 0.0, name)
 
 
-NAMES = ("kind", "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "time", "begin", "end")
 DISTURBANCE = Effect("disturbance", "a force and torque without a name", tuple(_number(n) for n in NAMES),
                      wrench=_disturbance)
 
@@ -97,6 +129,7 @@ def _change(row, values) -> None:
     row[name] = own + amount * here if name in ADDED else own * np.where(here, amount, 1.0)
 
 
+#: property: its place in `properties`; which: element of one with several, -1 for all; amount: factor, or what is added
 PROPERTY = Effect("property", "a property of the plant that no effect changes",
                   tuple(_number(n) for n in ("property", "which", "amount")), settings=_change)
 
@@ -104,9 +137,9 @@ PROPERTY = Effect("property", "a property of the plant that no effect changes",
 @cache
 def properties() -> tuple[str, ...]:
     """Properties of the plant that no effect of the registry changes, and that may be scaled or added to."""
-    return tuple(name for name, _, default, _ in plant.FIELDS if name not in _changed() | LEFT_OUT
-                 and (name in ADDED or default != 0.0 or name in ("rotor_x", "rotor_y", "rotor_inertia",
-                                                                  "yaw_torque_over_thrust")))
+    out = _changed() | LEFT_OUT
+    return tuple(name for name, _, default, _ in plant.FIELDS
+                 if name not in out and (default != 0.0 or name in ADDED or name in OF_VEHICLES))
 
 
 def _changed() -> set[str]:
@@ -123,25 +156,38 @@ def _changed() -> set[str]:
 
 def draw(rng: np.random.Generator) -> list[Active]:
     """A disturbance, ready to be flown."""
-    if rng.random() >= WRENCHES:
-        every = properties()
-        which = int(rng.integers(len(every)))
-        size = log_uniform(*FACTOR, rng)
-        amount = ADDED[every[which]] * size / FACTOR[1] if every[which] in ADDED else np.exp(size * rng.choice([-1, 1]))
-        where = float(rng.integers(-1, 4))
-        return [Active(PROPERTY, {"property": float(which), "which": where, "amount": float(amount)})]
-    kind, axis = int(rng.choice(DRAWN)), int(rng.integers(3))
-    way, parts = rng.normal(size=6), int(rng.integers(4))
+    return [_drawn_property(rng) if rng.random() >= WRENCH_SHARE else _drawn_wrench(rng)]
+
+
+def _drawn_property(rng: np.random.Generator) -> Active:
+    """Any property, all its elements or one of them, smaller or larger."""
+    place = int(rng.integers(len(properties())))
+    name, size = properties()[place], log_uniform(*FACTOR, rng)
+    amount = ADDED[name] * size / FACTOR[1] if name in ADDED else np.exp(size * rng.choice([-1, 1]))
+    which = float(rng.integers(-1, 4))
+    return Active(PROPERTY, {"property": float(place), "which": which, "amount": float(amount)})
+
+
+def _drawn_wrench(rng: np.random.Generator) -> Active:
+    """A force and torque in any direction that follows any signal."""
+    follows, axis = Follows(int(rng.choice(DRAWN))), int(rng.integers(3))
+    direction = _direction(rng)
+    direction *= log_uniform(*FORCE_N, rng) / np.linalg.norm(direction)
+    direction[3:] *= LEVER_M
+    time = log_uniform(*SCALE[follows], rng) if follows in SCALE else float(rng.integers(4))
+    begin = float(rng.uniform(*BEGIN_S))
+    seconds = (0.0, 1e9) if rng.random() < WHOLE_FLIGHT_SHARE else (begin, begin + float(rng.uniform(*DURATION_S)))
+    values = (3 * follows + axis, *direction, time, *seconds)
+    return Active(DISTURBANCE, dict(zip(NAMES, map(float, values), strict=True)))
+
+
+def _direction(rng: np.random.Generator) -> np.ndarray:
+    """Force and torque (6,), of any length: a force alone, a torque alone, one component alone, or all six."""
+    direction, parts = rng.normal(size=6), int(rng.integers(4))
     if parts == 0:
-        way[3:] = 0.0
+        direction[3:] = 0.0
     elif parts == 1:
-        way[:3] = 0.0
+        direction[:3] = 0.0
     elif parts == 2:
-        way *= np.arange(6) == rng.integers(6)
-    way *= log_uniform(*FORCE_N, rng) / np.linalg.norm(way)
-    way[3:] *= LEVER_M
-    time = {LOW: (0.02, 0.4), WAVE: (0.025, 5.0), NOISE: (0.004, 2.0)}.get(kind)
-    scale = log_uniform(*time, rng) if time else float(rng.integers(4))
-    begin = float(rng.uniform(2.0, 20.0))
-    stretch = (0.0, 1e9) if rng.random() < ALWAYS else (begin, begin + float(rng.uniform(1.0, 8.0)))
-    return [Active(DISTURBANCE, dict(zip(NAMES, map(float, (3 * kind + axis, *way, scale, *stretch)), strict=True)))]
+        direction *= np.arange(6) == rng.integers(6)
+    return direction
