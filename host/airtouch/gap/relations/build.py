@@ -3,175 +3,194 @@
     python -m airtouch.gap.relations.build OUT.npz [--scenario diagnosis] [--vehicle crazyflie-2.1-flow]
 
 The flights' seed is no sealed set's (`learning.SEED`), so that the file is the same every time.
+
+Whitened features (F of them) have the covariance 1 in nominal flights. What is stored is their projection on the Q
+directions in which effects and nameless disturbances move them.
+
+The counts and thresholds below were chosen with the library of 2026-11-24, on flights of `learning.SEED` alone
+(host/docs/looks.md, 12:43 UTC of that day). What other values were tried is not recorded.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from airtouch.gap.relations import exposure, space
-from airtouch.gap.relations.checks import checked, two_of
-from airtouch.gap.relations.effect_class import CHANCE, learn_class
+from airtouch.gap.relations import space
+from airtouch.gap.relations.calibration import calibrated, two_of
+from airtouch.gap.relations.effect_class import learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
-from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly, scaled
+from airtouch.gap.relations.learning import (
+    SEED,
+    Drawing,
+    Say,
+    Scene,
+    Stream,
+    all_drawings,
+    disturbed_flights,
+    drawn_flights,
+    fly,
+    scaled,
+)
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.gap.relations.space import Standard
-from airtouch.simulation.effects import EFFECTS, NAMES, Active
+from airtouch.simulation.effects import Active
 from airtouch.vehicle import load
 
-NOMINAL, NAMELESS, PAIRS = 5000, 3000, 300  #: flights of each kind
-PER_KNOT = 60  #: flights of a class for each factor of three in strength, twice as many where it has a direction
-SMALL = 6.0  #: size of a shift in all whitened features that is hardly one: such are the weakest flights of a class
-HALVINGS = 17  #: of a strength, at most
-COMMON, EACH, OF_NAMELESS = 160, 6, 120  #: directions: of nameless disturbances, of each class, of their scatter
-TOGETHER = 24  #: directions, at most, in which two effects are no sum
-CLEAR = 12.0  #: size of the smaller of two effects from which their sum is looked at
-Say = Callable[[str], None]
+NOMINAL = 5000  #: nominal flights, twice as many as there are features, of which they give the covariance
+NAMELESS = 3000  #: flights in which something acts that has no name
+PAIRS = 300  #: flights with two effects
+PER_KNOT = 60  #: flights of a class for each KNOT of its strength (a factor of three); twice as many for a direction
+FACTOR_OF_KNOT = 3.0  #: in strength, that of `effect_class.KNOT`
+WEAKEST_SHIFT = 6.0  #: length of a whitened shift of a class's weakest flights, which hardly shows beside nominal ones
+WEAKEST_FLIGHTS = 3  #: flights whose median gives that length
+HALVINGS = 17  #: of the highest strength, at most, down to the weakest
+DIRECTIONS_OF_NAMELESS = 160  #: directions that are stored for nameless disturbances
+DIRECTIONS_OF_CLASS = 6  #: directions that are stored for each class
+RANK_OF_NAMELESS = 120  #: directions of the scatter of nameless disturbances
+RANK_OF_INTERACTION = 24  #: directions, at most, in which two effects are no sum
+CLEAR_NAMELESS = 3.0  #: length of the shift of a nameless disturbance from which its direction counts
+CLEAR_PAIR = 12.0  #: length of the smaller shift of two effects from which their sum is looked at
 
 
 @dataclass(frozen=True)
-class Whitened:
-    """Features as coordinates in which nominal flights have the covariance 1 (lower triangle L of what it is else)."""
+class Whitening:
+    """Standardised features as coordinates (n, F) in which nominal flights have the covariance 1; L L' is theirs."""
 
     standard: Standard
     lower: np.ndarray
 
     def __call__(self, features: np.ndarray) -> np.ndarray:
+        """Whitened features (n, F) of flights (n, F) or of one flight (F,)."""
         return solve_triangular(self.lower, self.standard(np.atleast_2d(features)).T, lower=True).T
 
 
 @dataclass(frozen=True)
-class Paired:
-    """Flights of a class: scaled parameters (n, p), whitened shifts from the same flights without (n, F), flights."""
+class PairedFlights:
+    """Flights of a class, each beside the nominal flight of the same number.
+
+    amount (n, p): true parameters that vary (`learning.scaled`); shift (n, F): whitened, from the nominal flight;
+    whitened (n, F): the flights themselves; strengths: the lowest and the highest that were drawn.
+    """
 
     drawing: Drawing
-    strength: np.ndarray
+    amount: np.ndarray
     shift: np.ndarray
-    flown: np.ndarray
-    range: tuple[float, float]
+    whitened: np.ndarray
+    strengths: tuple[float, float]
+
+    def draw_strong(self, rng: np.random.Generator) -> Active:
+        """The effect at a strength of the upper half of its range, log-uniform."""
+        low, high = np.log(self.strengths)
+        return self.drawing.active(float(np.exp(rng.uniform(0.5 * (low + high), high))), rng)
 
 
 def build(scene: Scene, say: Say = lambda _: None) -> Library:
     """Fly and learn."""
     say("nominal flights")
-    nominal = {i: f for i in range(NOMINAL) if (f := fly(scene, i)) is not None}
-    table = np.array(list(nominal.values()))
-    standard = space.standard_of(table)
-    white = Whitened(standard, space.whitening(standard(table)))
-    own = dict(zip(nominal, white(table), strict=True))
-    middle = np.mean(list(own.values()), axis=0)
-    paired = [_paired(scene, white, own, d, say) for e in NAMES if e in EFFECTS for d in drawings(e)]
+    flown = {i: f for i in range(NOMINAL) if (f := fly(scene, i)) is not None}
+    features = np.array(list(flown.values()))
+    standard = space.standard_of(features)
+    whitening = Whitening(standard, space.whitening(standard(features)))
+    nominal = dict(zip(flown, whitening(features), strict=True))
+    middle = np.mean(list(nominal.values()), axis=0)
+    paired = [_paired_flights(scene, whitening, nominal, d, say) for d in all_drawings()]
     say("flights without a name")
-    nameless = _nameless(scene, white, own)
-    axes = space.directions([p.shift for p in paired], EACH, nameless, COMMON)
-    stored = solve_triangular(white.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
-    axes, at = white.lower.T @ stored, standard(table) @ stored
-    return _learned(scene, Library(scene.scenario, scene.vehicle.name, standard, stored, at.mean(axis=0),
-                                   LearnedModel((), np.zeros((stored.shape[1], 0)), _of_nameless(nameless @ axes)),
-                                   (0.0, 1.0), np.zeros(0), np.zeros(0), np.zeros(0), 0.0), paired, middle, axes, say)
-
-
-def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.ndarray, axes: np.ndarray, say: Say,
-             ) -> Library:
-    """The library with classes, and what is known of them by flights that they were not learned from."""
-    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.strength, p.shift @ axes,
-                            (p.flown - middle) @ axes) for p in paired)
-    library = replace(empty, model=replace(empty.model, classes=classes))
+    nameless = np.array([whitening(f)[0] - nominal[i] for i, f in disturbed_flights(scene, NAMELESS) if i in nominal])
+    axes = space.directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
+    projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
+    axes = whitening.lower.T @ projection  # as they are after the rounding
+    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.amount, p.shift @ axes,
+                                (p.whitened - middle) @ axes) for p in paired)
+    none = np.zeros(len(classes))
+    library = Library(
+        scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),
+        LearnedModel(classes, np.zeros((projection.shape[1], 0)), _scatter_of_nameless(nameless @ axes)),
+        distance=(0.0, 1.0), nameless_share=none, second_share=none, distance_scatter=none, pair_scatter=0.0)
     say("flights of two effects")
     library = replace(library, model=replace(library.model, interaction=_interaction(scene, library, paired)))
-    say("checks")
-    nothing = np.zeros(len(classes))
-    return checked(scene, read(packed(replace(library, nameless_share=nothing, second_share=nothing,
-                                               distance_scatter=nothing))), say)
+    say("calibration")
+    return calibrated(scene, read(packed(library)), say)  # as it will be read, rounded
 
 
-def _paired(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say) -> Paired:
-    """Flights of one class, from strengths that hardly show to the highest."""
+def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say,
+                    ) -> PairedFlights:
+    """Flights of one class, from strengths that hardly show to the highest; nominal: whitened (F,) by number."""
     say(f"{drawing.name} {drawing.shape or ''}")
-    high = low = drawing.kind.highest
+    high = drawing.kind.highest
+    low = min(_weakest(scene, whitening, nominal, drawing), high / FACTOR_OF_KNOT)
+    of_direction = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
+    count = int(of_direction * PER_KNOT * (np.log(high / low) / np.log(FACTOR_OF_KNOT) + 1.0))
+    flown = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
+    amount = np.array([scaled(drawing, a) for _, a, _ in flown])
+    whitened = whitening(np.array([f for *_, f in flown]))
+    shift = whitened - np.array([nominal[i] for i, *_ in flown])
+    return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
+
+
+def _weakest(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing) -> float:
+    """The highest strength of a class, halved until it hardly shows."""
+    strength = drawing.kind.highest
     for _ in range(HALVINGS):
-        if _size(scene, white, nominal, drawing, low) <= SMALL:
+        if _length_of_shift(scene, whitening, nominal, drawing, strength) <= WEAKEST_SHIFT:
             break
-        low /= 2.0
-    low = min(low, high / 3.0)
-    turned = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
-    count = int(turned * PER_KNOT * (np.log(high / low) / np.log(3.0) + 1.0))
-    made = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
-    strength = np.array([scaled(drawing, a) for _, a, _ in made])
-    flown = white(np.array([f for *_, f in made]))
-    shift = flown - np.array([nominal[i] for i, *_ in made])
-    return Paired(drawing, strength[:, np.abs(strength).max(axis=0) > 0.0], shift, flown, (low, high))
+        strength /= 2.0
+    return strength
 
 
-def _size(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing: Drawing, strength: float) -> float:
-    """Median size of the shift by a class at a strength, of three flights."""
-    sizes = []
-    for i in list(nominal)[:3]:
-        f = fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, 5, i]))])
-        sizes += [] if f is None else [np.linalg.norm(white(f)[0] - nominal[i])]
-    return float(np.median(sizes)) if sizes else np.inf
+def _length_of_shift(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,
+                     strength: float) -> float:
+    """Median length of the whitened shift by a class at a strength, of WEAKEST_FLIGHTS."""
+    lengths = []
+    for i in list(nominal)[:WEAKEST_FLIGHTS]:
+        f = fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))])
+        lengths += [] if f is None else [np.linalg.norm(whitening(f)[0] - nominal[i])]
+    return float(np.median(lengths)) if lengths else np.inf
 
 
-def _nameless(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray]) -> np.ndarray:
-    """Whitened shifts (n, F) of flights in which something acts that has no name."""
-    out = []
-    for i in range(NAMELESS):
-        f = fly(scene, i, exposure.draw(np.random.default_rng([SEED, i, 1])))
-        if f is not None and i in nominal:
-            out.append(white(f)[0] - nominal[i])
-    return np.array(out)
+def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
+    """Directions (Q, r), times the deviation, of nameless shifts (n, Q) over their length."""
+    length = np.linalg.norm(shift, axis=1, keepdims=True)
+    unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > CLEAR_NAMELESS]
+    _, deviation, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
+    return axes[:RANK_OF_NAMELESS].T * deviation[:RANK_OF_NAMELESS]
 
 
-def _of_nameless(shift: np.ndarray) -> np.ndarray:
-    """Directions (Q, r), times the deviation, of nameless shifts (n, Q) over their size."""
-    size = np.linalg.norm(shift, axis=1, keepdims=True)
-    unit_shift = (shift / np.maximum(size, 1e-9))[size[:, 0] > 3.0]
-    _, spread, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
-    return axes[:OF_NAMELESS].T * spread[:OF_NAMELESS]
-
-
-def _interaction(scene: Scene, library: Library, paired: Sequence[Paired]) -> np.ndarray:
+def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]) -> np.ndarray:
     """Directions (Q, r), times the deviation, of what two effects are beside their sum, over the smaller."""
     relative, noise = [], []
     for i in range(PAIRS):
-        rng = np.random.default_rng([SEED, 97, i])
+        rng = np.random.default_rng([SEED, Stream.PAIR, i])
         a, b = two_of([p.drawing for p in paired], rng)
-        f = fly(scene, i, [_drawn(paired[j], rng) for j in (a, b)])
+        f = fly(scene, i, [paired[j].draw_strong(rng) for j in (a, b)])
         if f is None:
             continue
         residual, smaller = _residual_of_two(library, library.coordinates(f[None])[0], a, b)
-        if smaller > CLEAR:
+        if smaller > CLEAR_PAIR:
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
                 relative.append(residual / smaller)
-    return _standing_out(np.array(relative), float(np.mean(noise)))
+    return _beyond_noise(np.array(relative), float(np.mean(noise)))
 
 
-def _standing_out(relative: np.ndarray, noise: float) -> np.ndarray:
+def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
     """Directions (Q, r), times the deviation, in which values (n, Q) vary by more than a noise of this variance may."""
     many, dimensions = relative.shape
-    _, spread, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
-    stands = spread ** 2 > CHANCE * noise * (1.0 + np.sqrt(dimensions / many)) ** 2
-    stands[TOGETHER:] = False
-    return axes[stands].T * np.sqrt(spread[stands] ** 2 - noise)
-
-
-def _drawn(paired: Paired, rng: np.random.Generator) -> Active:
-    """An effect of a class, not of its weakest strengths."""
-    low, high = np.log(paired.range)
-    return paired.drawing.active(float(np.exp(rng.uniform(0.5 * (low + high), high))), rng)
+    _, deviation, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
+    stands = stands_out(deviation ** 2, noise, dimensions, many)
+    stands[RANK_OF_INTERACTION:] = False
+    return axes[stands].T * np.sqrt(deviation[stands] ** 2 - noise)
 
 
 def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
-    """What two right classes leave of a flight (Q,), and the size of the smaller one's shift."""
+    """What two right classes leave of a flight (Q,), and the length of the smaller one's shift."""
     one, two = library.model.classes[a], library.model.classes[b]
-    flown = FlightFeatures(values, library.model)
-    both = flown.with_two(one, two)
-    return flown.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
+    flight = FlightFeatures(values, library.model)
+    both = flight.with_two(one, two)
+    return flight.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
 def main() -> None:
@@ -180,12 +199,13 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--scenario", default="diagnosis")
     parser.add_argument("--vehicle", default="crazyflie-2.1-flow")
-    given = parser.parse_args()
-    made = build(Scene(given.scenario, load(given.vehicle)), lambda text: print(text, flush=True))
-    save(made, given.out)
-    for c, left, more, far in zip(made.model.classes, made.nameless_share, made.second_share, made.distance_scatter,
-                                    strict=True):
-        print(f"{c.name} {c.shape or ''}: left {left:.3f}, more {more:.3f}, far {far:.3f}")
+    arguments = parser.parse_args()
+    library = build(Scene(arguments.scenario, load(arguments.vehicle)), lambda text: print(text, flush=True))
+    save(library, arguments.out)
+    for c, nameless, second, scatter in zip(library.model.classes, library.nameless_share, library.second_share,
+                                            library.distance_scatter, strict=True):
+        print(f"{c.name} {c.shape or ''}: nameless share {nameless:.3f}, second share {second:.3f}, "
+              f"distance scatter {scatter:.3f}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """What an effect does to the features: a curve along its strength, and how far single flights lie off it.
 
-Coordinates are those of `space`: nominal flights have the covariance 1 there. A class is learned from pairs of
-simulated flights, the same seeds with and without the effect.
+Coordinates (Q of them) are those of `space`: nominal flights have the covariance 1 there. A class is learned from
+pairs of simulated flights, the same seeds with and without the effect. Lengths of shifts are in these coordinates.
+Thresholds without another source were chosen on flights of `learning.SEED` (host/docs/looks.md, 2026-11-24 12:43 UTC).
 """
 
 from dataclasses import dataclass
@@ -13,11 +14,15 @@ from airtouch.gap.relations.readout import Readout
 
 KNOT = float(np.log(3.0))  #: between two knots of a curve, in the logarithm of the strength
 LEAST_SHIFT = 0.5  #: shift along a class's own direction below which a flight says nothing of the curve
-LEAST_SIZE = 5.0  #: of a shift, by which errors of the curve are weighed
-CLEAR = 40.0  #: size of a shift from which the scatter about the curve stands over that of nominal flights
-ODD = 4.0  #: times the usual distance from the curve: a flight that hit something
+LEAST_WEIGHED = 5.0  #: length of a shift below which errors of the curve are weighed as at that length
+CLEAR = 40.0  #: length of a shift from which the scatter about the curve stands over that of nominal flights
+OUTLIER = 4.0  #: times the median distance from the curve: a flight that hit something
 SIGNED = 0.1  #: share of flights with a negative strength from which a class has two signs
-RANK = 16  #: directions of the scatter
+RANK = 16  #: directions of the scatter, at most
+WEAKEST_QUANTILE = 0.01  #: of the strengths, at which a curve begins: a few flights show next to nothing
+LONGEST_UNIT = 3.0  #: length of a shift from which its direction counts in full
+FITS = 2  #: of a curve, the second without outliers
+GRID_PER_KNOT = 6  #: strengths at which a class of one parameter is tried first, for each knot
 #: times the largest eigenvalue that noise alone gives (Marchenko and Pastur 1967), from which a direction counts
 CHANCE = 1.2
 
@@ -55,6 +60,7 @@ class EffectClass:
 
     @property
     def most(self) -> float:
+        """The highest strength that was flown."""
         return float(np.exp(self.knots[-1]))
 
     def mean(self, strength: np.ndarray) -> np.ndarray:
@@ -65,8 +71,8 @@ class EffectClass:
 
     @cached_property
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strengths (n, 1) of a class with one parameter, six a knot, and the shifts there (n, Q)."""
-        steps = 6 * (len(self.knots) - 1) + 1
+        """Strengths (n, 1) of a class with one parameter, GRID_PER_KNOT a knot, and the shifts there (n, Q)."""
+        steps = GRID_PER_KNOT * (len(self.knots) - 1) + 1
         one = np.exp(np.linspace(self.knots[0], self.knots[-1], steps))
         strength = np.concatenate([one, -one] if self.signed else [one])[:, None]
         return strength, self.mean(strength)
@@ -88,59 +94,73 @@ def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     return out
 
 
-def learn_class(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flown: np.ndarray,
-            ) -> EffectClass:
-    """A class from flights: scaled parameters (n, parameters), shifts from the same flights without the effect (n, Q),
+def learn_class(name: str, effect: str, shape: float | None, amount: np.ndarray, shift: np.ndarray, flights: np.ndarray,
+                ) -> EffectClass:
+    """A class from n flights.
 
-    and the flights themselves less the nominal mean (n, Q).
-
+    amount (n, parameters): true parameters, scaled; shift (n, Q): from the same flights without the effect; flights
+    (n, Q): the flights themselves less the nominal mean.
     With one parameter the strength is the shift along the class's main direction: what else of a flight makes the
     effect stronger or weaker (a battery's charge, the phase of four rotors) counts as its strength.
     """
-    signs = np.sign(strength[:, 0]) if strength.shape[1] == 1 else np.ones(len(strength))
-    strength = strength / np.median(np.abs(strength[strength != 0.0]))
-    if strength.shape[1] == 1:
-        unit = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), 3.0) * signs[:, None]
-        way = np.linalg.svd(unit, full_matrices=False)[2][0]
-        along = shift @ (way * np.sign((unit @ way).sum()))
-        seen = np.abs(along) > LEAST_SHIFT
-        strength, shift, flown = along[seen, None], shift[seen], flown[seen]
-    for _ in range(2):
-        made, good = _fitted(name, effect, shape, strength, shift, flown)
-        strength, shift, flown = strength[good], shift[good], flown[good]
-    return made
+    if amount.shape[1] == 1:
+        strength = _along_main_direction(shift, np.sign(amount[:, 0]))[:, None]
+        shows = np.abs(strength[:, 0]) > LEAST_SHIFT
+        strength, shift, flights = strength[shows], shift[shows], flights[shows]
+    else:
+        strength = amount / np.median(np.abs(amount[amount != 0.0]))
+    for _ in range(FITS):
+        learned, near = _fitted(name, effect, shape, strength, shift, flights)
+        strength, shift, flights = strength[near], shift[near], flights[near]
+    return learned
 
 
-def _fitted(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flown: np.ndarray,
+def _along_main_direction(shift: np.ndarray, sign: np.ndarray) -> np.ndarray:
+    """Shifts (n, Q) along the direction in which most of them lie (n,); positive where sign (n,), the effect's, is."""
+    unit = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), LONGEST_UNIT) * sign[:, None]
+    direction = np.linalg.svd(unit, full_matrices=False)[2][0]
+    return shift @ (direction * np.sign((unit @ direction).sum()))
+
+
+def _fitted(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flights: np.ndarray,
             ) -> tuple[EffectClass, np.ndarray]:
     """The class of these flights, and which of them lie about its curve as most do, bool (n,)."""
     size = np.linalg.norm(strength, axis=1)
     signed = bool((strength < 0.0).mean() > SIGNED)
-    low, high = np.log(np.quantile(size, [0.01, 1.0]))
+    low, high = np.log(np.quantile(size, [WEAKEST_QUANTILE, 1.0]))
     knots = np.linspace(low, high, max(int(np.ceil((high - low) / KNOT)), 1) + 1)
     parts = _parts(strength, signed)
     columns = (parts[:, :, None] * _hats(size, knots)[:, None]).reshape(len(size), -1)
-    weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_SIZE)
+    weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_WEIGHED)
     table = np.linalg.lstsq(columns * weight[:, None], shift * weight[:, None], rcond=1e-6)[0]
     expected = columns @ table
-    moved = np.linalg.norm(expected, axis=1)
-    off = np.linalg.norm(shift - expected, axis=1) / np.hypot(moved, LEAST_SIZE)
-    good = off < ODD * np.median(off)
-    axes, variances = _scatter(flown[good] - expected[good], moved[good], columns.shape[1])
+    length = np.linalg.norm(expected, axis=1)
+    distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHED)
+    near = distance < OUTLIER * np.median(distance)
+    axes, variances = _scatter(flights[near] - expected[near], length[near], columns.shape[1])
     return EffectClass(name, effect, shape, strength.shape[1], signed, knots,
-                       table.reshape(parts.shape[1], len(knots), -1), axes, variances), good
+                       table.reshape(parts.shape[1], len(knots), -1), axes, variances), near
 
 
-def _scatter(off: np.ndarray, moved: np.ndarray, fitted: int) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (Q, r) and variances (r,) by which flights lie off their curve (n, Q), over the size of their shifts
+def _scatter(residual: np.ndarray, length: np.ndarray, fitted: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (Q, r), and variances (r,) along them, of flights about their curve, over the squared shift.
 
-    (n,), beyond what nominal flights scatter. fitted: coefficients of each coordinate of the curve.
+    residual (n, Q): flights less their expected shift, of this length (n,); what nominal flights scatter is not
+    counted. fitted: coefficients of each coordinate of the curve.
     """
-    clear = moved >= min(float(np.median(moved)), CLEAR)
-    relative = off[clear] / moved[clear, None]
+    clear = length >= min(float(np.median(length)), CLEAR)
+    relative = residual[clear] / length[clear, None]
     many = len(relative)
-    noise = float(np.mean(moved[clear] ** -2.0))
+    noise = float(np.mean(length[clear] ** -2.0))
     _, size, axes = np.linalg.svd(relative / np.sqrt(max(many - fitted * clear.mean(), 1.0)), full_matrices=False)
-    stands = size ** 2 > CHANCE * noise * (1.0 + np.sqrt(off.shape[1] / many)) ** 2
+    stands = stands_out(size ** 2, noise, residual.shape[1], many)
     stands[RANK:] = False
     return axes[stands].T, size[stands] ** 2 - noise
+
+
+def stands_out(variance: np.ndarray, noise: float, dimensions: int, many: int) -> np.ndarray:
+    """Which eigenvalues (r,) of a covariance exceed what noise of this variance gives, bool (r,).
+
+    many: samples of which the covariance is, each of so many dimensions.
+    """
+    return variance > CHANCE * noise * (1.0 + np.sqrt(dimensions / many)) ** 2

@@ -1,7 +1,8 @@
 """Flights simulated to learn from: nominal ones, ones with each effect, ones with something that has no name."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 
@@ -15,10 +16,20 @@ from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of, log_uniform
 from airtouch.gap.signatures.signature import free_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
-from airtouch.simulation.effects import Active, get
+from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
 from airtouch.vehicle import Vehicle
 
 SEED = 8_000_000  #: of all flights that are learned from; nobody draws sealed sets from it
+Say = Callable[[str], None]  #: what a long run reports its progress to
+
+
+class Stream(IntEnum):
+    """Second number of a random generator's seed, after SEED: one for each purpose, so that none repeats another."""
+
+    WEAKEST = 5
+    CALIBRATION = 95
+    PAIR = 97
+    CALIBRATION_PAIR = 98
 
 
 @dataclass(frozen=True)
@@ -30,7 +41,7 @@ class Scene:
 
 
 def fly(scene: Scene, number: int, active: Sequence[Active] = ()) -> np.ndarray | None:
-    """Features of flight number `number` with effects; None where it does not end well."""
+    """Features (features,) of flight number `number` with effects; None where it does not end well."""
     log = next(iter(flown(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED, workers=1)))
     if not isinstance(log, FlightLog):
         return None
@@ -56,7 +67,6 @@ class Drawing:
         drawn = self.kind.active(strength, rng)
         return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, SHAPED[self.name]: self.shape})
 
-
     @property
     def free(self) -> tuple[str, ...]:
         """Names of the effect's free parameters; of one where the class is of that one alone."""
@@ -64,14 +74,19 @@ class Drawing:
         return tuple(p for p in free_of(get(self.kind.effect)) if alone in ("", p))
 
 
+def all_drawings() -> list[Drawing]:
+    """The classes of flights of all effects of the package."""
+    return [d for effect in NAMES if effect in EFFECTS for d in drawings(effect)]
+
+
 def drawings(effect: str) -> list[Drawing]:
-    """The classes of flights of an effect."""
+    """The classes of flights of an effect: one for each kind of it, and for each value of what shapes that kind."""
     out = []
     for name, kind in kinds_of(get(effect)).items():
         parameter = SHAPED.get(name)
-        own = [t for v in all_candidates()[effect] for t in v if t.name == effect and not t.companion]
+        own = [t for variant in all_candidates()[effect] for t in variant if t.name == effect and not t.companion]
         shapes = sorted({t.values[parameter] for t in own}) if parameter else [None]
-        out += [Drawing(name, kind, s) for s in shapes]
+        out += [Drawing(name, kind, shape) for shape in shapes]
     return out
 
 

@@ -7,11 +7,14 @@ import numpy as np
 
 from airtouch.gap.relations import coherence, edge_steps, moments
 
-SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm only
+SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm only; chosen, as all numbers here
+MIDDLE_TWO_THIRDS = (0.16, 0.84)  #: quantiles; in a normal density they are two standard deviations apart
+LONG_SHIFT = 8.0  #: length of a whitened shift above which longer ones count no more in `directions`
+SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
 #: no feature is taken to say more than this: coherence, logarithms of powers and of variances, of the clock
 LEAST_COHERENCE, LEAST_LOG, LEAST_CLOCK = 0.01, 0.03, 0.1
 LEAST_LOST = 0.5  #: the same of lost rows, in the logarithm of one more than their number: one by chance is no news
-DOUBT = 0.1  #: variance of every feature, in its nominal one, that no nominal flight knows of: see `whitening`
+DOUBT = 0.1  #: variance of a feature, as a share of its nominal one, that no nominal flight shows: see `whitening`
 SMALLEST = 1e-9  #: deviation of a feature that varies at all
 
 
@@ -34,7 +37,7 @@ class Standard:
 def standard_of(nominal: np.ndarray) -> Standard:
     """The standard of nominal flights' features (n, features): the middle two thirds of them give the deviation."""
     middle = np.nanmedian(nominal, axis=0)
-    low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), [0.16, 0.84], axis=0)
+    low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), MIDDLE_TWO_THIRDS, axis=0)
     deviation = np.hypot(0.5 * (high - low), _least())
     return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
 
@@ -57,17 +60,17 @@ def whitening(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:
     return np.linalg.cholesky(covariance)
 
 
-def directions(shifts: Sequence[np.ndarray], each: int, first: np.ndarray, common: int) -> np.ndarray:
-    """Orthonormal directions (features, d): `common` of `first` (n, features) and `each` of every other set of shifts.
+def directions(shifts: Sequence[np.ndarray], each: int, first: np.ndarray, of_first: int) -> np.ndarray:
+    """Orthonormal directions (features, Q): `of_first` of `first` (n, features), `each` of every other set of shifts.
 
     All shifts are whitened; long ones count little more than short ones.
     """
-    blocks = [_principal(first, common), *(_principal(s, each) for s in shifts)]
+    blocks = [_principal(first, of_first), *(_principal(s, each) for s in shifts)]
     return np.linalg.qr(np.concatenate(blocks, axis=1))[0]
 
 
-def _principal(shifts: np.ndarray, many: int, least: float = 8.0) -> np.ndarray:
-    """The directions (features, many) in which shifts (n, features) lie, their lengths cut at `least`."""
-    scaled = shifts / np.maximum(np.linalg.norm(shifts, axis=1, keepdims=True), least)
+def _principal(shifts: np.ndarray, many: int) -> np.ndarray:
+    """The directions (features, many) in which shifts (n, features) lie, their lengths cut at LONG_SHIFT."""
+    scaled = shifts / np.maximum(np.linalg.norm(shifts, axis=1, keepdims=True), LONG_SHIFT)
     _, size, axes = np.linalg.svd(scaled, full_matrices=False)
-    return axes[:many][size[:many] > 1e-6 * size[0]].T
+    return axes[:many][size[:many] > SMALLEST_SINGULAR * size[0]].T

@@ -1,0 +1,210 @@
+"""Calibrate a library on simulated flights that it was not learned from: distances, shares of evidence, parameters.
+
+Counts and thresholds without another source were chosen on flights of `learning.SEED` alone (host/docs/looks.md,
+2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not recorded.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.stats import t as student
+
+from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
+from airtouch.gap.relations.inference import LEAST_EVIDENCE
+from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, scaled
+from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.readout import Readout
+from airtouch.gap.relations.space import MIDDLE_TWO_THIRDS
+from airtouch.gap.signatures.alike import interchangeable
+from airtouch.gap.signatures.drawn import log_uniform
+from airtouch.simulation.effects import Active
+
+NOMINAL = 300  #: nominal flights, whose distances are measured
+CALIBRATION = 80  #: flights of each class (host/docs/gap.md, "How far right names lie"); those that show it count
+SECONDS = 12  #: of them, those beside whose effect a second one is tried
+PAIRS = 150  #: flights with two effects (host/docs/gap.md, there)
+FIRST_NOMINAL, FIRST_OF_PAIR, FIRST_CALIBRATION = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
+OF_CLASS = 1000  #: numbers that each class has of its own
+RANGE_OF_PAIR = 30.0  #: factor between the highest and the lowest strength of the effects of a pair
+HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
+TRIED, SHOWN = 3, 0.5  #: flights at each of these strengths, and the share of them that shows an effect which shows
+QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
+FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
+LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
+LEAST_GAIN = 10.0  #: nats that chance may gain beside any class, as many as `inference.LEAST_NAMELESS`
+LEAST_FLIGHTS = 12  #: calibration flights that show the effect; with fewer a class gives no parameters
+
+
+def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Library:
+    """The library with its distances, its shares and the calibration of its classes."""
+    library = replace(library, distance=_nominal_distance(scene, library))
+    drawing_of = {(d.name, d.shape): d for d in all_drawings()}
+    drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
+    classes, shares = [], []
+    for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
+        say(f"calibration of {own.name} {own.shape or ''}")
+        shown = _calibration_flights(scene, library, place, drawing)
+        classes.append(replace(own, readout=_readout(drawing, shown)))
+        shares.append((share_of((f.nameless, f.evidence) for f in shown),
+                       share_of((f.second, f.evidence) for f in shown if f.second is not None),
+                       scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
+                               library.nominal_scatter)))
+    nameless, second, distance = np.array(shares).T
+    library = replace(library, nameless_share=nameless, second_share=second, distance_scatter=distance,
+                      model=replace(library.model, classes=tuple(classes)))
+    say("pairs")
+    return replace(library, pair_scatter=_scatter_of_pairs(scene, library, drawings))
+
+
+def _nominal_distance(scene: Scene, library: Library) -> tuple[float, float]:
+    """`Library.distance`: median and standard deviation of squared distances of nominal flights."""
+    flown = [f for i in range(NOMINAL) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
+    squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
+    low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
+    return float(np.median(squared)), float(0.5 * (high - low))
+
+
+@dataclass(frozen=True)
+class CalibrationFlight:
+    """A flight that shows an effect, with the class of that effect fitted to it.
+
+    strength (s,): of the class, as fitted; amount (p,): true parameters (`learning.scaled`). In nats: evidence for the
+    class; what a disturbance without a name gains beside it (nameless) and what a second effect gains (second, None
+    where none was tried); excess, by which the flight lies farther from the class than the median nominal flight from
+    none.
+    """
+
+    strength: np.ndarray
+    amount: np.ndarray
+    evidence: float
+    nameless: float
+    second: float | None
+    excess: float
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A flight with one effect, and the hypothesis of its class."""
+
+    active: Active
+    flight: FlightFeatures
+    hypothesis: Hypothesis
+
+    @property
+    def shows(self) -> bool:
+        """Whether the class has the evidence that an effect needs."""
+        return self.hypothesis.evidence > LEAST_EVIDENCE
+
+
+def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Drawing) -> list[CalibrationFlight]:
+    """Flights of a class from the strength that hardly shows to the highest, of them those that show it."""
+    own, high = library.model.classes[place], drawing.kind.highest
+    rng = np.random.default_rng([SEED, Stream.CALIBRATION, place])
+    first = FIRST_CALIBRATION + OF_CLASS * place
+    numbers = iter(range(first, first + OF_CLASS))
+
+    def fitted(strength: float) -> _Fitted | None:
+        """A flight with the effect at a strength, and the class fitted to it; None where it does not end well."""
+        active = drawing.active(strength, rng)
+        flight = _flown(scene, library, next(numbers), [active])
+        return None if flight is None else _Fitted(active, flight, flight.with_class(own))
+
+    low = min(_weakest_shown(fitted, high), 0.5 * high)
+    shown: list[CalibrationFlight] = []
+    for strength in np.exp(rng.uniform(np.log(low), np.log(high), CALIBRATION)):
+        one = fitted(strength)
+        if one is not None and one.shows:
+            shown.append(_measured(library, drawing, one, with_second=len(shown) < SECONDS))
+    return shown
+
+
+def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float) -> float:
+    """The highest strength of a class, halved until fewer than half of its flights show it."""
+    strength = highest
+    for _ in range(HALVINGS):
+        ended = [one for one in (fitted(strength) for _ in range(TRIED)) if one is not None]
+        if ended and np.mean([one.shows for one in ended]) < SHOWN:
+            break
+        strength /= 2.0
+    return strength
+
+
+def _measured(library: Library, drawing: Drawing, one: _Fitted, with_second: bool) -> CalibrationFlight:
+    """What speaks for the class of a flight, and what beside it; with_second: whether a second effect is tried."""
+    flight, here, effect = one.flight, one.hypothesis, drawing.kind.effect
+    second = None
+    if with_second:
+        two = flight.with_one_more(here, lambda c, _: not interchangeable(c.effect, effect))[0]
+        second = two.evidence - here.evidence
+    return CalibrationFlight(here.fits[0].strength, scaled(drawing, one.active), here.evidence,
+                             flight.nameless_evidence(here) - here.evidence, second,
+                             library.excess(flight.squared_distance(here)))
+
+
+def share_of(gains: Iterable[tuple[float, float]]) -> float:
+    """The share of a class's evidence that something beside it gains in most of its flights.
+
+    gains: for each flight what is gained and the evidence, nats. LEAST_GAIN is chance's; one share of 0 is always among
+    those of which the quantile is taken, so that a class without flights has none.
+    """
+    shares = [max(gain - LEAST_GAIN, 0.0) / evidence for gain, evidence in gains]
+    return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
+
+
+def scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
+    """Likeliest scatter s of distances over the evidence: excess (n,) ~ sqrt(nominal^2 + (s evidence)^2) Student's t.
+
+    nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats.
+    """
+    def against(logarithm: float) -> float:
+        """Minus the log likelihood of a scatter."""
+        return -float(student.logpdf(excess, FREEDOM, 0.0, np.hypot(nominal, np.exp(logarithm) * evidence)).sum())
+
+    return float(np.exp(minimize_scalar(against, bounds=(np.log(LEAST_SCATTER), 0.0), method="bounded").x))
+
+
+def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight]) -> Readout | None:
+    """Calibration of a class by flights that show it; None where too few do."""
+    if len(shown) < LEAST_FLIGHTS:
+        return None
+    amount = np.array([f.amount for f in shown])
+    free = np.abs(amount).max(axis=0) > 0.0
+    return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
+
+
+def _scatter_of_pairs(scene: Scene, library: Library, drawings: Sequence[Drawing]) -> float:
+    """`Library.pair_scatter`: by flights with two effects, each hypothesis started from either."""
+    excess, evidence, of_classes = [], [], []
+    for i in range(PAIRS):
+        rng = np.random.default_rng([SEED, Stream.CALIBRATION_PAIR, i])
+        a, b = two_of(drawings, rng)
+        active = [d.active(log_uniform(d.kind.highest / RANGE_OF_PAIR, d.kind.highest, rng), rng)
+                  for d in (drawings[a], drawings[b])]
+        flight = _flown(scene, library, FIRST_OF_PAIR + i, active)
+        if flight is None:
+            continue
+        one, two = (library.model.classes[j] for j in (a, b))
+        both = max((flight.with_two(one, two), flight.with_two(two, one)), key=lambda h: h.evidence)
+        alone = max(flight.with_class(c).evidence for c in (one, two))
+        if both.evidence < alone + LEAST_EVIDENCE:
+            continue  # the weaker one does not show
+        excess.append(library.excess(flight.squared_distance(both)))
+        evidence.append(both.evidence)
+        of_classes.append(library.scatter(max(library.distance_scatter[[a, b]]), both.evidence))
+    return scatter(np.array(excess), np.array(evidence), np.array(of_classes))
+
+
+def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, int]:
+    """Places of two classes whose effects are not two names of one thing."""
+    while True:
+        a, b = (int(j) for j in rng.choice(len(drawings), 2, replace=False))
+        if not interchangeable(drawings[a].kind.effect, drawings[b].kind.effect):
+            return a, b
+
+
+def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightFeatures | None:
+    """The features of a flight with effects; None where it does not end well."""
+    features = fly(scene, number, active)
+    return None if features is None else FlightFeatures(library.coordinates(features[None])[0], library.model)
