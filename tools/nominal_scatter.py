@@ -31,8 +31,9 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.sealed import blind
-from airtouch.gap.signatures import nominal_scatter
-from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, measured
+from airtouch.gap.signatures import scatter_estimates
+from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter
+from airtouch.gap.signatures.scatter_estimates import measured
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
@@ -71,7 +72,7 @@ def groups(folder: Path) -> Iterator[Group]:
         logs = blind.nominal(vehicle, blind.CAL_FIRST, blind.CAL, seed)
         simulated_logs: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log))
                                      for i, log in enumerate(logs)]
-        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs
+        yield scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs
 
 
 def nothing_done(log: FlightLog) -> FlightLog:

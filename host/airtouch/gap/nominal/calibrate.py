@@ -29,7 +29,8 @@ from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import terms
-from airtouch.gap.signatures.nominal_scatter import Apparent, scatter_of
+from airtouch.gap.signatures.nominal_scatter import Apparent
+from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.generic import unnamed_floor
 from airtouch.robust import deviation

@@ -7,34 +7,26 @@ news only as far as its strength exceeds what nominal flights show of the same e
 The variance of a parameter's apparent strength has a scaled inverse chi-square prior
 (Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6) from the table
 `nominal_scatter.toml`, of one class of vehicles, and is updated by the baseline flights;
-the class is the one that these fit best. `tools/nominal_scatter.py` makes the table.
+the class is the one that these fit best (`scatter_estimates`). `tools/nominal_scatter.py`
+makes the table.
 """
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 
 import numpy as np
-from scipy.special import poch, stdtrit
+from scipy.special import stdtrit
 
-from airtouch.gap.signatures.alike import ALIKE
-from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, moments, standard_deviation, updated
+from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS
 
-LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
-RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
 EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is added to that of every strength
-STEPS = 12  #: iterations of the compromise between nominal scatter and chance
-POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
-LEAST_SPREAD = 0.05  #: natural steps: scatter of strengths and sizes at least, where classes are compared
-LEAST_RATE_SPREAD = 0.3  #: the same for the square root of a rate, nats a second
-WINSOR = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised)
-FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that come and go may be named
-RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that square root: a flight or two may be odd
-SIMULATED = "simulated"  #: the class of flights of this project's simulator
+STEPS = 12  #: iterations of the compromise between nominal scatter and chance; chosen
+LEAST_SPREAD = 0.05  #: natural steps: scatter of a size at least; chosen
+FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that come and go may be named; chosen
 
 
 @dataclass(frozen=True)
@@ -145,93 +137,6 @@ class Scatter:
         return 0.5 * (self.freedom + 1.0) * (rarity - limit_rarity)
 
 
-def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
-    """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
-
-    baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
-    by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
-    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
-    that was measured on the vehicle of this name leaves no room for other vehicles'.
-    """
-    classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
-    if vehicle and any(c.vehicle == vehicle for c in classes.values()):
-        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle}
-    n = len(baseline)
-    wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
-    known = baseline if n > 1 else ()
-    weight = np.array([_fit(c, known, wide) for c in classes.values()])
-    name_of = list(classes)[int(np.argmax(weight))]
-    own = classes[name_of] if n > 1 else _widest(list(classes.values()))
-    simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
-    least = LEAST if simulated else LEAST_RECORDED
-    worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
-    rms, middle = {}, {}
-    for name, prior in own.rms.items():
-        rows = [f for f in known if name in f.strengths]
-        scale = math.sqrt(wide)
-        centre = np.zeros(len(prior))
-        if name in own.middle:
-            sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
-            middle[name] = centre = sums / (worth + len(rows))
-        own_rms = [standard_deviation(scale * (_column(rows, name, "strengths", k) - centre[k]),
-                           scale * _column(rows, name, "errors", k), p, (worth, min(worth, RECORDED_WORTH)))
-                   for k, p in enumerate(prior)] if rows else prior
-        exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
-        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
-    for group, _ in ALIKE:  # one thing in the logs, as mass and thrust, scatters as the wider of its names
-        same = [rms[n] for n in group if n in rms]
-        if len({len(x) for x in same}) == 1:
-            rms |= {n: np.max(same, axis=0) for n in group if n in rms}
-    passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
-    rate = updated(own.rate, np.sqrt([f.rate for f in known]), worth)
-    return Scatter(rms, worth + len(known), rate, passing, middle=middle, exact=simulated)
-
-
-def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
-    """Parameter k of an effect, strength or error, in every flight (n,)."""
-    return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
-
-
-def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
-    """Log likelihood of the baseline's strengths and rates in a class."""
-    total, nu = 0.0, own.freedom
-    for flight in baseline:
-        for name, rms in own.rms.items():
-            if name in flight.strengths:
-                n = min(len(rms), len(flight.strengths[name]))
-                variance = np.maximum(rms[:n], LEAST_SPREAD) ** 2 + wide * flight.errors[name][:n] ** 2
-                strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
-                far = wide * strength ** 2 / variance
-                total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
-        middle, spread = own.rate
-        total += float(student_log_density(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
-        for name, (middle, spread) in own.passing.items():
-            size = flight.passing.get(name, 0.0)
-            total += float(student_log_density(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
-    return total
-
-
-def student_log_density(x: float, freedom: float, middle: float, spread: float) -> float:
-    """Logarithm of Student's density about a middle, of a spread; scipy.stats takes a second to import."""
-    far = (x - middle) / spread
-    top = np.log(poch(0.5 * freedom, 0.5)) - 0.5 * (np.log(freedom) + np.log(np.pi))
-    return top - 0.5 * (freedom + 1.0) * np.log1p(far * far / freedom) - np.log(spread)
-
-
-def _widest(classes: Sequence[Scatter]) -> Scatter:
-    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known."""
-    classes = list(classes)
-    names = {n for c in classes for n in c.rms}
-    rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
-
-    def highest(rates: Iterable[tuple[float, float]]) -> tuple[float, float]:
-        return max(rates, key=lambda r: r[0] + r[1])
-
-    passing = {n: highest(c.passing[n] for c in classes if n in c.passing)
-               for n in sorted({n for c in classes for n in c.passing})}
-    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
-
-
 @cache
 def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
@@ -240,31 +145,3 @@ def table() -> dict[str, Scatter]:
                           tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["passing"].items()},
                           entry.get("vehicle", ""), {k: np.array(v) for k, v in entry.get("middle", {}).items()})
             for name, entry in tomllib.loads(text).items()}
-
-
-def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = None) -> Scatter:
-    """The scatter of flights each of which was held against others than itself.
-
-    alike: those of them that give the rates and the degrees of freedom, which were held against flights of their own
-    day and condition; all by default.
-    """
-    alike = flights if alike is None else alike
-    names = sorted({n for f in flights for n in f.strengths})
-    rms, middle = {}, {}
-    for name in names:
-        rows = [f for f in flights if name in f.strengths]
-        size = max(len(f.strengths[name]) for f in rows)
-        columns = [(_column(rows, name, "strengths", k), _column(rows, name, "errors", k)) for k in range(size)]
-        if is_random(name):
-            middle[name] = np.array([strengths.mean() for strengths, _ in columns])
-            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
-        each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
-        pooled = standard_deviation(each, errors, 0.0)
-        rms[name] = np.array([standard_deviation(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1
-                             else [pooled])
-    # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
-    names = sorted({n for f in alike for n in f.passing})
-    passing = {n: moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
-    roots = np.sqrt([f.rate for f in alike])
-    rate = moments(np.minimum(roots, np.quantile(roots, WINSOR)))
-    return Scatter(rms, float(len(alike)), rate, passing, middle=middle)

@@ -1,0 +1,167 @@
+"""The scatter of nominal flights estimated from flights: of a class for the table, of a baseline given the table."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from scipy.special import poch
+
+from airtouch.gap.signatures.alike import ALIKE
+from airtouch.gap.signatures.candidates import is_random
+from airtouch.gap.signatures.nominal_scatter import LEAST_SPREAD, Apparent, Scatter, table
+from airtouch.gap.signatures.posterior import LEAST, moments, standard_deviation, updated
+
+LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
+RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen
+POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them; chosen
+LEAST_RATE_SPREAD = 0.3  #: standard deviation at least of the root of a rate, where classes are compared; chosen
+RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that square root: a flight or two may be odd
+WINSOR = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised); chosen
+SIMULATED = "simulated"  #: the class of flights of this project's simulator
+Pair = tuple[float, float]  #: mean and standard deviation
+
+
+def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
+    """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
+
+    baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
+    by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
+    that was measured on the vehicle of this name leaves no room for other vehicles'. One flight or none says nothing:
+    the scatter is then the widest of any class.
+    """
+    classes = _possible_classes(recorded, vehicle)
+    n = len(baseline)
+    known = tuple(baseline) if n > 1 else ()
+    if n < 2:
+        own, widening, simulated = _widest(list(classes.values())), 1.0, False
+    else:
+        widening = (n + 1.0) / (n - 1.0)
+        likelihood = {name: _log_likelihood(c, known, widening) for name, c in classes.items()}
+        best = max(likelihood, key=likelihood.__getitem__)
+        own, simulated = classes[best], best == SIMULATED  # whose flights are all drawn alike
+    worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
+    middle = _updated_middle(own, known, worth)
+    rms = _updated_rms(own, known, middle, math.sqrt(widening), worth, LEAST if simulated else LEAST_RECORDED)
+    passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
+    rate = updated(own.rate, np.sqrt([f.rate for f in known]), worth)
+    return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=middle, exact=simulated)
+
+
+def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = None) -> Scatter:
+    """The scatter of flights each of which was held against others than itself.
+
+    alike: those of them that give the rates and the degrees of freedom, which were held against flights of their own
+    day and condition; all by default.
+    """
+    alike = flights if alike is None else alike
+    rms, middle = {}, {}
+    for name in sorted({n for f in flights for n in f.strengths}):
+        rows = [f for f in flights if name in f.strengths]
+        size = max(len(f.strengths[name]) for f in rows)
+        columns = [(_column(rows, name, "strengths", k), _column(rows, name, "errors", k)) for k in range(size)]
+        if is_random(name):
+            middle[name] = np.array([strengths.mean() for strengths, _ in columns])
+            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
+        together, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
+        pooled = standard_deviation(together, errors, 0.0)
+        rms[name] = np.array([standard_deviation(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1
+                             else [pooled])
+    # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
+    names = sorted({n for f in alike for n in f.passing})
+    passing = {n: moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    roots = np.sqrt([f.rate for f in alike])
+    rate = moments(np.minimum(roots, np.quantile(roots, WINSOR)))
+    return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
+
+
+def _possible_classes(recorded: bool, vehicle: str) -> dict[str, Scatter]:
+    """The classes of the table that the flights of a vehicle may be of; see `scatter_of`."""
+    classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
+    of_vehicle = {name: c for name, c in classes.items() if c.vehicle == vehicle}
+    return of_vehicle if vehicle and of_vehicle else classes
+
+
+def _updated_middle(own: Scatter, known: Sequence[Apparent], worth: float) -> dict[str, np.ndarray]:
+    """Mean strength (k,) of each random effect: of the class, which counts as `worth` flights, and of the baseline."""
+    middle = {}
+    for name in own.rms:
+        if name in own.middle:
+            rows = [f for f in known if name in f.strengths]
+            sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
+            middle[name] = sums / (worth + len(rows))
+    return middle
+
+
+def _updated_rms(own: Scatter, known: Sequence[Apparent], middle: Mapping[str, np.ndarray], widening: float,
+                 worth: float, least: float) -> dict[str, np.ndarray]:
+    """Scatter (k,) of each effect's strength about its middle, by the baseline's flights, at least `least`.
+
+    widening: factor of the baseline's scatter. The log's times are known exactly and differ from day to day: their
+    scatter is not less than the class's.
+    """
+    rms = {}
+    for name, prior in own.rms.items():
+        rows = [f for f in known if name in f.strengths]
+        centre = middle.get(name, np.zeros(len(prior)))
+        own_rms = [standard_deviation(widening * (_column(rows, name, "strengths", k) - centre[k]),
+                                      widening * _column(rows, name, "errors", k), p,
+                                      (worth, min(worth, RECORDED_WORTH)))
+                   for k, p in enumerate(prior)] if rows else prior
+        exact = rows and not any(f.errors[name].any() for f in rows)
+        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
+    return rms
+
+
+def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Scatter by effect, in which names of one thing in the logs, as mass and thrust, have the wider of theirs."""
+    out = dict(rms)
+    for group, _ in ALIKE:
+        same = [out[n] for n in group if n in out]
+        if len({len(x) for x in same}) == 1:
+            out |= {n: np.max(same, axis=0) for n in group if n in out}
+    return out
+
+
+def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
+    """Parameter k of an effect, "strengths" or "errors", in every flight that has it (n,)."""
+    return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
+
+
+def _log_likelihood(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
+    """Log likelihood of the baseline's strengths, rates and sizes in a class; wide: factor of their variance."""
+    total, nu = 0.0, own.freedom
+    for flight in baseline:
+        for name, rms in own.rms.items():
+            if name in flight.strengths:
+                n = min(len(rms), len(flight.strengths[name]))
+                variance = np.maximum(rms[:n], LEAST_SPREAD) ** 2 + wide * flight.errors[name][:n] ** 2
+                strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
+                far = wide * strength ** 2 / variance
+                total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
+        middle, spread = own.rate
+        total += float(student_log_density(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
+        for name, (middle, spread) in own.passing.items():
+            size = flight.passing.get(name, 0.0)
+            total += float(student_log_density(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
+    return total
+
+
+def student_log_density(x: float, freedom: float, middle: float, spread: float) -> float:
+    """Logarithm of Student's density about a middle, of a spread; scipy.stats takes a second to import."""
+    far = (x - middle) / spread
+    top = np.log(poch(0.5 * freedom, 0.5)) - 0.5 * (np.log(freedom) + np.log(np.pi))
+    return top - 0.5 * (freedom + 1.0) * np.log1p(far * far / freedom) - np.log(spread)
+
+
+def _widest(classes: Sequence[Scatter]) -> Scatter:
+    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known."""
+    names = {n for c in classes for n in c.rms}
+    rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
+
+    def highest(rates: Iterable[Pair]) -> Pair:
+        return max(rates, key=lambda r: r[0] + r[1])
+
+    passing = {n: highest(c.passing[n] for c in classes if n in c.passing)
+               for n in sorted({n for c in classes for n in c.passing})}
+    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
