@@ -1,7 +1,7 @@
 """Power of signals and coherence between them, band by band, of one flight."""
 
 from functools import cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -19,10 +19,11 @@ from airtouch.gap.relations.flight_signals import (
 )
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 
+#: edges of the bands; chosen; the last one lies beyond half the log's rate, 50 Hz, which it so includes
 BANDS_HZ = (0.2, 0.6, 1.2, 2.2, 3.5, 5.0, 7.0, 9.5, 13.0, 18.0, 25.0, 35.0, 50.1)
-LEAST_POWER = 1e-30  #: of a band
-FEW_LACKING = 0.2  #: share of the blocks, up to which those that lack a row are left out
-LEAST_ALONE = 1e-4  #: share of a signal's power that the others of its group do not foretell, at least
+LEAST_POWER = 1e-30  #: power of a band at least, so that it has a logarithm
+LACKING_SHARE = 0.2  #: share of the blocks, up to which those that lack a row are left out; chosen
+LEAST_ALONE = 1e-4  #: share of a signal's power that the others of its group do not predict, at least
 #: signals that move together, each by its name and its column of the table: roll with y, pitch with x, climb, yaw
 GROUPS: dict[str, dict[str, int]] = {
     **{axis: {"command": COMMAND.start + 1 + turned, "turn": TURN.start + turned,
@@ -41,42 +42,41 @@ def names() -> tuple[str, ...]:
     """Names of what `coherence` gives: group, what of it (power, real, imaginary, alone), signals, band."""
     out = []
     for group, signals in GROUPS.items():
-        every, bands = list(signals), range(len(BANDS_HZ) - 1)
-        pairs = [(a, b) for i, a in enumerate(every) for b in every[i + 1:]]
-        out += [f"{group} power {a} {k}" for a in every for k in bands]
-        out += [f"{group} {part} {a}:{b} {k}" for a, b in pairs for part in ("real", "imaginary") for k in bands]
-        out += [f"{group} alone {a} {k}" for a in every for k in bands]
+        bands = range(len(BANDS_HZ) - 1)
+        out += [f"{group} power {a} {k}" for a in signals for k in bands]
+        out += [f"{group} {part} {a}:{b} {k}" for a, b in combinations(signals, 2) for part in ("real", "imaginary")
+                for k in bands]
+        out += [f"{group} alone {a} {k}" for a in signals for k in bands]
     return tuple(out)
 
 
 def coherence(signals: FlightSignals) -> np.ndarray:
-    """Numbers (len(names()),) of a flight in the air: of each group the logarithm of every signal's power in each band,
+    """Powers and coherences (len(names()),) of a flight in the air.
 
-    the complex coherence of every two, and the logarithm of the share of a signal's power that the others of the group
-    do not foretell (1 less the multiple coherence: Bendat and Piersol, Random Data, 4th ed., section 7.3).
+    Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the
+    logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple
+    coherence: Bendat and Piersol, Random Data, 4th ed., section 7.3).
     """
     spectra = blocks(signals.table, _whole(signals.flight, starts(signals.flight, AIR)), AIR)
-    out = []
-    for group in GROUPS.values():
-        out += _of_group(spectra[:, :, list(group.values())])
-    return np.concatenate(out)
+    columns_of_groups = [list(columns.values()) for columns in GROUPS.values()]
+    return np.concatenate([part for columns in columns_of_groups for part in _of_group(spectra[:, :, columns])])
 
 
 def _whole(flight: Flight, first: np.ndarray) -> np.ndarray:
     """The first samples (b,) of those blocks that lack no row, where few lack one; else of all."""
     lost = np.concatenate([[0], np.cumsum(flight.bridged)])
     whole = lost[first + LENGTH[AIR]] == lost[first]
-    return first[whole] if (~whole).sum() <= FEW_LACKING * len(first) else first
+    return first[whole] if (~whole).sum() <= LACKING_SHARE * len(first) else first
 
 
 def _of_group(spectra: np.ndarray) -> list[np.ndarray]:
-    """Powers, coherences and what is left alone, each a vector, of spectra (blocks, bins, signals)."""
-    each = np.einsum("bfi,bfj->fij", spectra, spectra.conj(), optimize=True) / max(len(spectra), 1)
-    cross = np.einsum("kf,fij->kij", _bands(), each, optimize=True)
+    """Powers, coherences and unpredicted shares, each a vector, of spectra (blocks, bins, signals)."""
+    of_bins = np.einsum("bfi,bfj->fij", spectra, spectra.conj(), optimize=True) / max(len(spectra), 1)
+    cross = np.einsum("kf,fij->kij", _bands(), of_bins, optimize=True)
     power = np.maximum(np.einsum("kii->ki", cross).real, LEAST_POWER)
     coherence = cross / np.sqrt(power[:, :, None] * power[:, None, :])
     many = power.shape[1]
-    pairs = [coherence[:, i, j] for i in range(many) for j in range(i + 1, many)]
+    pairs = [coherence[:, i, j] for i, j in combinations(range(many), 2)]
     inverse = np.linalg.inv(coherence + LEAST_ALONE * np.eye(many))
     alone = -np.log(np.maximum(np.einsum("kii->ki", inverse).real, 1.0 / (1.0 + LEAST_ALONE)))
     return [np.log(power).T.ravel(), *(part for c in pairs for part in (c.real, c.imag)), alone.T.ravel()]

@@ -1,4 +1,8 @@
-"""How likely features are under a class of flights: normal densities with few directions of more scatter."""
+"""How likely features are under a class of flights: normal densities with few directions of more scatter.
+
+A flight's features are Q values, of which nominal flights have the covariance 1. Log densities are in nats and leave
+out the constant -Q/2 log(2 pi). The numbers of the search were chosen.
+"""
 
 from dataclasses import dataclass
 
@@ -8,18 +12,20 @@ from scipy.special import gammaln
 from airtouch.gap.relations.effect_class import EffectClass
 
 LOG_2PI = float(np.log(2.0 * np.pi))
-REFINED, AMONG = 3, 9  #: rounds in which the best strength of a grid is refined, and strengths in each
+REFINEMENTS, TRIALS = 3, 9  #: rounds in which the best strength of a grid is refined, and strengths in each
 STARTS, STEPS = 5, 10  #: sizes of the strength from which a fit of several parameters begins, and its steps at most
-SHORTER = (1.0, 0.5, 0.25, 0.1)  #: of a step that gains nothing
-ENOUGH = 0.01  #: nats of a step
-SLOPE = 1e-3  #: of the strength, over which slopes are taken
+STEP_LENGTHS = (1.0, 0.5, 0.25, 0.1)  #: of a step that are tried in turn, until one gains
+LEAST_GAIN = 0.01  #: nats that a step gains; after one that gains less the fit ends
+SLOPE = 1e-3  #: share of the strength over which slopes are taken
+SMALLEST = 1e-300  #: length that a division may have at least
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """A change of coordinates that makes a covariance 1 + F F' to 1: along axes (Q, r) by stretch (r,), less 1.
+    """A change of coordinates that makes a covariance 1 + F F' to 1.
 
-    level: logarithm of the density that it costs.
+    Along axes (Q, r) values are multiplied by 1 + stretch (r,). level: logarithm of the density that this costs, that
+    of the change's determinant.
     """
 
     axes: np.ndarray
@@ -34,8 +40,8 @@ class Coordinates:
 def coordinates_of(factors: np.ndarray) -> Coordinates:
     """Coordinates for the covariance 1 + F F' of factors F (Q, r)."""
     axes, size, _ = np.linalg.svd(factors, full_matrices=False)
-    grown = np.sqrt(1.0 + size ** 2)
-    return Coordinates(axes, 1.0 / grown - 1.0, -float(np.log(grown).sum()))
+    deviation = np.sqrt(1.0 + size ** 2)
+    return Coordinates(axes, 1.0 / deviation - 1.0, -float(np.log(deviation).sum()))
 
 
 def unchanged(dimensions: int) -> Coordinates:
@@ -50,9 +56,10 @@ def log_density(values: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Fit:
-    """A class at its likeliest strength (parameters,): log density there, over no class in plain coordinates without
+    """A class at its likeliest strength (parameters,).
 
-    the constant, and the same averaged over the strengths that it may have.
+    level: log density of the flight there; evidence: the same averaged over the strengths that the
+    class may have.
     """
 
     of: EffectClass
@@ -70,8 +77,8 @@ class Fit:
         return self.of.axes * (np.linalg.norm(self.shift) * np.sqrt(self.of.variances))
 
 
-class _Seen:
-    """A class in some coordinates: its log density at strengths."""
+class _Likelihood:
+    """The log density of a flight's values (Q,) under a class, in some coordinates, as a function of its strength."""
 
     def __init__(self, of: EffectClass, values: np.ndarray, coordinates: Coordinates) -> None:
         self.of, self.values, self.coordinates = of, values, coordinates
@@ -84,24 +91,24 @@ class _Seen:
     def level(self, shift: np.ndarray) -> np.ndarray:
         """Log density (n,) at expected shifts (n, Q) in plain coordinates."""
         size = (shift ** 2).sum(axis=1)
-        off = self.values - self.coordinates(shift)
-        along, grown = off @ self.axes, 1.0 + size[:, None] * self.variances
-        distance = (off ** 2).sum(axis=1) - (along ** 2 * (1.0 - 1.0 / grown)).sum(axis=1)
-        return self.coordinates.level - 0.5 * (distance + np.log(grown).sum(axis=1))
+        residual = self.values - self.coordinates(shift)
+        along, variance = residual @ self.axes, 1.0 + size[:, None] * self.variances
+        squared_distance = (residual ** 2).sum(axis=1) - (along ** 2 * (1.0 - 1.0 / variance)).sum(axis=1)
+        return self.coordinates.level - 0.5 * (squared_distance + np.log(variance).sum(axis=1))
 
     def at(self, strength: np.ndarray) -> np.ndarray:
         """Log density (n,) at strengths (n, parameters)."""
         return self.level(self.of.mean(strength))
 
-    def solved(self, shift: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Values (n, Q) over the covariance that the class has at an expected shift (Q,)."""
-        grown = 1.0 + (shift @ shift) * self.variances
-        return values - ((values @ self.axes) * (1.0 - 1.0 / grown)) @ self.axes.T
+    def over_covariance(self, shift: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Values (n, Q) times the inverse of the covariance that the class has at an expected shift (Q,)."""
+        variance = 1.0 + (shift @ shift) * self.variances
+        return values - ((values @ self.axes) * (1.0 - 1.0 / variance)) @ self.axes.T
 
     def clipped(self, strength: np.ndarray) -> np.ndarray:
-        """A strength (parameters,) within what was flown."""
+        """A strength (parameters,) with its length cut to what was flown."""
         size = float(np.linalg.norm(strength))
-        return strength / max(size, 1e-300) * np.clip(size, self.of.least, self.of.most)
+        return strength / max(size, SMALLEST) * np.clip(size, self.of.least, self.of.most)
 
     def slopes(self, strength: np.ndarray) -> np.ndarray:
         """Change (parameters, Q) of the expected shift per parameter, in these coordinates."""
@@ -112,65 +119,77 @@ class _Seen:
 
 def fit(of: EffectClass, values: np.ndarray, coordinates: Coordinates) -> Fit:
     """The likeliest strength of a class for features (Q,) in some coordinates."""
-    seen = _Seen(of, values, coordinates)
-    strength, level = _one(seen) if of.parameters == 1 else _several(seen)
-    return Fit(of, strength, level, level + min(_occam(seen, strength), 0.0))
+    likelihood = _Likelihood(of, values, coordinates)
+    strength, level = _on_a_grid(likelihood) if of.parameters == 1 else _by_gauss_newton(likelihood)
+    return Fit(of, strength, level, level + min(_occam_factor(likelihood, strength), 0.0))
 
 
-def _one(seen: _Seen) -> tuple[np.ndarray, float]:
-    """The likeliest strength of one parameter: on a grid, then closer and closer."""
-    strength, shift = seen.of.grid
-    level = seen.level(shift)
-    best, wide = int(np.argmax(level)), float(np.log(strength[1, 0] / strength[0, 0]))
-    found, top = strength[best], float(level[best])
-    for _ in range(REFINED):
-        tried = np.clip(np.abs(found) * np.exp(np.linspace(-wide, wide, AMONG)), seen.of.least, seen.of.most)
-        tried *= np.sign(found)
-        level = seen.at(tried[:, None])
-        best = int(np.argmax(level))
-        if level[best] > top:
-            found, top = tried[best:best + 1], float(level[best])
-        wide *= 2.0 / (AMONG - 1)
-    return found, top
+def _on_a_grid(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
+    """The likeliest strength (1,) of one parameter and its log density: on the class's grid, then closer and closer."""
+    of = likelihood.of
+    strengths, shifts = of.grid
+    levels = likelihood.level(shifts)
+    place, width = int(np.argmax(levels)), float(np.log(strengths[1, 0] / strengths[0, 0]))
+    best, top = strengths[place], float(levels[place])
+    for _ in range(REFINEMENTS):
+        trials = np.clip(np.abs(best) * np.exp(np.linspace(-width, width, TRIALS)), of.least, of.most) * np.sign(best)
+        levels = likelihood.at(trials[:, None])
+        place = int(np.argmax(levels))
+        if levels[place] > top:
+            best, top = trials[place:place + 1], float(levels[place])
+        width *= 2.0 / (TRIALS - 1)
+    return best, top
 
 
-def _several(seen: _Seen) -> tuple[np.ndarray, float]:
-    """The likeliest strengths of several parameters, by Gauss-Newton from several sizes."""
-    of, found, top = seen.of, np.zeros(0), -np.inf
-    for size in np.geomspace(of.least, of.most, STARTS):
-        slopes = seen.slopes(np.full(of.parameters, size / np.sqrt(of.parameters)))
-        tried = seen.clipped(np.linalg.lstsq(slopes.T, seen.values, rcond=None)[0])
-        level = float(seen.at(tried[None])[0])
-        if level > top:
-            found, top = tried, level
+def _by_gauss_newton(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
+    """The likeliest strengths (parameters,) of several parameters and their log density."""
+    best, top = _start(likelihood)
     for _ in range(STEPS):
-        shift, slopes = of.mean(found[None])[0], seen.slopes(found)
-        over = seen.solved(shift, slopes)
-        left = seen.values - seen.coordinates(shift)
-        step = np.linalg.lstsq(over @ slopes.T, over @ left, rcond=1e-9)[0]
         before = top
-        for share in SHORTER:
-            tried = seen.clipped(found + share * step)
-            level = float(seen.at(tried[None])[0])
+        step = _step(likelihood, best)
+        for length in STEP_LENGTHS:
+            trial = likelihood.clipped(best + length * step)
+            level = float(likelihood.at(trial[None])[0])
             if level > top:
-                found, top = tried, level
+                best, top = trial, level
                 break
-        if top < before + ENOUGH:
+        if top < before + LEAST_GAIN:
             break
-    return found, top
+    return best, top
 
 
-def _occam(seen: _Seen, strength: np.ndarray) -> float:
+def _start(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
+    """The best of several first strengths (parameters,): least squares with the slopes at several sizes of strength."""
+    of, best, top = likelihood.of, np.zeros(0), -np.inf
+    for size in np.geomspace(of.least, of.most, STARTS):
+        slopes = likelihood.slopes(np.full(of.parameters, size / np.sqrt(of.parameters)))
+        trial = likelihood.clipped(np.linalg.lstsq(slopes.T, likelihood.values, rcond=None)[0])
+        level = float(likelihood.at(trial[None])[0])
+        if level > top:
+            best, top = trial, level
+    return best, top
+
+
+def _step(likelihood: _Likelihood, strength: np.ndarray) -> np.ndarray:
+    """The step (parameters,) of Gauss-Newton at a strength: least squares weighed by the covariance there."""
+    shift, slopes = likelihood.of.mean(strength[None])[0], likelihood.slopes(strength)
+    weighed = likelihood.over_covariance(shift, slopes)
+    residual = likelihood.values - likelihood.coordinates(shift)
+    return np.linalg.lstsq(weighed @ slopes.T, weighed @ residual, rcond=1e-9)[0]
+
+
+def _occam_factor(likelihood: _Likelihood, strength: np.ndarray) -> float:
     """Logarithm of the share of what a strength may be that the features leave (Laplace's method).
 
-    A strength may be anything between the least and the most that was flown, on a logarithmic scale, in any direction.
+    MacKay, Information Theory, Inference, and Learning Algorithms, 2003, section 28.1. A strength may be anything
+    between the least and the most that was flown, on a logarithmic scale, in any direction.
     """
-    of, many = seen.of, len(strength)
-    slopes = seen.slopes(strength)
-    curvature = np.linalg.slogdet(seen.solved(of.mean(strength[None])[0], slopes) @ slopes.T)[1]
+    of, many = likelihood.of, len(strength)
+    slopes = likelihood.slopes(strength)
+    precision = likelihood.over_covariance(of.mean(strength[None])[0], slopes) @ slopes.T
     size = float(np.linalg.norm(strength))
-    directions = np.log(2.0) + 0.5 * many * np.log(np.pi) - gammaln(0.5 * many)  # of the unit sphere; 2 for one
+    unit_sphere = np.log(2.0) + 0.5 * many * np.log(np.pi) - gammaln(0.5 * many)  # its area; 2 for one parameter
     if many == 1 and not of.signed:
-        directions = 0.0
-    prior = -np.log(np.log(of.most / of.least)) - directions - many * np.log(size)
-    return 0.5 * many * LOG_2PI - 0.5 * float(curvature) + prior
+        unit_sphere = 0.0
+    prior = -np.log(np.log(of.most / of.least)) - unit_sphere - many * np.log(size)
+    return 0.5 * many * LOG_2PI - 0.5 * float(np.linalg.slogdet(precision)[1]) + prior

@@ -19,8 +19,8 @@ COMMAND, TURN, LIFT, FORCE_LEFT, TORQUE_LEFT, SPEED_LEFT, ANGLE_LEFT, RANGE_LEFT
     slice(0, 4), slice(4, 7), slice(7, 8), slice(8, 11), slice(11, 14), slice(14, 17), slice(17, 20), slice(20, 21))
 COUNT = 21
 #: down range over standing below which legs may touch in flight, and for how long around it
-CONTACT_M, CONTACT_S = 0.012, 0.15
-JUMP_MPS = 4.0  #: of the down range: another surface came below
+CONTACT_M, CONTACT_S = 0.012, 0.15  # chosen
+JUMP_MPS = 4.0  #: change of the down range from which another surface came below; chosen
 
 
 @dataclass(frozen=True)

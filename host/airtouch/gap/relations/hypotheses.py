@@ -1,4 +1,7 @@
-"""Hypotheses on the features of a flight and their evidence: effects together, or a disturbance without a name."""
+"""Hypotheses on the features of a flight and their evidence: effects together, or a disturbance without a name.
+
+A flight's features are Q values, of which nominal flights have the covariance 1; evidence is in nats.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,8 +14,8 @@ from scipy.special import logsumexp
 from airtouch.gap.relations.density import Coordinates, Fit, coordinates_of, fit, log_density, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
-ROUNDS = 3  #: in which the effects of a hypothesis are fitted in turn
-SIZES = np.geomspace(3.0, 300.0, 10)  #: of a disturbance without a name in nominal deviations, equally likely
+ROUNDS = 3  #: rounds, at most, in which the effects of a hypothesis are fitted in turn; chosen
+SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance in nominal deviations, equally likely; chosen
 
 
 @dataclass(frozen=True)
@@ -113,9 +116,9 @@ class FlightFeatures:
         residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
         axes, size, _ = np.linalg.svd(known(self.model.nameless.T).T, full_matrices=False)
         along = (residual @ axes) ** 2
-        grown = 1.0 + np.outer(SIZES ** 2, size ** 2)
-        level = known.level + log_density(residual) + 0.5 * ((along * (1.0 - 1.0 / grown)) - np.log(grown)).sum(axis=1)
-        averaged = float(logsumexp(level) - np.log(len(SIZES)))
+        variance = 1.0 + np.outer(SIZES ** 2, size ** 2)  # (sizes, r)
+        gain = 0.5 * ((along * (1.0 - 1.0 / variance)) - np.log(variance)).sum(axis=1)
+        averaged = float(logsumexp(known.level + log_density(residual) + gain) - np.log(len(SIZES)))
         return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.level
 
     def at_fits(self, fits: Sequence[Fit], cost: float | None = None) -> Hypothesis:

@@ -1,8 +1,14 @@
-"""Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect."""
+"""Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect.
+
+`infer` adds effects one by one while each gains enough (`_likeliest`). What then still speaks against them is measured
+in two ways, each with its limit: what a disturbance without a name gains beside them (`_nameless`), and how far the
+flight lies from them (`_distance`).
+"""
 
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
@@ -17,22 +23,30 @@ from airtouch.simulation.effects import get
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
 #: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
-#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence
+#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence; 7 was tried on
+#: 2026-11-25 and taken back after the opened set of seed 112233 (host/docs/looks.md)
 LEAST_NAMELESS = 10.0
 #: nats by which two effects must be likelier than one with a disturbance without a name beside it; 36 of 44 wrong
 #: pairs, found where the right effect was left out, were not
 OVER_NAMELESS = 30.0
 #: shares of the effects' evidence, beside that of their classes, that a disturbance without a name may gain, because no
-#: curve is exact; PAIR: the same for two effects, because they are not a sum
+#: curve is exact; PAIR: the same for two effects, because they are not a sum; chosen on flights of `learning.SEED`
 CRUDE_NAMELESS, PAIR_NAMELESS = 0.01, 0.01
 #: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
 #: below 10,000 nats lie farther, half of them because they hit something (2,750 flights of `learning.SEED`, scatters
 #: and limit by other halves)
 FAR = 3.5
-MOST_EFFECTS = 3
-BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn
-TEMPERATURE = 2.0  #: of the probabilities: the densities' tails are heavier than normal ones
+MOST_EFFECTS = 3  #: effects that a flight is named to have, at most; chosen
+BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn; chosen
+TEMPERATURE = 2.0  #: divisor of the evidence in probabilities: the densities' tails are heavier than normal; chosen
 Shares = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
+
+
+class Against(NamedTuple):
+    """Nats that speak against effects, and those that may where the effects are right."""
+
+    nats: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -70,13 +84,17 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     many = len(coordinates)
     flight = FlightFeatures(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
     singles = flight.single_effects()
-    second, nameless, scatter = (
-        {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, shares, strict=True)}
-        for shares in (library.second_share, library.nameless_share, library.distance_scatter))
-    best = _likeliest(flight, singles, second)
-    against = _nameless(flight, best, nameless), _distance(flight, library, best, scatter)
+    best = _likeliest(flight, singles, _by_class(library, library.second_share))
+    against = max(_nameless(flight, best, _by_class(library, library.nameless_share)),
+                  _distance(flight, best, _by_class(library, library.distance_scatter), library),
+                  key=lambda a: a.nats / a.limit)
     return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flight.nameless_evidence(flight.none),
-                     *max(against, key=lambda a: a[0] / a[1]), _readings(best))
+                     against.nats, against.limit, _readings(best))
+
+
+def _by_class(library: Library, numbers: np.ndarray) -> Shares:
+    """Numbers (classes,) by the name and shape of their class."""
+    return {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, numbers, strict=True)}
 
 
 def _readings(best: Hypothesis) -> Mapping[str, Reading]:
@@ -89,16 +107,16 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
             for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
 
 
-def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> tuple[float, float]:
-    """Nats that a disturbance without a name gains beside effects, and their limit."""
+def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> Against:
+    """What a disturbance without a name gains beside effects."""
     share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
-    return flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence
+    return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence)
 
 
-def _distance(flight: FlightFeatures, library: Library, best: Hypothesis, scatters: Shares) -> tuple[float, float]:
-    """Nats by which a flight lies farther from effects than nominal flights from none, and their limit."""
+def _distance(flight: FlightFeatures, best: Hypothesis, scatters: Shares, library: Library) -> Against:
+    """How much farther a flight lies from effects than nominal flights from none."""
     share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
-    return library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence)
+    return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence))
 
 
 def _largest(of: Hypothesis, shares: Shares) -> float:
@@ -127,9 +145,8 @@ def _likeliest(flight: FlightFeatures, singles: list[Hypothesis], second: Shares
         if not larger:
             break
         first = larger[0]
-        share = _largest(best, second)
-        if first.evidence < best.evidence + LEAST_EVIDENCE + share * best.evidence \
-                or first.evidence < flight.nameless_evidence(best) + OVER_NAMELESS:
+        needed = best.evidence + LEAST_EVIDENCE + _largest(best, second) * best.evidence
+        if first.evidence < needed or first.evidence < flight.nameless_evidence(best) + OVER_NAMELESS:
             break
         best, beam = first, larger[:1]
     return best
@@ -137,10 +154,10 @@ def _likeliest(flight: FlightFeatures, singles: list[Hypothesis], second: Shares
 
 def _with_one_more(flight: FlightFeatures, beam: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
-    tried = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
-             for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
-    worth = sorted(tried.values(), key=lambda h: -h.evidence)[:BEAM]
-    return sorted((flight.refitted(h) for h in worth), key=lambda h: -h.evidence)
+    by_classes = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
+                  for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
+    likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
+    return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
 
 def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:

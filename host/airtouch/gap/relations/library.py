@@ -19,9 +19,11 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-MOST_DEVIATIONS = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none
-SHARES = ("nameless_share", "second_share", "distance_scatter")
-STORED = np.float16  #: numbers of a file; their rounding moves a coordinate by less than a tenth of its deviation
+MOST_DEVIATIONS = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
+SHARES = ("nameless_share", "second_share", "distance_scatter")  #: fields of a library with one number for each class
+STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its deviation
+#: ends of the names of the arrays that are stored in float32
+EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
 
 
 @dataclass(frozen=True)
@@ -29,12 +31,14 @@ class Library:
     """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
     projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
-    less the middle. distance: median and standard deviation of the squared size of coordinates of nominal flights that
-    were not learned from. The shares (classes,) are nats over the evidence for the class, as four of five flights with
-    it have at most: nameless_share, what a disturbance without a name gains beside it; second_share, what a second
-    effect gains. distance_scatter (classes,): scatter of the nats by which a flight with it lies farther from it than
-    nominal flights from none, over the evidence, beside the scatter of nominal flights; pair_scatter: the same of two
-    effects, beside those of their classes.
+    less the middle.
+    distance: median and standard deviation of the squared length of coordinates of nominal flights that were not
+    learned from.
+    nameless_share, second_share (classes,): nats that a disturbance without a name, or a second effect, gains beside
+    the class, over the evidence for it; four of five flights with it have at most so much.
+    distance_scatter (classes,): scatter of the nats by which a flight with the class lies farther from it than nominal
+    flights from none, over the evidence, beside the scatter of nominal flights.
+    pair_scatter: the same of two effects, beside those of their classes.
     """
 
     scenario: str
@@ -59,7 +63,10 @@ class Library:
         return 0.5 * self.distance[1]
 
     def scatter(self, share: float, evidence: float) -> float:
-        """Standard deviation of the excess distance of flights with effects, nats; share: of it over the evidence."""
+        """Standard deviation of the excess distance of flights with effects, nats.
+
+        share: what of it is beyond that of nominal flights, over the evidence; evidence: of the effects, nats.
+        """
         return float(np.hypot(self.nominal_scatter, share * evidence))
 
     def excess(self, squared: float) -> float:
@@ -77,16 +84,16 @@ class Library:
         return frozenset(c.effect for c in self.model.classes)
 
     def without(self, names: Iterable[str]) -> "Library":
-        """The library with effects left out."""
-        out = frozenset(names)
-        keep = np.array([c.effect not in out for c in self.model.classes])
-        classes = tuple(c for c in self.model.classes if c.effect not in out)
+        """The library without the classes of some effects."""
+        left_out = frozenset(names)
+        keep = np.array([c.effect not in left_out for c in self.model.classes])
+        classes = tuple(c for c in self.model.classes if c.effect not in left_out)
         return replace(self, model=replace(self.model, classes=classes), nameless_share=self.nameless_share[keep],
                        second_share=self.second_share[keep], distance_scatter=self.distance_scatter[keep])
 
 
 def save(library: Library, path: Path) -> None:
-    """Write a library as npz, numbers in half precision."""
+    """Write a library as npz, most numbers in half precision; raises AirTouchError where it cannot be written."""
     write_bytes(packed(library), path, True)
 
 
@@ -104,10 +111,9 @@ def packed(library: Library) -> bytes:
              "pair_scatter": library.pair_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
              "readouts": [c.readout and c.readout.parameters for c in model.classes]}
-    exact = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
-    kept: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(exact) else STORED) for k, v in arrays.items()}
+    rounded: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(EXACT) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
-    np.savez_compressed(file, **kept, words=np.array(json.dumps(words)))
+    np.savez_compressed(file, **rounded, words=np.array(json.dumps(words)))
     return file.getvalue()
 
 
@@ -115,18 +121,20 @@ def read(content: bytes) -> Library:
     """The library in the bytes of a file."""
     with np.load(io.BytesIO(content)) as file:
         words = json.loads(str(file["words"]))
-        a = {k: file[k].astype(float) for k in file.files if k != "words"}
-    classes = tuple(EffectClass(name, effect, shape, parameters, signed, a[f"{i}.knots"], a[f"{i}.table"],
-                                a[f"{i}.axes"], a[f"{i}.variances"], _readout(words["readouts"][i], i, a))
-                    for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
-    middle, deviation = words["distance"]
-    return Library(words["scenario"], words["vehicle"], Standard(a["standard.middle"], a["standard.deviation"]),
-                   a["projection"], a["middle"], LearnedModel(classes, a["interaction"], a["nameless"]),
-                   (middle, deviation), a["nameless_share"], a["second_share"], a["distance_scatter"],
-                   words["pair_scatter"])
+        arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
+    classes = tuple(
+        EffectClass(name, effect, shape, parameters, signed, arrays[f"{i}.knots"], arrays[f"{i}.table"],
+                    arrays[f"{i}.axes"], arrays[f"{i}.variances"], _readout(words["readouts"][i], i, arrays))
+        for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
+    return Library(
+        words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
+        arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
+        distance=tuple(words["distance"]), pair_scatter=words["pair_scatter"],
+        **{name: arrays[name] for name in SHARES})
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:
+    """The calibration of the class at a place of the file; None where it has none."""
     return Readout(tuple(parameters), arrays[f"{place}.strength"], arrays[f"{place}.amount"]) if parameters else None
 
 

@@ -17,13 +17,15 @@ from airtouch.gap.unnamed.basis import BASIS, basis
 from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
+AXES = "xyz"
 REGRESSED = {"force": FORCE_LEFT, "torque": TORQUE_LEFT, "speed": SPEED_LEFT}
 OF_MEANS = slice(FORCE_LEFT.start, SPEED_LEFT.stop)  #: columns of the table whose means are looked at
-FEWEST = 20  #: samples of a phase; else the whole flight stands in for it
-FEWEST_AT_REST = 4  #: samples
-FAST_SAMPLES = 50  #: what changes faster than a mean over so many is fast
-LEAST_VARIANCE = 1e-14
-CLOCK_S = 2e-4  #: of the logged times, added to their rms: less is none
+FEWEST = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
+FEWEST_AT_REST = 4  #: samples at rest of which a variance is taken; chosen
+FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow and what deviates from it fast; chosen
+LEAST_VARIANCE = 1e-14  #: variance that is added, in squared units of a signal, so that none is 0
+LEAST_SCORE = 1e-9  #: sum of squares of a column that is added to it, so that none is 0
+CLOCK_S = 2e-4  #: s that are added to the rms of the logged times: a jitter below it says nothing; chosen
 
 
 @cache
@@ -31,7 +33,7 @@ def names() -> tuple[str, ...]:
     """Names of what `moments` gives."""
     means = [f"mean {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4 + 3 + 3 + 3 + 1)]
     of_phase = [*means, *(f"variance {i}" for i in range(COUNT))]
-    return (*(f"follows {what} {axis} {b}" for what in REGRESSED for axis in "xyz" for b in BASIS),
+    return (*(f"follows {what} {axis} {b}" for what in REGRESSED for axis in AXES for b in BASIS),
             *(f"{phase} {what}" for phase in KINDS[1:] for what in of_phase),
             *(f"later {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4)),
             *(f"rest {what} {i}" for what in ("mean", "fast variance", "variance") for i in range(6)),
@@ -39,33 +41,36 @@ def names() -> tuple[str, ...]:
 
 
 def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
-    """Numbers (len(names()),) of a flight: what force, torque and estimated speed have of the flight's own signals
+    """Scores, means and variances (len(names()),) of a flight; NaN where there is nothing to tell by.
 
-    (`unnamed.basis`), means and logarithms of variances in each phase, what the second half has over the first, means
-    and noise at rest, and what the log did to its times. NaN where there is nothing to tell by.
+    What force, torque and estimated speed have of the flight's own signals (`unnamed.basis`); means and logarithms of
+    variances in each phase; what the second half has over the first; means and noise at rest; and what the log did to
+    its times.
     """
-    return np.concatenate([_followed(signals, vehicle), *(_of_phase(signals, k) for k in range(1, len(KINDS))),
+    return np.concatenate([_scores(signals, vehicle), *(_of_phase(signals, k) for k in range(1, len(KINDS))),
                            _later(signals), _at_rest(signals), _clock(signals)])
 
 
-def _followed(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
-    """Scores of each force, torque and speed on each column of the basis: products, over the column's own size."""
-    own, out = basis(signals.flight, vehicle)[signals.air], []
-    many = np.sqrt(signals.air.sum() + 1.0)
+def _scores(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
+    """Scores of each force, torque and speed on each column of the basis: products, over the column's length."""
+    columns, out = basis(signals.flight, vehicle)[signals.air], []  # (samples, columns, axes)
+    root = np.sqrt(signals.air.sum() + 1.0)
     for place in REGRESSED.values():
-        left = signals.table[signals.air, place]
-        out += [own[:, :, a].T @ left[:, a] / np.sqrt((own[:, :, a] ** 2).sum(axis=0) + 1e-9) / many for a in range(3)]
+        residual = signals.table[signals.air, place]
+        out += [columns[:, :, axis].T @ residual[:, axis]
+                / np.sqrt((columns[:, :, axis] ** 2).sum(axis=0) + LEAST_SCORE) / root for axis in range(len(AXES))]
     return np.concatenate(out)
 
 
 def _means(signals: FlightSignals, some: np.ndarray) -> np.ndarray:
+    """Means of what model and estimator leave open, and of the commands, over some samples, bool (n,) or places."""
     return np.concatenate([signals.table[some, OF_MEANS].mean(axis=0), signals.table[some, COMMAND].mean(axis=0)])
 
 
 def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
-    """Means of what is left, commands, angles, velocity, rates and range; logarithm of the variance of what is fast."""
-    own = signals.air & (signals.flight.phase == phase)
-    some = own if own.sum() > FEWEST else signals.air
+    """`_means`, those of angles, velocity, rates and range, and logarithms of the variance of what is fast."""
+    in_phase = signals.air & (signals.flight.phase == phase)
+    some = in_phase if in_phase.sum() > FEWEST else signals.air
     assert signals.flight.rates is not None
     slow = [x[some].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
                                            signals.table[:, RANGE_LEFT])]
@@ -89,13 +94,13 @@ def _later(signals: FlightSignals) -> np.ndarray:
 
 
 def _at_rest(signals: FlightSignals) -> np.ndarray:
-    """Means and logarithms of variances, of differences and of values, of accelerations and rates."""
+    """Means (6), logarithms of variances of differences (6) and of values (6) of accelerations and rates."""
     assert signals.flight.rates is not None
-    own = np.column_stack([signals.flight.acceleration, signals.flight.rates])[signals.rest]
-    if len(own) < FEWEST_AT_REST:
-        return np.full(18, np.nan)
-    return np.concatenate([own.mean(axis=0), np.log(np.diff(own, axis=0).var(axis=0) + LEAST_VARIANCE),
-                           np.log(own.var(axis=0) + LEAST_VARIANCE)])
+    imu = np.column_stack([signals.flight.acceleration, signals.flight.rates])[signals.rest]
+    if len(imu) < FEWEST_AT_REST:
+        return np.full(3 * imu.shape[1], np.nan)
+    return np.concatenate([imu.mean(axis=0), np.log(np.diff(imu, axis=0).var(axis=0) + LEAST_VARIANCE),
+                           np.log(imu.var(axis=0) + LEAST_VARIANCE)])
 
 
 def _clock(signals: FlightSignals) -> np.ndarray:

@@ -13,10 +13,12 @@ from airtouch.gap.signatures.term import neutral_of, parameter_of, unit
 from airtouch.simulation.effects import Effect
 
 LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors
-#: of an effect's parameters by name: value and standard deviation, in the parameter's unit
+#: by name of a parameter: its value and standard deviation, in its unit
 Reading = Mapping[str, tuple[float, float]]
-WIDTH = float(np.log(2.0))  #: of the weights of the calibration flights, standard deviation of the log strength
-RIDGE = 0.1  #: flights that say that amount and strength are proportional: for strengths at the ends of the calibration
+WIDTH = float(np.log(2.0))  #: standard deviation, in the log strength, of the weights of calibration flights; chosen
+#: flights that say that amount and strength are proportional, for strengths at the ends of the calibration; chosen
+RIDGE = 0.1
+FITTED = 2.0  #: flights that a local regression uses up: intercept and slope
 
 
 @dataclass(frozen=True)
@@ -39,35 +41,41 @@ class Readout:
 
     def _along(self, strength: float) -> tuple[np.ndarray, np.ndarray]:
         """One parameter: local linear regression of the logarithm of the amount on that of the strength."""
-        same = self.strength[:, 0] * strength > 0.0
-        x = np.log(np.abs(self.strength[same, 0])) - np.log(abs(strength))
-        y = np.log(np.abs(self.amount[same, 0])) - x
-        weight = _weights(x)
-        columns = np.column_stack([np.ones_like(x), x])
+        same_sign = self.strength[:, 0] * strength > 0.0
+        distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
+        ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
+        weight = _weights(distance)
+        columns = np.column_stack([np.ones_like(distance), distance])
         normal = (columns * weight[:, None]).T @ columns + RIDGE * np.diag([0.0, WIDTH ** 2])
-        fitted = np.linalg.solve(normal, columns.T @ (weight * y))
-        amount = float(np.sign(np.median(self.amount[same, 0])) * np.exp(fitted[0]))
-        error = _deviation((y - columns @ fitted)[:, None], weight)
+        coefficients = np.linalg.solve(normal, columns.T @ (weight * ratio))
+        amount = float(np.sign(np.median(self.amount[same_sign, 0])) * np.exp(coefficients[0]))
+        error = _deviation((ratio - columns @ coefficients)[:, None], weight)
         return np.array([amount]), np.abs(amount) * error
 
     def _across(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Several parameters: linear in the strengths; errors in proportion to the length of the amount."""
         length = np.linalg.norm(self.amount, axis=1)
         matrix = np.linalg.lstsq(self.strength / length[:, None], self.amount / length[:, None], rcond=None)[0]
-        amount, off = strength @ matrix, (self.amount - self.strength @ matrix) / length[:, None]
+        amount, residual = strength @ matrix, (self.amount - self.strength @ matrix) / length[:, None]
         weight = _weights(np.log(np.linalg.norm(self.strength, axis=1)) - np.log(np.linalg.norm(strength)))
-        return amount, np.linalg.norm(amount) * _deviation(off, weight)
+        return amount, np.linalg.norm(amount) * _deviation(residual, weight)
 
 
-def _weights(x: np.ndarray) -> np.ndarray:
-    """Weights (n,) of calibration flights at distances x (n,) in the logarithm of the strength."""
-    return np.exp(-0.5 * (np.clip(np.abs(x) - max(float(np.abs(x).min()) - WIDTH, 0.0), 0.0, None) / WIDTH) ** 2)
+def _weights(distance: np.ndarray) -> np.ndarray:
+    """Weights (n,) of calibration flights at distances (n,) in the logarithm of the strength.
+
+    They fall with the distance as a normal density does; from a strength beyond the calibration the nearest flight is
+    taken to be WIDTH away.
+    """
+    beyond = max(float(np.abs(distance).min()) - WIDTH, 0.0)
+    return np.exp(-0.5 * (np.clip(np.abs(distance) - beyond, 0.0, None) / WIDTH) ** 2)
 
 
-def _deviation(off: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Standard deviation (k,) of residuals (n, k), with the flights that the regression itself has used up."""
-    many = weight.sum() ** 2 / (weight ** 2).sum()
-    return np.sqrt((weight[:, None] * off ** 2).sum(axis=0) / weight.sum() * many / max(many - 2.0, 1.0))
+def _deviation(residual: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Standard deviation (k,) of residuals (n, k) with weights (n,), of which the regression has used up FITTED."""
+    effective = weight.sum() ** 2 / (weight ** 2).sum()  # number of flights, Kish 1965
+    variance = (weight[:, None] * residual ** 2).sum(axis=0) / weight.sum() * effective / max(effective - FITTED, 1.0)
+    return np.sqrt(variance)
 
 
 def amount_of(effect: Effect, name: str, value: float) -> float:
@@ -80,12 +88,14 @@ def amount_of(effect: Effect, name: str, value: float) -> float:
 
 def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
     """The parameters of an effect whose class has a strength (s,) in a flight."""
-    out = {}
-    for name, amount, deviation in zip(readout.parameters, *readout(strength), strict=True):
-        p = parameter_of(effect, name)
-        if effect.name in LOGARITHMIC:
-            value = float(np.exp(amount))
-            out[name] = value, value * float(deviation)
-        else:
-            out[name] = neutral_of(p) + float(amount) * unit(p), float(deviation) * unit(p)
-    return out
+    return {name: _quantity(effect, name, float(amount), float(deviation))
+            for name, amount, deviation in zip(readout.parameters, *readout(strength), strict=True)}
+
+
+def _quantity(effect: Effect, name: str, amount: float, deviation: float) -> tuple[float, float]:
+    """Value and standard deviation of a parameter in its unit, from those of its amount; undoes `amount_of`."""
+    if effect.name in LOGARITHMIC:
+        value = float(np.exp(amount))
+        return value, value * deviation
+    p = parameter_of(effect, name)
+    return neutral_of(p) + amount * unit(p), deviation * unit(p)

@@ -26,8 +26,8 @@ def log_uniform(low: float, high: float, rng: np.random.Generator) -> float:
 class Kind:
     """An effect, or one variant of it, as it is drawn: highest plausible strength, and values of a strength.
 
-    make(strength, rng): values whose distance from neutral grows with the strength; the
-    rest (direction, rotor, length) is drawn.
+    make(strength, rng): values whose distance from neutral grows with the strength; the rest (direction, rotor,
+    length) is drawn. The unit of strengths is that of the parameter that they scale.
     """
 
     effect: str
@@ -94,9 +94,7 @@ KINDS: dict[str, Kind] = {
     **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop))
        for loop in ("rate", "attitude", "position", "height")},
 }
-
-
-STEPS = 3.0  #: natural steps of a parameter up to which an effect that KINDS lacks is drawn
+STEPS = 3.0  #: natural steps of a parameter up to which an effect that KINDS lacks is drawn; chosen
 #: parameters of a kind that shape it, not scale it: each of the values that the diagnosis tries is a class of its own
 SHAPED = {"weak_motor": "rotor", "gust": "length", "motor_noise": "time", "slung_load": "length"}
 
@@ -108,10 +106,10 @@ def kinds_of(effect: Effect) -> dict[str, Kind]:
     any direction.
     """
     known = {name: kind for name, kind in KINDS.items() if kind.effect == effect.name}
-    return known or {effect.name: Kind(effect.name, STEPS, _any(effect))}
+    return known or {effect.name: Kind(effect.name, STEPS, _any_direction(effect))}
 
 
-def _any(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
+def _any_direction(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
     """Values of an effect at a strength in natural steps: a random direction of its free parameters."""
     free = [p for p in effect.parameters if p.name in free_of(effect)]
 
@@ -119,10 +117,14 @@ def _any(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
         direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
         direction /= np.linalg.norm(direction)
         out = {}
-        for p, x in zip(free, direction, strict=True):
-            signed = -abs(x) if p.high <= neutral_of(p) else abs(x) if p.low >= neutral_of(p) else \
-                x * rng.choice([-1.0, 1.0])
-            out[p.name] = float(np.clip(neutral_of(p) + s * signed * unit(p), p.low, p.high))
+        for p, share in zip(free, direction, strict=True):
+            if p.high <= neutral_of(p):  # it has values below neutral alone
+                share = -abs(share)
+            elif p.low >= neutral_of(p):
+                share = abs(share)
+            else:
+                share *= rng.choice([-1.0, 1.0])
+            out[p.name] = float(np.clip(neutral_of(p) + s * share * unit(p), p.low, p.high))
         return out
 
     return make
