@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.related import inference_of
 from airtouch.gap.naming.select import select
-from airtouch.gap.relations import calibration, library
+from airtouch.gap.relations import library
 from airtouch.gap.relations.features import features, names
 from airtouch.gap.relations.learning import drawings
 from airtouch.gap.signatures.candidates import all_candidates
@@ -21,15 +21,6 @@ from gap_flights import VEHICLE, fly, ready
 def nominal():
     """Features of nominal flights of a seed that nothing was learned from."""
     return [features(f, VEHICLE) for f in fly(5, 77)]
-
-
-def test_the_scatter_of_distances_is_found_in_flights_of_which_some_hit_something():
-    rng = np.random.default_rng(1)
-    evidence = np.exp(rng.uniform(3.0, 10.0, 4000))
-    excess = np.hypot(19.0, 0.02 * evidence) * rng.standard_t(calibration.FREEDOM, 4000)
-    excess[:40] += 5000.0
-    assert calibration.scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
-    assert calibration.scatter(19.0 * rng.standard_t(calibration.FREEDOM, 4000), evidence, 19.0) < 0.002
 
 
 def test_a_file_holds_what_was_saved(tmp_path):

@@ -29,12 +29,15 @@ CHANCE = 1.2
 
 @dataclass(frozen=True)
 class EffectClass:
-    """name: of the kind of effect; effect: of the registry; shape: value of the parameter that shapes it, or None.
+    """One class: the expected shift as a curve along the strength, and the scatter of single flights about it.
 
+    name: of the kind of effect; effect: of the registry; shape: value of the parameter that shapes it, or None.
+    parameters: number of them; signed: whether strengths have two signs.
     knots (k,): logarithms of strengths; table (parts, k, Q): shift per unit of strength at the knots, one part for each
-    parameter and one more, even in the sign, where there are two signs; axes (Q, r), variances (r,): directions, and
-    variances along them, of a flight's distance from the curve, over the squared size of the shift. readout: what its
-    strengths are in the effect's units, where that is known.
+    parameter and one more, even in the sign, where there are two signs.
+    axes (Q, r), variances (r,): directions of a flight's distance from the curve, and variances along them, over the
+    squared length of the shift.
+    readout: what its strengths are in the effect's units, where that is known.
     """
 
     name: str
@@ -55,12 +58,12 @@ class EffectClass:
 
     @property
     def least(self) -> float:
-        """The least strength that was flown."""
+        """The least strength that was flown, in units of the class."""
         return float(np.exp(self.knots[0]))
 
     @property
     def most(self) -> float:
-        """The highest strength that was flown."""
+        """The highest strength that was flown, in units of the class."""
         return float(np.exp(self.knots[-1]))
 
     def mean(self, strength: np.ndarray) -> np.ndarray:
