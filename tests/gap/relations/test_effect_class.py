@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.relations.effect_class import learn_class
+from airtouch.gap.relations.effect_class import EffectClass, learn_class, stands_out
 
 Q, N = 20, 400
 
@@ -51,3 +51,34 @@ def test_a_plane_of_two_parameters():
     strength_pair = np.array([[0.6, -0.8]])
     middle = np.median(np.abs(strength))  # what strengths are scaled by
     assert effect_class.mean(strength_pair)[0] == pytest.approx(middle * strength_pair[0] @ plane, rel=0.05, abs=0.05)
+
+
+def test_flights_that_hit_something_do_not_bend_the_curve():
+    """One flight in twenty lies far off, across the others."""
+    rng = np.random.default_rng(4)
+    strength = np.exp(rng.uniform(np.log(5.0), np.log(50.0), N))
+    shift = strength[:, None] * np.eye(Q)[0] + 0.01 * rng.normal(size=(N, Q))
+    shift[::20, 1] += 10.0 * strength[::20]
+    effect_class = learn_class("one", "one", None, strength[:, None], shift, shift)
+    direction = effect_class.mean(np.array([[20.0]]))[0]
+    assert abs(direction[1]) < 0.02 * abs(direction[0])
+    assert effect_class.variances.size == 0  # no scatter is learned from them
+
+
+def test_noise_alone_stands_out_in_no_direction():
+    """Eigenvalues of noise reach (1 + sqrt(dimensions / samples))^2 times its variance (Marchenko and Pastur)."""
+    rng = np.random.default_rng(5)
+    samples = 0.3 * rng.normal(size=(N, 100))
+    variance = np.linalg.svd(samples / np.sqrt(N), compute_uv=False) ** 2
+    assert variance[0] > 1.5 * 0.3 ** 2
+    assert not stands_out(variance, 0.3 ** 2, 100, N).any()
+    assert stands_out(np.append(1.5 * variance[0], variance), 0.3 ** 2, 100, N).sum() == 1
+
+
+def test_a_class_of_one_parameter_of_several_says_so():
+    def named(name, effect):
+        return EffectClass(name, effect, None, 1, False, np.zeros(2), np.zeros((1, 2, Q)), np.zeros((Q, 0)),
+                           np.zeros(0))
+
+    assert named("controller_gain rate", "controller_gain").of_one_parameter
+    assert not named("mass", "mass").of_one_parameter

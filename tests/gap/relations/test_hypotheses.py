@@ -12,6 +12,7 @@ from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import SIZES, FlightFeatures, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.readout import Readout
 from airtouch.gap.relations.space import Standard
 
 Q = 100
@@ -113,3 +114,57 @@ def test_scatter_between_flights_averages_out():
     shift = mean.mean(np.array([[2.0]]))[0]
     # of the mean times 2: 4 (1 + 2^2 0.4) / 4
     assert 1.0 + (shift @ shift) * mean.variances[0] == pytest.approx(1.0 + 2.0 ** 2 * 0.4)
+
+
+@pytest.mark.parametrize(("other", "effect", "may"), [
+    ("wind", "wind", True), ("mass", "mass", False), ("thrust_coefficient", "thrust_coefficient", False),
+    ("mass again", "mass", True)])
+def test_what_may_stand_beside_a_mass(other, effect, may):
+    """Another name of it may not, another parameter of the same effect may if each has a class of its own."""
+    mass = FlightFeatures(noise() + 45.0 * np.eye(Q)[0], library().model).with_class(library().model.classes[0])
+    assert inference.may_stand_beside(replace(mass.fits[0].of, name=other, effect=effect), mass) is may
+
+
+def test_no_more_effects_are_named_than_a_flight_may_have(monkeypatch):
+    monkeypatch.setattr(inference, "OVER_NAMELESS", -np.inf)  # four equal effects resemble a disturbance without a name
+    values = noise() + sum(30.0 * np.eye(Q)[i] for i in range(4))
+    assert len(infer(library(), values[None]).classes) == inference.MOST_EFFECTS
+
+
+def test_a_second_effect_needs_a_share_of_the_firsts_evidence():
+    """The share that wrong ones gain beside that effect: of 1000 nats, a twentieth is more than the second one has."""
+    values = (noise() + 45.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1])[None]
+    with_share = replace(library(), second_share=np.full(len(NAMES), 0.05))
+    assert {c.name for c in infer(library(), values).classes} == {"mass", "wind"}
+    assert {c.name for c in infer(with_share, values).classes} == {"mass"}
+
+
+def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_two_effects(monkeypatch):
+    """The distance says nothing here: nominal flights scatter widely."""
+    monkeypatch.setattr(inference, "OVER_NAMELESS", -np.inf)
+    wide = replace(library(), distance=(float(Q), 1e6))
+    for true, share in (((45.0,), 0.01), ((45.0, 30.0), 0.02)):
+        values = noise(4) + sum(size * np.eye(Q)[i] for i, size in enumerate(true))
+        values[60:] *= 2.5
+        flight = FlightFeatures(values, wide.model)
+        best = flight.with_class(wide.model.classes[0])
+        if len(true) == 2:
+            best = flight.with_two(*wide.model.classes[:2])
+        result = infer(wide, values[None])
+        assert len(result.classes) == len(true)
+        assert result.limit == pytest.approx(10.0 + share * best.evidence, rel=1e-3)
+        assert result.unexplained == pytest.approx(flight.nameless_evidence(best) - best.evidence, rel=1e-2)
+
+
+def test_two_parameters_of_one_effect_have_no_readings():
+    """Each was calibrated acting alone."""
+    size = np.geomspace(1.0, 100.0, 30)[:, None]
+    gains = tuple(replace(c, name=f"controller_gain {p}", effect="controller_gain",
+                          readout=Readout((p,), size, 0.01 * size))
+                  for c, p in zip(library().model.classes[:2], ("rate", "attitude"), strict=True))
+    known = replace(library(), model=replace(library().model, classes=gains), nameless_share=np.zeros(2),
+                    second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    rate, attitude = 45.0 * np.eye(Q)[0], 30.0 * np.eye(Q)[1]
+    one, both = (infer(known, (noise() + x)[None]) for x in (rate, rate + attitude))
+    assert list(one.readings) == ["controller_gain"]
+    assert len(both.classes) == 2 and not both.readings
