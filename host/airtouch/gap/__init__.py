@@ -8,7 +8,8 @@ Where each decision is made; a folder imports only those above it:
 - `flights`, a log made ready: `flight`, `motion` with its `filters`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
-  `scatter_estimates` (a `posterior` of the baseline flights), `drawn` how simulated flights with it are drawn.
+  `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
+  simulated flights with it are drawn.
 - `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
@@ -19,8 +20,8 @@ Where each decision is made; a folder imports only those above it:
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
 - `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of
-  a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `space`; each effect an `effect_class`; how
-  likely a flight is under it, `density`, under several or something without a name, `hypotheses`; a `library` holds
+  a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `feature_space`; each effect an
+  `effect_class`; how likely a flight is under it, `density`, under several or something without a name, `hypotheses`; a `library` holds
   what `build` learned by `learning` flights and `exposure` to what has no name, and what `calibration` measured with
   others; `readout` gives a strength in the effect's own units; `inference` names the effects.
 - `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does

@@ -7,8 +7,8 @@ import pytest
 
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import coherence, features
+from airtouch.gap.relations.feature_space import cholesky_factor
 from airtouch.gap.relations.flight_signals import COMMAND, LIFT, signals_of
-from airtouch.gap.relations.space import whitening
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
 
@@ -62,6 +62,6 @@ def test_whitened_nominal_flights_have_no_covariance():
     rng = np.random.default_rng(2)
     mix = np.eye(5) + 0.8 * rng.normal(size=(5, 5))
     draws = rng.normal(size=(20000, 5)) @ mix.T
-    lower = whitening(draws, doubt=0.0)
+    lower = cholesky_factor(draws, doubt=0.0)
     white = np.linalg.solve(lower, (rng.normal(size=(20000, 5)) @ mix.T).T)
     assert np.cov(white) == pytest.approx(np.eye(5), abs=0.04)

@@ -9,11 +9,11 @@ from scipy.stats import multivariate_normal
 
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.feature_space import Standard
 from airtouch.gap.relations.hypotheses import SIZES, FlightFeatures, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
-from airtouch.gap.relations.space import Standard
 
 Q = 100
 KNOTS, SIZE = np.log([0.5, 5.0, 50.0]), (45.0, 30.0, 12.0)

@@ -17,7 +17,7 @@ from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError
 from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity
 from airtouch.gap.sealed.blind_severity import severities
-from airtouch.gap.signatures.drawn import KINDS
+from airtouch.gap.signatures.random_draws import KINDS
 
 CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_offset": (5e-4, 1e-3, 2e-3),
          "rotor_drag": (0.004, 0.008, 0.016), "time_jitter": (0.002, 0.004, 0.006)}

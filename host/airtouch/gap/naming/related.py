@@ -10,7 +10,7 @@ from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
-from airtouch.gap.signatures.drawn import SHAPED
+from airtouch.gap.signatures.random_draws import SHAPED
 
 
 def inference_of(data: Data, names: Sequence[str]) -> Inference | None:

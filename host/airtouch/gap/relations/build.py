@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from airtouch.gap.relations import space
 from airtouch.gap.relations.calibration import calibrated, two_of
 from airtouch.gap.relations.effect_class import learn_class, stands_out
+from airtouch.gap.relations.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -36,7 +36,6 @@ from airtouch.gap.relations.learning import (
     scaled,
 )
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
-from airtouch.gap.relations.space import Standard
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import load
 
@@ -93,14 +92,14 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     say("nominal flights")
     flown = {i: f for i in range(NOMINAL) if (f := fly(scene, i)) is not None}
     features = np.array(list(flown.values()))
-    standard = space.standard_of(features)
-    whitening = Whitening(standard, space.whitening(standard(features)))
+    standard = standard_of(features)
+    whitening = Whitening(standard, cholesky_factor(standard(features)))
     nominal = dict(zip(flown, whitening(features), strict=True))
     middle = np.mean(list(nominal.values()), axis=0)
     paired = [_paired_flights(scene, whitening, nominal, d, say) for d in all_drawings()]
     say("flights without a name")
     nameless = np.array([whitening(f)[0] - nominal[i] for i, f in disturbed_flights(scene, NAMELESS) if i in nominal])
-    axes = space.directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
+    axes = directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
     classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.amount, p.shift @ axes,

@@ -11,14 +11,14 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
+from airtouch.gap.relations.feature_space import MIDDLE_TWO_THIRDS
 from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
-from airtouch.gap.relations.space import MIDDLE_TWO_THIRDS
 from airtouch.gap.signatures.alike import interchangeable
-from airtouch.gap.signatures.drawn import log_uniform
+from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
 NOMINAL = 300  #: nominal flights, whose distances are measured

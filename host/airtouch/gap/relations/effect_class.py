@@ -1,7 +1,7 @@
 """What an effect does to the features: a curve along its strength, and how far single flights lie off it.
 
-Coordinates (Q of them) are those of `space`: nominal flights have the covariance 1 there. A class is learned from
-pairs of simulated flights, the same seeds with and without the effect. Lengths of shifts are in these coordinates.
+Coordinates (Q of them) are those of `feature_space`: nominal flights have the covariance 1 there, and lengths of shifts
+are lengths there. A class is learned from pairs of simulated flights, the same seeds with and without the effect.
 Thresholds without another source were chosen on flights of `learning.SEED` (host/docs/looks.md, 2026-11-24 12:43 UTC).
 """
 

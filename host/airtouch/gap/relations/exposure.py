@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from airtouch.gap.signatures.drawn import log_uniform
+from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation import plant
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, wrench

@@ -1,6 +1,6 @@
 """The features of one flight: some 2,300 numbers that say how its signals go together, without a unit to compare by.
 
-What they say of a vehicle is told by flights of it without any effect: see `space`.
+What they say of a vehicle is known by flights of it without any effect: see `feature_space`.
 """
 
 from functools import cache
@@ -13,7 +13,7 @@ from airtouch.gap.relations.flight_signals import readable, signals_of
 from airtouch.logs.flight_log import RPM
 from airtouch.vehicle import Vehicle
 
-UNSEEN = ("vbat_V", *RPM)  #: columns that are not looked at: few small vehicles log them
+UNSEEN = ("vbat_V", *RPM)  #: columns that are left out: few small vehicles log them
 
 
 @cache

@@ -12,7 +12,7 @@ from airtouch.gap.relations import exposure
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.readout import amount_of
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of, log_uniform
+from airtouch.gap.signatures.random_draws import SHAPED, Kind, kinds_of, log_uniform
 from airtouch.gap.signatures.signature import free_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown

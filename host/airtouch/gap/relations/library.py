@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.feature_space import Standard
 from airtouch.gap.relations.hypotheses import LearnedModel
 from airtouch.gap.relations.readout import Readout
-from airtouch.gap.relations.space import Standard
 from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 

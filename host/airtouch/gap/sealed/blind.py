@@ -22,7 +22,7 @@ from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
 from airtouch.gap.signatures.alike import interchangeable
-from airtouch.gap.signatures.drawn import KINDS, Kind
+from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown

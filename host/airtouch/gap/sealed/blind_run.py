@@ -18,7 +18,7 @@ from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.signatures.alike import names_alike
-from airtouch.gap.signatures.drawn import KINDS
+from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order

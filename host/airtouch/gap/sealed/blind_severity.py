@@ -21,7 +21,7 @@ from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.drawn import KINDS, Kind
+from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 from airtouch.logs.flight_log import FlightLog

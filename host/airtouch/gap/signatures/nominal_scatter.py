@@ -90,15 +90,12 @@ class Scatter:
             strength = np.maximum(strength - self.middle[name], 0.0)
         if covariance is None or not covariance.any():
             return self._rare(strength / rms, max(int(np.count_nonzero(strength)) - 1, 0))
-        finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
-        own, further = strength[finite] / rms[finite], max(len(finite) - 1, 0)
-        chance = covariance[np.ix_(finite, finite)] / np.outer(rms[finite], rms[finite]) + EXACT * np.eye(len(finite))
-        apart = np.broadcast_to(apart, strength.shape)[finite] / rms[finite]
-        toward = np.linalg.solve(chance + np.eye(len(finite)), apart)
-        if toward @ apart > 0.0:
-            own = own - np.clip(toward @ own / (toward @ apart), -1.0, 1.0) * apart
+        known = np.flatnonzero(np.isfinite(np.diag(covariance)))
+        unit, further = rms[known], max(len(known) - 1, 0)
+        chance = covariance[np.ix_(known, known)] / np.outer(unit, unit) + EXACT * np.eye(len(known))
+        fitted = _least_within(strength[known] / unit, np.broadcast_to(apart, strength.shape)[known] / unit, chance)
         precision = np.linalg.inv(chance)
-        return min(self._compromise(own, precision, further, start) for start in (own, np.zeros(len(own))))
+        return min(self._compromise(fitted, precision, further, start) for start in (fitted, np.zeros(len(fitted))))
 
     def _rare(self, far: np.ndarray, further: int) -> float:
         """Log of Student's density at 0 over that at `far` (k,), where `further` parameters pay for themselves."""
@@ -135,6 +132,17 @@ class Scatter:
         limit = float(stdtrit(self.freedom, 1.0 - FALSE_SHARE))
         rarity, limit_rarity = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
         return 0.5 * (self.freedom + 1.0) * (rarity - limit_rarity)
+
+
+def _least_within(strength: np.ndarray, apart: np.ndarray, chance: np.ndarray) -> np.ndarray:
+    """Of the strengths (k,) on the line between strength - apart and strength + apart that of least evidence.
+
+    All in units of the nominal scatter; chance (k, k): covariance of the strength.
+    """
+    toward = np.linalg.solve(chance + np.eye(len(strength)), apart)
+    if toward @ apart > 0.0:
+        return strength - np.clip(toward @ strength / (toward @ apart), -1.0, 1.0) * apart
+    return strength
 
 
 @cache

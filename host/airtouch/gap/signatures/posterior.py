@@ -6,7 +6,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 LEAST = 1e-3  #: natural steps that the scatter of a parameter is at least; no effect is a thousandth of its step
-MOST_DEVIATIONS = 4.0  #: standard deviations above the mean to which values are cut, and up to which a rate is no news
+#: standard deviations above the mean to which values are cut, and up to which a rate is no news; chosen
+MOST_DEVIATIONS = 4.0
 LEAST_INFORMATION = 1.0  #: exactly known values, of a scatter of a natural step, of which a scatter can be estimated
 GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations, in natural steps, among which the posterior's median is
 

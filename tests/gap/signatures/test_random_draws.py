@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.signatures.drawn import KINDS, SHAPED, STEPS, kinds_of, log_uniform
+from airtouch.gap.signatures.random_draws import KINDS, SHAPED, STEPS, kinds_of, log_uniform
 from airtouch.gap.signatures.signature import free_of
 from airtouch.gap.signatures.term import neutral_of, unit
 from airtouch.simulation.effects import EFFECTS, get

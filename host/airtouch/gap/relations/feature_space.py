@@ -14,7 +14,7 @@ SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
 #: no feature is taken to say more than this: coherence, logarithms of powers and of variances, of the clock
 LEAST_COHERENCE, LEAST_LOG, LEAST_CLOCK = 0.01, 0.03, 0.1
 LEAST_LOST = 0.5  #: the same of lost rows, in the logarithm of one more than their number: one by chance is no news
-DOUBT = 0.1  #: variance of a feature, as a share of its nominal one, that no nominal flight shows: see `whitening`
+DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
 SMALLEST = 1e-9  #: deviation of a feature that varies at all
 
 
@@ -50,7 +50,7 @@ def _least() -> np.ndarray:
     return np.array([*of_coherence, *of_moments, *(0.0 for _ in edge_steps.names())])
 
 
-def whitening(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:
+def cholesky_factor(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:
     """Lower triangle L of the covariance L L' (features, features) of nominal flights (n, features), standardised.
 
     Each feature has a variance of its own beside what nominal flights show: no simulated vehicle is as exact as the
