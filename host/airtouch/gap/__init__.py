@@ -21,9 +21,10 @@ Where each decision is made; a folder imports only those above it:
   and free `powers`.
 - `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of
   a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `feature_space`; each effect an
-  `effect_class`; how likely a flight is under it, `density`, under several or something without a name, `hypotheses`; a `library` holds
-  what `build` learned by `learning` flights and `exposure` to what has no name, and what `calibration` measured with
-  others; `readout` gives a strength in the effect's own units; `inference` names the effects.
+  `effect_class`; how likely a flight is under it, `density`, under several or something without a name, `hypotheses`;
+  a `library` holds what `build` learned by `learning` flights and `exposure` to what has no name, and what
+  `calibration` measured with others; `readout` gives a strength in the effect's own units; `inference` names the
+  effects.
 - `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
   both for every candidate, `select` adds effects one by one, unless the relations of signals name them: `related`;
   `selection` holds what was found, with its probabilities.
