@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from airtouch.gap.result import Found
 from airtouch.gap.signatures.alike import interchangeable, names_alike
-from airtouch.gap.signatures.candidates import all_candidates, gated, is_random, kind_of, strength_term, terms
+from airtouch.gap.signatures.candidates import all_candidates, gated, is_random, kind_of, strength_term, term_of, terms
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.simulation.effects import EFFECTS, get
 
@@ -65,3 +67,17 @@ def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(li
 def test_mass_and_thrust_are_two_names_of_one_thing():
     assert interchangeable("mass", "thrust_coefficient") and interchangeable("wind", "wind")
     assert not interchangeable("mass", "inertia") and names_alike("inertia") is None
+
+
+def test_a_named_effect_is_its_own_variant_again():
+    (own,) = (t for t in terms("motor_noise") if t.values["time"] == 0.02)
+    values = own.quantities(own.scaled({**own.values, "rms": 0.05}))
+    again = term_of(Found("motor_noise", values, (("flight", 1.0, 2.0),)))
+    assert again.values == {**own.values, "rms": pytest.approx(0.05)}
+    assert again.gate == (("flight", 1.0, 2.0),) and again.kind == SPECTRUM
+
+
+def test_a_gain_that_was_named_alone_is_its_own_term_with_its_values():
+    alone = terms("controller_gain")[3]
+    found = Found("controller_gain", alone.quantities(np.array([0.4])))
+    assert term_of(found).values == alone.at(np.array([0.4]))

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Apparent, Scatter, size_of, table
-from airtouch.gap.signatures.posterior import LEAST
+from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, standard_deviation
 from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, measured, scatter_of, student_log_density
 from airtouch.simulation.effects import EFFECTS
 
@@ -268,3 +268,28 @@ def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed(
 @pytest.mark.parametrize(("x", "freedom", "middle", "spread"), [(0.3, 3.0, 0.0, 1.0), (12.0, 4.0, -2.0, 0.5)])
 def test_students_density_is_scipys(x, freedom, middle, spread):
     assert student_log_density(x, freedom, middle, spread) == pytest.approx(student.logpdf(x, freedom, middle, spread))
+
+
+def test_of_two_halves_the_strength_of_least_evidence_counts():
+    """Two halves that disagree by more than the strength itself are no evidence; others count as the weaker half."""
+    scatter = Scatter({"mass": np.array([0.01])}, 8.0, (0.0, 0.5))
+    covariance, strength = np.array([[1e-8]]), np.array([0.05])
+    whole, disputed, none = (scatter.evidence("mass", strength, covariance, np.array([x])) for x in (0.0, 0.02, 0.07))
+    assert disputed == pytest.approx(scatter.evidence("mass", np.array([0.03]), covariance), rel=1e-3)
+    assert none == pytest.approx(0.0, abs=1e-6) and whole > disputed
+
+
+def test_a_rate_far_beyond_those_of_nominal_flights_allows_no_more_than_four_deviations():
+    scatter = Scatter({}, 8.0, (0.3, 0.6))
+    assert scatter.allowed(10.0, 200.0) == pytest.approx(200.0 + 10.0 * (0.3 + MOST_DEVIATIONS * 0.6) ** 2)
+
+
+def test_few_baseline_flights_scatter_more_than_they_seem_to():
+    """Each of three was among those that it is held against: twice the variance; the class counts as four flights."""
+    of_class = next(c for c in table().values() if c.vehicle == "ns-34g")
+    strengths = np.array([4.0, -6.0, 5.0])
+    flights = [Apparent({"inertia": np.array([x])}, {"inertia": np.array([0.1])}, 1.0) for x in strengths]
+    expected = standard_deviation(np.sqrt(2.0) * strengths, np.full(3, np.sqrt(2.0) * 0.1), of_class.rms["inertia"][0],
+                                  (4.0, 4.0))
+    assert scatter_of(flights, True, "ns-34g").rms["inertia"] == pytest.approx(expected)
+    assert expected > standard_deviation(strengths, np.full(3, 0.1), of_class.rms["inertia"][0], (4.0, 4.0))
