@@ -25,7 +25,8 @@ Where each decision is made; a folder imports only those above it:
 - `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
   both for every candidate, `select` adds effects one by one, unless the relations of signals name them: `related`;
   `selection` holds what was found, with its probabilities.
-- `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).
+- `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
+  `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
 - `answer`: the verdict and the `ranking`; the `named_effects` with their intervals; how far: `shrink`; what stays
   open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
