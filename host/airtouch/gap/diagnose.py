@@ -20,8 +20,9 @@ from airtouch.gap.evidence.overhead import seconds_overhead, with_overhead
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.select import LOOP_SHARE, select
+from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.thresholds import LOOP_SHARE
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from airtouch.gap.evidence import random_effects
+from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
-from airtouch.gap.evidence.problem import GROUPS, LOOP, Part, Problem, problem_of
+from airtouch.gap.evidence.problem import LOOP, Part, Problem, problem_of
 from airtouch.gap.evidence.slopes import Slopes, active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term, random_of

@@ -15,10 +15,11 @@ from scipy.optimize import brentq
 from scipy.special import exp1
 
 from airtouch.gap.evidence import random_effects
+from airtouch.gap.evidence.cells import BANDS_HZ, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
 from airtouch.gap.evidence.likelihood import tailed
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY, Change
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
+from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
@@ -30,9 +31,6 @@ OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to fl
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
 DOUBT = 0.25
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell: about octaves; no other source
-REST_VIEW, COMMAND_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
-GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
 FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 
 
@@ -99,14 +97,14 @@ class Problem:
 
     @functools.cached_property
     def groups(self) -> np.ndarray:
-        """A number below GROUPS for each flattened value: view, regime, channel and band."""
+        """Number of the cell of each flattened value (`cells`)."""
         groups = []
         for _, regime, chosen in self.part.pieces:
             band = np.digitize(frequencies(regime), BANDS_HZ) - 1
-            table = band[:, None] * COUNT + np.arange(COUNT) + (1000 * REST_VIEW if regime == REST else 0)
+            table = cell_numbers(REST_VIEW if regime == REST else REPLAY_VIEW, band[:, None], np.arange(COUNT))
             groups.append(np.tile(table[self.keep[regime]], int(chosen.sum())))
         own = self.commands
-        of_commands = np.digitize(own.frequency, BANDS_HZ) * COUNT + own.channel + 1000 * COMMAND_VIEW \
+        of_commands = cell_numbers(COMMAND_VIEW, np.digitize(own.frequency, BANDS_HZ), own.channel) \
             if len(own) else np.zeros(0)
         return np.concatenate([*groups, of_commands]).astype(int) if groups else np.zeros(0, int)
 
@@ -262,14 +260,6 @@ def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, falls: np.ndarr
     power += tails
     power *= -OVERLAP_WEIGHT
     return power
-
-
-def cell_words(group: int) -> str:
-    """The cell of a number of `Problem.groups`, in words: channel, band, and whether at rest."""
-    view, place = divmod(group, 1000)
-    band, channel = divmod(place, COUNT)
-    low, high = BANDS_HZ[max(band - (view == COMMAND_VIEW), 0):][:2]
-    return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
 def tail(freedom: np.ndarray) -> np.ndarray:

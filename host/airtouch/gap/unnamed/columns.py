@@ -10,8 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from airtouch.gap.evidence.cells import BANDS_HZ, GROUPS
 from airtouch.gap.evidence.data import Data, commanded
-from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem
+from airtouch.gap.evidence.problem import Part, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
