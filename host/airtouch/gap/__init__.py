@@ -12,9 +12,11 @@ Where each decision is made; a folder imports only those above it:
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
-- `evidence`, how likely the flights are under an effect: `data`, its `cells`, `problem`, its `likelihood`, `fit` with `slopes`,
-  `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `overhead` takes
-  its seconds from another vehicle's log, `clock` what only the log's times show.
+- `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
+  (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,
+  `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
+- `passing`, what comes and goes: `gates`, of `stretches` of blocks and `bursts`; `overhead` takes its seconds from
+  another vehicle's log.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
 - `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of

@@ -12,13 +12,13 @@ from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.gates import TOLD, gated
 from airtouch.gap.evidence.problem import Part, whole_of
 from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.selection import Judged, probabilities
+from airtouch.gap.passing.gates import TOLD, gated
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates

@@ -63,7 +63,8 @@ class Slopes:
         gradient, information = problem.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
         powers = np.array(self.powers)
         if powers.any():
-            push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
+            push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
+                                                              problem.own)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.likelihood import tailed
+from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.simulation import replay
@@ -30,7 +30,6 @@ RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: below it forces of other origin are strong
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power over the floor's
 MOST_BLOCKS = 40  #: on which the place is looked for
-FREEDOM = 12.0  #: of the tails of a block's power, as in `problem`
 
 
 @dataclass(frozen=True)

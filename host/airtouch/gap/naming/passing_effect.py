@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.gates import TOLD, Gated, gated
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Judged
+from airtouch.gap.passing.gates import TOLD, Gated, gated
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.unnamed.generic import height_gain
 

@@ -30,7 +30,7 @@ class Screen:
 
     def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
         """Change of the flattened spectra per scaled parameter i of a term at neutral."""
-        gathered = problem._gather(self._change(term, i))
+        gathered = problem.layout.gather(self._change(term, i))
         return np.where(problem.known, problem.with_commands(gathered), 0.0)
 
     def _change(self, term: Term, i: int) -> list[dict[str, np.ndarray]]:
@@ -85,7 +85,7 @@ def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.nd
     low, high = np.concatenate([low, -wide]), np.concatenate([high, wide])
     for train, test in ((0, 1), (1, 0)):
         problem = problem_of(screen.data, parts[train])
-        constants = problem.constant()
+        constants = problem.unit_offsets
         columns = np.array([*tables[train], *(-c for c, _ in constants)])
         prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
         x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))

@@ -12,8 +12,9 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.gates import TOLD, Gate, within
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.passing.gates import TOLD, within
+from airtouch.gap.passing.stretches import Gate
 from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import FlightLog
