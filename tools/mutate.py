@@ -45,7 +45,7 @@ GROUPS = {
     "selection": Group(("gap/evidence/cells.py", *(f"gap/naming/{name}.py" for name in (
         "contradiction", "forward", "judging", "looks", "passing_effect", "rounds", "select", "shares",
         "thresholds"))), tuple(f"gap/naming/test_{name}.py" for name in (
-            "rounds", "select", "select_beside", "thresholds"))),
+            "forward", "looks", "rounds", "select", "select_beside", "thresholds"))),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)
