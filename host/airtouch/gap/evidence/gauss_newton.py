@@ -1,5 +1,6 @@
 """Fit of mean effects by Gauss-Newton on the whitened spectra, the offsets between flights beside them."""
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -133,12 +134,11 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: ra
     """The parameters (k,) with that one of an effect's `own` moved to that place of GRID that is likeliest."""
     low, high = limits(mean)
     best, out = -np.inf, x
-    for i in own:
-        for amount in GRID:
-            trial = x.copy()
-            trial[i] = np.clip(amount, low[i], high[i])
-            command_power, cost = problem.commanded(active_at(mean, trial))
-            level = problem.likelihood(problem.base, command_power) - cost
-            if level > best:
-                best, out = level, trial
+    for i, amount in itertools.product(own, GRID):
+        trial = x.copy()
+        trial[i] = np.clip(amount, low[i], high[i])
+        command_power, cost = problem.commanded(active_at(mean, trial))
+        level = problem.likelihood(problem.base, command_power) - cost
+        if level > best:
+            best, out = level, trial
     return out
