@@ -15,16 +15,17 @@ from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
-from airtouch.gap.evidence.gates import TOLD
-from airtouch.gap.evidence.overhead import seconds_overhead, with_overhead
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.select import LOOP_SHARE, select
+from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.thresholds import LOOP_SHARE
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
+from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates

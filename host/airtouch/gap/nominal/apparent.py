@@ -7,13 +7,14 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import strength_variance
-from airtouch.gap.evidence.gates import gated
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
+from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.select import nameless, seconds
+from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Judged
+from airtouch.gap.passing.gates import gated
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, Term, all_candidates, strength_term
 from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, scatter_of, size_of

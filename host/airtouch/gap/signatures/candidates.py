@@ -224,7 +224,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ..
 
 
 def gated(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
-    """The variants of effects that may come and go, by name; `evidence.gates` sets their gates."""
+    """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
     without = set(without)
     out: dict[str, list[tuple[Term, ...]]] = {name: [(t,) for t in terms(name)] for name in GATED
                                               if name in EFFECTS and name not in without}
