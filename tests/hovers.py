@@ -10,7 +10,7 @@ from airtouch.gap.evidence.fit import fit, judge
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import signals
@@ -19,7 +19,7 @@ from gap_flights import VEHICLE, flight, noise
 ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes
 LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
 DOWN = 0.5  #: m/s^2, pushed where a test pushes
-FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
+FLOOR = declared_study(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
 CORRELATION_S = 0.5  #: of the made gusts, which is that of one of the variants
 PWM = 40000.0  #: of the made hovers
 LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
@@ -41,7 +41,7 @@ EFFECT = Effect("stiff_climb", "gain of the height loop", (FACTOR,), settings=se
 
 def hover(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
     """A hover with white noise `louder` times as strong as the floor has it, and a steady force, m/s^2."""
-    declared = calibrate.sensor_noise(VEHICLE)
+    declared = sensor_noise(VEHICLE)
     acc, gyro = LOUDNESS * louder * declared[:3], LOUDNESS * louder * declared[3:6]
     return flight(length_s, noise(length_s, 1.0, seed) * acc + np.array(force),
                   noise(length_s, 1.0, seed + 500) * gyro, **options)

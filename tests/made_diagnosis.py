@@ -6,7 +6,7 @@ import short_flights
 from airtouch import vehicle
 from airtouch.gap.answer.pictures import of
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked, Step
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
@@ -44,7 +44,7 @@ def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **mor
 
 def of_flights(logs, effects=(FOUND,), **more):
     """A diagnosis with map and curves of flights."""
-    study, flights = calibrate.declared(VEHICLE, ()), [ready(f, VEHICLE) for f in logs]
+    study, flights = declared_study(VEHICLE, ()), [ready(f, VEHICLE) for f in logs]
     terms = [term_of(e) for e in effects]
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)

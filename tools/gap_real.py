@@ -17,6 +17,7 @@ only where --rows names it.
 import argparse
 import csv
 import json
+import multiprocessing
 import os
 import sys
 import time
@@ -213,7 +214,7 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
         answer_of = {(c["row"], c["flight"]): c for c in map(json.loads, store.read_text().splitlines())}
     todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in answer_of),
                   key=lambda c: (c.row, c.vehicle, c.baseline))
-    with ProcessPoolExecutor(max(jobs, 1)) as pool:
+    with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
         for i, case in enumerate(pool.map(answered, todo)):
             answer_of[case["row"], case["flight"]] = case
             if store:

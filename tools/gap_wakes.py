@@ -29,12 +29,12 @@ from scipy.signal import butter, sosfiltfilt
 import gap_real
 import swarm_cuts
 from airtouch import vehicle as vehicles
-from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.naming.judging import LEAST_GAIN
-from airtouch.gap.naming.select import news
+from airtouch.gap.naming.passing_effect import news
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.passing import gates, overhead
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.gap.signals.channels import residual
 from airtouch.logs import read

@@ -42,8 +42,10 @@ GROUPS = {
     "int8": Group(tuple(f"reference/networks/{name}.py" for name in ("int8_network", "stream_graph", "stream_int8")), (
         "reference/networks", "kernels/test_network.py", "kernels/test_stream.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
-    "selection": Group(("gap/naming/select.py", "gap/naming/judging.py", "gap/naming/rounds.py"),
-                       ("gap/naming/test_rounds.py", "gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
+    "selection": Group(("gap/evidence/cells.py", *(f"gap/naming/{name}.py" for name in (
+        "contradiction", "forward", "judging", "looks", "passing_effect", "rounds", "select", "shares",
+        "thresholds"))), tuple(f"gap/naming/test_{name}.py" for name in (
+            "forward", "looks", "rounds", "select", "select_beside", "thresholds"))),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)

@@ -35,7 +35,7 @@ def test_nominal_flights_are_held_against_others_of_their_group(flights):
 class Alone:
     """A pool of this process alone."""
 
-    def __init__(self, _jobs):
+    def __init__(self, _jobs, _context):
         self.map = map
 
     def __enter__(self):

@@ -15,7 +15,7 @@ from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.pictures import of_measurement
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import Found, Quantity
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
@@ -153,7 +153,7 @@ def test_the_report_computes_nothing():
 def test_any_effect_can_be_shown(pushed_flights, name):
     term = term_of(Found(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
     assert dict(term.values) == EFFECTS[name].values()
-    study, flight = calibrate.declared(VEHICLE, ()), ready(pushed_flights[0], VEHICLE)
+    study, flight = declared_study(VEHICLE, ()), ready(pushed_flights[0], VEHICLE)
     cells_map = gap_map(study, [flight], terms=[term])
     assert all(c.after is not None and c.after >= 0.0 for c in cells_map.cells) and len(where(cells_map)) >= 10
     assert gap_tables.maps(cells_map.cells)

@@ -14,9 +14,11 @@ Where each decision is made; a folder imports only those above it:
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
-- `evidence`, how likely the flights are under an effect: `data`, `problem`, its `likelihood`, `fit` with `slopes`,
-  `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `overhead` takes
-  its seconds from another vehicle's log, `clock` what only the log's times show.
+- `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
+  (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,
+  `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
+- `passing`, what comes and goes: `gates`, of `stretches` of blocks and `bursts`; `overhead` takes its seconds from
+  another vehicle's log.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
 - `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of
@@ -25,10 +27,12 @@ Where each decision is made; a folder imports only those above it:
   a `library` holds what `build` learned by `learning` flights and `exposure` to what has no name, and what
   `calibration` measured with others; `readout` gives a strength in the effect's own units; `inference` names the
   effects.
-- `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
-  both for every candidate, `select` adds effects one by one, unless the relations of signals name them: `related`;
-  `selection` holds what was found, with its probabilities.
-- `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).
+- `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
+  `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
+  that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the
+  effects: `related`; `selection` holds what was found, with its probabilities; `contradiction` by the flights.
+- `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
+  `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
 - `answer`: the verdict and the `ranking`; the `named_effects` with their intervals; how far: `shrink`; what stays
   open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.

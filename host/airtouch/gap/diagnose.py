@@ -15,14 +15,17 @@ from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
-from airtouch.gap.evidence.gates import TOLD
-from airtouch.gap.evidence.overhead import seconds_overhead, with_overhead
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.select import LOOP_SHARE, select
+from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.thresholds import LOOP_SHARE
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
+from airtouch.gap.nominal.consistency import differences
+from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
@@ -69,7 +72,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         study, fitted = before.held
     else:
         study, fitted = calibrate.calibrated(vehicle, nominal, without=without) if nominal \
-            else (calibrate.declared(vehicle, ()), None)
+            else (declared_study(vehicle, ()), None)
     some = _some(seen)
     held = (study, fitted)
     if partner:
@@ -87,7 +90,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     alike = alike_of(selection)
     notes = [n for f in seen for n in f.notes] + left_out
     notes += list(fitted.notes) if fitted else [NO_BASELINE]
-    notes += measure.differences(study, nominal)
+    notes += differences(study, nominal)
     notes += measure.flown_unlike(study, seen)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
@@ -199,7 +202,7 @@ def _arms(vehicle: Vehicle, nominal: Sequence[Flight], fitted: calibrate.Calibra
     if not nominal or selection.chosen is None:
         return {"declared": _plain(overall)}
     known = fitted.declared if fitted is not None else None
-    data = Data(known or calibrate.declared(vehicle, nominal), some)
+    data = Data(known or declared_study(vehicle, nominal), some)
     parts = halves(data)
     terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
     fits = tuple(fit(data, p, terms, _start(terms, selection.chosen)) for p in parts)

@@ -17,21 +17,17 @@ from airtouch.gap.flights.motion import held
 from airtouch.gap.loop.command_spectra import block_spectra, frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
+from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
-from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of, where
+from airtouch.gap.where.gap_map import GapMap, Part, assemble, in_words, overall, part_of, where
 from airtouch.logs.flight_log import RPM, FlightLog
 from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle
 
-#: means of nominal flights that differ by more than this are worth a word: force m/s^2, torque rad/s^2
-APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])
 LEAST_RPM = 500.0  #: of a rotor in flight
-SURE = 6.0  #: and by more than this many standard errors
-NAMES = tuple(CHANNEL_WORDS.values())[:6]
-UNITS = ("m/s^2",) * 3 + ("rad/s^2",) * 3
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     """
     left_out: list[str] = []
     nominal = list(usable(baseline, vehicle, left_out))
-    studies, fitted = [calibrate.declared(vehicle, nominal)], None
+    studies, fitted = [declared_study(vehicle, nominal)], None
     notes = differences(studies[0], nominal)
     if nominal and calibrated:
         progress("calibration")
@@ -142,26 +138,6 @@ def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> 
             yield ready(log, vehicle)
         except AirTouchError as error:
             left_out.append(str(error))
-
-
-def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
-    """In words, in which channels flights declared nominal differ among themselves."""
-    if len(nominal) == 1:
-        return ["one baseline flight: how much nominal flights differ among themselves is not known"]
-    means, errors = [], []
-    for f in nominal:
-        left = residual(f, study.vehicle, study.calibration)[(f.phase != GROUND) & f.usable][:, :6]
-        parts = np.array([p.mean(axis=0) for p in np.array_split(left, 8)])
-        means.append(left.mean(axis=0))
-        errors.append(parts.std(axis=0, ddof=1) / np.sqrt(8.0))
-    if not means:
-        return []
-    spread = np.ptp(means, axis=0)
-    error = np.sqrt(np.mean(np.square(errors), axis=0))
-    found = [f"{spread[i]:.2g} {UNITS[i]} in {NAMES[i]}" for i in np.argsort(-spread / APART)
-             if spread[i] > APART[i] and spread[i] > SURE * error[i]]
-    return ["the baseline flights are not consistent: among themselves they differ by " + ", ".join(found)
-            + "; the floor is that much higher"] if found else []
 
 
 def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from airtouch.gap.answer.pictures import Signal, Spectrum
-from airtouch.gap.where.gap_map import CHANNEL_WORDS
+from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE
 

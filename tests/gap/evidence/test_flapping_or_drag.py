@@ -8,7 +8,7 @@ from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.sealed.blind import SCENARIO
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.alike import names_alike
@@ -30,7 +30,7 @@ def fly(count, effects, seed):
 
 @pytest.fixture(scope="module")
 def study():
-    return calibrate.declared(VEHICLE, fly(5, {}, 31))
+    return declared_study(VEHICLE, fly(5, {}, 31))
 
 
 def test_one_force_while_thrust_is_steady():

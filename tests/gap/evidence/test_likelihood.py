@@ -1,9 +1,10 @@
-"""The compiled sum against the same sum by NumPy."""
+"""The compiled sum against the same sum by NumPy, and the likelihood that it is the sum of."""
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
-from airtouch.gap.evidence.likelihood import tailed
+from airtouch.gap.evidence.likelihood import Likelihood, tail, tailed
 
 
 @pytest.mark.parametrize("exponents", [(-3.0, 3.0), (-60.0, -40.0), (40.0, 60.0)])
@@ -19,3 +20,43 @@ def test_the_sum_is_numpys(exponents):
 
 def test_no_value_gives_nothing():
     assert tailed(*np.zeros((4, 0)), np.zeros(0, bool)) == 0.0
+
+
+@pytest.fixture
+def law():
+    """Values (200,), some of them unknown, and their likelihood."""
+    rng = np.random.default_rng(3)
+    power, freedom, known = rng.uniform(0.5, 2.0, 200), np.repeat([12.0, 6.0], 100), rng.random(200) > 0.2
+    values = np.sqrt(power / 2.0) * (rng.normal(size=200) + 1j * rng.normal(size=200))
+    return Likelihood(power, freedom, tail(freedom), known), values
+
+
+def test_the_likelihood_of_all_values_is_the_sum_of_that_of_each(law):
+    likelihood, values = law
+    each = likelihood.each(values, 0.3)
+    assert likelihood(values, 0.3) == pytest.approx(each.sum()) and not each[~likelihood.known].any()
+
+
+@pytest.mark.parametrize("x", [0.0, 0.7, 20.0])
+def test_along_one_power_it_is_that_of_this_power_and_the_others(law, x):
+    likelihood, values = law
+    unit, others = np.where(np.arange(200) % 3 == 0, 0.5, 0.0), np.full(200, 0.1)
+    at = likelihood.along(np.abs(values) ** 2, others, unit)
+    assert at(x) == pytest.approx(likelihood(values, others + x * unit), rel=1e-12)
+
+
+def test_its_slope_by_the_power_is_that_of_small_changes(law):
+    likelihood, values = law
+    added, small = np.full(200, 0.2), 1e-5
+    slope, curvature = likelihood.power_slopes(values, added, 150)
+    step = [likelihood.each(values, added + sign * small) for sign in (1.0, -1.0)]
+    np.testing.assert_allclose(slope, ((step[0] - step[1]) / (2.0 * small))[:150], atol=1e-6)
+    assert len(slope) == len(curvature) == 150 and (curvature[likelihood.known[:150]] > 0.0).all()
+
+
+@pytest.mark.parametrize("freedom", [2.0, 6.0, 12.0])
+def test_tails_are_scaled_so_that_the_expected_power_is_the_likeliest(freedom):
+    """Of exponential power e of mean 1, by quadrature."""
+    scale, = tail(np.array([freedom]))
+    mean, _ = quad(lambda e: np.exp(-e) * (freedom + 1.0) * e / (scale + e), 0.0, np.inf)
+    assert mean == pytest.approx(1.0, abs=1e-6)

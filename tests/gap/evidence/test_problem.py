@@ -3,7 +3,7 @@
 from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import Problem, problem_of, whole_of
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from gap_flights import VEHICLE, flight
 
 
@@ -11,7 +11,7 @@ def test_all_blocks_of_some_flights_are_flattened_once(monkeypatch):
     """A long-lived set of flights, judged a thousand times, else kept a thousand copies of them."""
     problems = []
     monkeypatch.setattr(problem, "Problem", lambda data, part: problems.append(part) or Problem(data, part))
-    data = Data(calibrate.declared(VEHICLE, ()), [flight(20.0), flight(20.0, name="other")])
+    data = Data(declared_study(VEHICLE, ()), [flight(20.0), flight(20.0, name="other")])
     blocks = whole_of(data)
     assert {i for i, _, _ in blocks.pieces} == {0, 1} and all(chosen.all() for _, _, chosen in blocks.pieces)
     assert whole_of(data) is blocks and problem_of(data, whole_of(data)) is problem_of(data, blocks)

@@ -12,7 +12,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
 from airtouch.gap.loop import command_spectra, controller, edge_response, identify, loop_model, noise_spectra, turning
 from airtouch.gap.naming import judging
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import terms
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import flights as simulated
@@ -37,7 +37,7 @@ def fly(scene, count, effects=(), seed=0):
 
 @pytest.fixture(scope="module")
 def study():
-    return calibrate.declared(VEHICLE, fly("paper-mixed", 6, seed=9))
+    return declared_study(VEHICLE, fly("paper-mixed", 6, seed=9))
 
 
 def held_out_gain(study, flights, name):

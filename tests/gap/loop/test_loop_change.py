@@ -11,7 +11,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap import diagnose, measure
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.edge_response import calm
-from airtouch.gap.nominal.calibrate import declared
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
 from airtouch.simulation import batch
@@ -49,7 +49,7 @@ def active_effects(name):
 
 @cache
 def nominal():
-    return declared(vehicles.load(VEHICLE), fly([], BASELINE))
+    return declared_study(vehicles.load(VEHICLE), fly([], BASELINE))
 
 
 @cache

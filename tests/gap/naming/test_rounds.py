@@ -9,7 +9,8 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, select
 from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, crossed
-from airtouch.gap.naming.rounds import HOPELESS, round_of
+from airtouch.gap.naming.looks import HOPELESS
+from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE
@@ -142,7 +143,7 @@ def test_a_wake_of_some_seconds_is_named_though_another_effect_is_likeliest_in_t
 
 
 def test_a_wind_that_comes_and_goes_is_named_only_if_it_is_likeliest_in_the_whole_flight(monkeypatch):
-    data, passing = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True), select._passing
-    monkeypatch.setattr(select, "_passing", lambda *arguments: replace(passing(*arguments), name="wind"))
+    data, passing = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True), select.passing_effect
+    monkeypatch.setattr(select, "passing_effect", lambda *arguments: replace(passing(*arguments), name="wind"))
     answer, _ = by_relations(monkeypatch, explained=False, likeliest="mass")
     assert select.select(data, candidates_of(["mass"])) is answer

@@ -8,14 +8,17 @@ import pytest
 from scipy.stats import t as student
 
 from airtouch.gap.answer.unexplained import fails
+from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.gates import TOLD, gated
-from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
-from airtouch.gap.naming import judging, rounds
-from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
+from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.naming import judging, looks, rounds
+from airtouch.gap.naming.contradiction import contradicted, losses
+from airtouch.gap.naming.forward import MOST_EFFECTS
+from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.selection import Judged, probabilities
+from airtouch.gap.passing.gates import TOLD, gated
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
@@ -127,7 +130,7 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
 
 def test_no_more_than_so_many_effects_are_named(monkeypatch):
     assert MOST_EFFECTS == 3
-    monkeypatch.setattr("airtouch.gap.naming.select.MOST_EFFECTS", 2)
+    monkeypatch.setattr("airtouch.gap.naming.forward.MOST_EFFECTS", 2)
     lost = np.random.default_rng(0).random(3000) < 0.1
     selection, _ = select_from([replace(hover(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
                                ("mass", "imu_noise", "packet_loss"))
@@ -180,7 +183,7 @@ def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
     gain = gated(Data(study, flights, slow=True))["downwash"].gain
-    monkeypatch.setattr("airtouch.gap.naming.select.height_gain", lambda *_: gain - less)
+    monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
     assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
 
 
@@ -219,7 +222,7 @@ def test_a_look_that_is_thorough_fits_what_promises_nothing():
     for thorough in (False, True):
         best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
         assert best["imu_noise"].full == thorough
-        assert best["imu_noise"].gain < rounds.HOPELESS and best["imu_noise"].strength[0] < 0.05
+        assert best["imu_noise"].gain < looks.HOPELESS and best["imu_noise"].strength[0] < 0.05
 
 
 def test_halves_share_no_block_and_leave_none_out():

@@ -10,7 +10,7 @@ from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import nameless, select
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
@@ -34,7 +34,7 @@ from hovers import (
 @pytest.fixture(scope="module")
 def flying():
     """A vehicle as declared with the loop of four nominal flights; no scatter."""
-    return calibrate.declared(VEHICLE, fly(4, 41))
+    return declared_study(VEHICLE, fly(4, 41))
 
 
 def gains(selection):

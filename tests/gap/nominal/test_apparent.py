@@ -1,9 +1,12 @@
 """Apparent strengths of effects in a simulated flight that has none."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent
+from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent, evenly_chosen, is_recorded
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from gap_flights import fly
@@ -27,3 +30,22 @@ def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
                 free += 1
                 assert error > 1e-4, name
     assert pressed >= 2 and free >= 2
+
+
+def flights(count, meta):
+    """Stand-ins that have a log's metadata alone."""
+    return [SimpleNamespace(log=SimpleNamespace(meta=meta), name=str(i)) for i in range(count)]
+
+
+@pytest.mark.parametrize(("count", "chosen"), [
+    (0, []), (1, []), (2, [0, 1]), (3, [0, 1, 2]), (5, [0, 1, 2, 4]), (40, [0, 13, 26, 39])])
+def test_strengths_are_measured_in_four_flights_evenly_chosen(count, chosen):
+    assert [int(f.name) for f in evenly_chosen(flights(count, {}))] == chosen
+
+
+@pytest.mark.parametrize(("meta", "recorded"), [
+    ({"format": "usd-2"}, True), ({"format": "authors-12"}, True), ({"format": "canonical"}, False), ({}, False),
+    ({"format": "canonical", "origin_format": "imrclab"}, True), ({"format": "simulated"}, False),
+    ({"format": "usdz"}, False)])
+def test_a_log_is_recorded_where_only_drones_write_its_format(meta, recorded):
+    assert is_recorded(flights(1, meta)[0]) == recorded

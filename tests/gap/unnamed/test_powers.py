@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import GROUPS
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.unnamed import generic, powers

@@ -9,8 +9,9 @@ from rich.table import Table
 from airtouch.gap.answer import words
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import CHANNEL_WORDS, interval, ratio, short
+from airtouch.gap.where.gap_map import interval, ratio, short
 
 MOST_CELLS = 16
 

@@ -11,7 +11,7 @@ from airtouch.gap import measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
@@ -87,7 +87,7 @@ def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], 
     flights = list(measure.usable(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = of(calibrate.declared(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
+    curves = of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
     return Pictures(curves.signal, curves.frequency_hz, curves.spectra, measurement.spectra)
 
 
@@ -158,7 +158,7 @@ def _spectra(study: Study, flights: Sequence[Flight], effects: Sequence[Term], c
     if not before:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > FEWEST_BLOCKS else
-                       sensor_power(calibrate.sensor_noise(study.vehicle), AIR), TINY)
+                       sensor_power(sensor_noise(study.vehicle), AIR), TINY)
     power, power_after = np.mean(before, axis=0), np.mean(after, axis=0)
     power_after = floor + np.abs(power_after - floor - random_power / len(before)) if random else power_after
     return tuple(Spectrum(name, CHANNELS[PLACE[name]].unit, power[:, PLACE[name]],

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
-from airtouch.gap.evidence.problem import GROUPS, Part
+from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared

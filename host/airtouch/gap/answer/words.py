@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
+from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio, short
+from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, ratio, short
 
 
 def answer(diagnosis: Diagnosis) -> str:

@@ -9,7 +9,7 @@ from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
 from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, hypotheses, pattern, reference
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where import summary
@@ -71,7 +71,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     headline = summary.headline(cells, bool(effects))
     made = GapMap(cells, BASELINE, tuple(f.name for f in flights))
     steps = advices.steps(verdict, effects, alike, headline, flights, True, vehicle.name)
-    study = calibrate.declared(vehicle, ())
+    study = declared_study(vehicle, ())
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), tuple(alike), cells,
         {"before": before, "after": after if verdict == "effect" else before, "floor": 1.0},

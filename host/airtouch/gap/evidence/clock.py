@@ -6,9 +6,13 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-LEAST_CLOCK_S = 2e-4  #: s, rms of a clock that nothing disturbs
+LEAST_CLOCK_S = 2e-4  #: s, rms of a clock that nothing disturbs; chosen
+#: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
+LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
+CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
 JITTER, LOSS = "time_jitter", "packet_loss"
 
 
@@ -19,7 +23,7 @@ def jitter(data: Data) -> tuple[float, float]:
     measured = max(float(np.std(clock)), 1e-9)
     if measured <= nominal:
         return 0.0, 0.0
-    n = len(clock) * PERIOD_S / 0.1  # arrival times are correlated over a tenth of a second
+    n = len(clock) * PERIOD_S / CORRELATION_S
     return float(np.sqrt(measured ** 2 - nominal ** 2)), float(
         0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal)))
 
@@ -27,7 +31,8 @@ def jitter(data: Data) -> tuple[float, float]:
 def loss(data: Data) -> tuple[float, float]:
     """Share of lost samples, and the log likelihood that it gains over the share in nominal flights."""
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
-    share, nominal = float(missing.mean()), max(data.study.floor.lost, 1e-3 if data.study.controller is None else 3e-4)
+    least = LEAST_LOST if data.study.controller is None else LEAST_LOST_OF_LOOP
+    share, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if share <= nominal:
         return share, 0.0
     n = len(missing) / 2.0
@@ -36,9 +41,14 @@ def loss(data: Data) -> tuple[float, float]:
 
 
 def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
-    """An effect on the logged times with its parameter as measured, and its gain."""
+    """An effect on the logged times with its parameter as measured, and its gain, nats."""
     measured, gain = jitter(data) if term.name == JITTER else loss(data)
     return term.fitted(np.array([measured / term.step(term.free[0])])), gain
+
+
+def clock_gains(data: Data, terms: Sequence[Term]) -> float:
+    """Log likelihood that those effects gain that act on the logged times, among others that do not."""
+    return sum(clock_gain(data, t)[1] for t in terms if t.kind == CLOCK)
 
 
 def clock_left(data: Data, named: Sequence[str]) -> float:

@@ -18,7 +18,8 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 SCALES_TORQUE = frozenset({"inertia"})  #: effects that only multiply torque, and would shrink any trim
-KEPT, KEPT_SAMPLES = 96, 20000  #: hypotheses whose spectra are cached, for flights of at most so many samples together
+#: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
+KEPT, KEPT_SAMPLES = 96, 20000
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,10 @@ class Study:
 class Data:
     """Flights with their blocks and the spectra of the gap before any effect is added.
 
-    slow: torque counts below the bins in which commands hold aliases only.
+    slow: torque counts below the bins in which commands hold aliases only. By flight, and the first two by regime:
+    first (blocks,): first sample of each block; base (blocks, bins, COUNT): spectra of the gap, unit/sqrt(Hz); turning
+    (blocks, bins, 3): those in the air of the measured angular acceleration; quiet (blocks, 3): blocks in the air and
+    axes in which no set-point stepped; bridging (blocks, bins, COUNT): power that lost rows add in the air.
     """
 
     study: Study
@@ -65,9 +69,9 @@ class Data:
     slow: bool = False
     first: list[dict[str, np.ndarray]] = field(default_factory=list)
     base: list[dict[str, np.ndarray]] = field(default_factory=list)
-    turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
-    quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
-    bridging: list[np.ndarray] = field(default_factory=list)  #: power that lost rows add to the blocks in the air
+    turning: list[np.ndarray] = field(default_factory=list)
+    quiet: list[np.ndarray] = field(default_factory=list)
+    bridging: list[np.ndarray] = field(default_factory=list)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -171,6 +175,7 @@ def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray
 
 def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], residuals: dict, active: Sequence[Active],
             ) -> dict[str, np.ndarray]:
+    """`_replayed` of one flight. first: of its blocks by regime; residuals: those of effects that always act, kept."""
     bridged = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), residuals)
     out = {}
     for r, begin in first.items():  # commands are the command view's: nothing is left of them here

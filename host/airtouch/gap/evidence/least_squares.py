@@ -40,9 +40,12 @@ def _normal(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, value
 def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
                  commands: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.
+    """A step that leaves parameters at a bound there when it would take them past it, and the covariance (k, k) of x.
 
-    damping: share of the normal matrix's diagonal that is added to it for the step.
+    columns (k + m, n): change of the values per parameter and offset; prior (k + m,): their standard deviations; values
+    (n,): the residual; weights (n,): `weights_of`; x (k,), offsets (m,): where the step begins; low, high (k,): bounds
+    of x; commands: gradient (k,) and information (k, k) of the likelihood from the power that parameters change;
+    damping: share of the normal matrix's diagonal that is added to it for the step. The step is (k + m,).
     """
     all_parameters, n = np.concatenate([x, offsets]), len(x)
     free = np.ones(len(all_parameters), bool)

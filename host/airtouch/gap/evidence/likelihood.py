@@ -1,10 +1,104 @@
-"""The sum that every likelihood is made of, compiled: one pass over the values, and one logarithm for many of them."""
+"""Likelihood of spectra of which some power is expected: Whittle's, with tails for a floor that is not known exactly.
+
+A value's power over the expected one is exponential when a hypothesis holds (Whittle 1953); since the floor is
+estimated from few flights, a Student-like tail stands in for it. The sum that every likelihood is made of is compiled:
+one pass over the values, and one logarithm for many of them.
+"""
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numba import boolean, float64, njit
+from scipy.optimize import brentq
+from scipy.special import exp1
 
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
+
+FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 _COLUMN = float64[::1]
 LEAST, MOST = 1e-100, 1e100  #: of a product of values before its logarithm is taken
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """Log likelihood of flattened values; only differences mean something.
+
+    power (n,): expected without random effects, unit^2/Hz; freedom, tail (n,): degrees of freedom and scale of the
+    tails; known (n,): values that count. `added` in its functions is the power (n,) that a hypothesis adds.
+    """
+
+    power: np.ndarray
+    freedom: np.ndarray
+    tail: np.ndarray
+    known: np.ndarray
+
+    def __call__(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """Log likelihood of values (n,)."""
+        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self._falls, self.known)
+
+    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+        """Log likelihood (n,) of each value, 0 for those that do not count."""
+        each = _each(squared(values), self.power + added, self.tail, self._falls)
+        each[~self.known] = 0.0
+        return each
+
+    def along(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
+        """Log likelihood as a function of x where others + x * unit is added; only what changes is computed anew.
+
+        size (n,): the values' squared size.
+        """
+        grows = (unit != 0.0) & self.known
+        rest = tailed(size, self.power + others, self.tail, self._falls, self.known & ~grows)
+        own = np.flatnonzero(grows)
+        power, tail, falls, known = (x[own] for x in (self.power + others, self.tail, self._falls, self.known))
+        own_size, own_unit = size[own], unit[own]
+
+        def at(x: float) -> float:
+            """Log likelihood at x."""
+            return -OVERLAP_WEIGHT * (rest + tailed(own_size, power + x * own_unit, tail, falls, known))
+
+        return at
+
+    def power_slopes(self, values: np.ndarray, added: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Slope and expected curvature (count,) against the expected power of each of the first `count` values."""
+        own = slice(count)
+        power = self.power[own] + added[own]
+        e = squared(values[own]) / power
+        share = OVERLAP_WEIGHT * self.known[own] / power
+        return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
+
+    @functools.cached_property
+    def _falls(self) -> np.ndarray:
+        """Power (n,) of the tails' fall."""
+        return self.freedom + 1.0
+
+
+def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, falls: np.ndarray) -> np.ndarray:
+    """Log likelihood (n,) of values of a squared size; in place of the power."""
+    tails = size / power
+    tails /= tail
+    np.log1p(tails, out=tails)
+    tails *= falls
+    np.log(power, out=power)
+    power += tails
+    power *= -OVERLAP_WEIGHT
+    return power
+
+
+def tail(freedom: np.ndarray) -> np.ndarray:
+    """Scale (n,) of tails whose likelihood is highest at the mean of exponential power.
+
+    E[(nu + 1) e / (tail + e)] = 1, where e is exponential and nu are the degrees of freedom (n,).
+    """
+    different, place = np.unique(freedom, return_inverse=True)
+    return np.array([_tail(nu) for nu in different])[place] if len(freedom) else freedom
+
+
+@functools.cache
+def _tail(nu: float) -> float:
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")

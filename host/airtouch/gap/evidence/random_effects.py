@@ -23,8 +23,10 @@ from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
-SEEDS = 4  #: runs of a random effect from which its power is estimated
-LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by
+SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen for time
+LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by; chosen
+RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
+LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
 SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
@@ -82,14 +84,22 @@ def _imu_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndar
         white[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
         if data.flights[i].rates is not None:
             gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
-            white[:, TORQUE] = _difference(r)[:, None] * gyro
+            white[:, TORQUE] = _torque_noise(data.study, r, _difference(r)[:, None] * gyro)
             white[:, RATE] = gyro
-            if r == AIR and r in data.study.floor.power:
-                floor = np.nan_to_num(data.study.floor.power[r][:, TORQUE])
-                beyond = _gyro_share(data.study) * np.maximum(floor - white[:, TORQUE], 0.0)
-                white[:, TORQUE] = np.minimum(white[:, TORQUE], floor) + beyond  # part of it the commands foretell
         out[r] = np.broadcast_to(extra * white, shape[r]).copy()
     return out
+
+
+def _torque_noise(study: Study, regime: str, gyro: np.ndarray) -> np.ndarray:
+    """PSD (bins, 3) of the torque from that of the gyro's differences: part of these the commands foretell in the air.
+
+    Only as much as the floor holds is seen, and of what the floor holds beyond it the gyro's share of the commands.
+    """
+    if regime != AIR or regime not in study.floor.power:
+        return gyro
+    floor = np.nan_to_num(study.floor.power[regime][:, TORQUE])
+    beyond = _gyro_share(study) * np.maximum(floor - gyro, 0.0)
+    return np.minimum(gyro, floor) + beyond
 
 
 def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
@@ -127,7 +137,7 @@ def _difference(regime: str) -> np.ndarray:
 
 
 def _motor_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
-    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing."""
+    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing, by regime."""
     flight, study = data.flights[i], data.study
     row = prepare(study.vehicle, study.calibration)[0][0]
     thrust = study.vehicle.thrust(flight.pwm)
@@ -138,17 +148,15 @@ def _motor_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.nd
     out = {}
     for r in shape:
         f = frequencies(r)
-        aliases = np.array([f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f])
+        aliases = np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
         density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
         folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
         folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
         power_of_blocks = np.zeros(shape[r])
-        for b, first in enumerate(data.first[i][r]):
-            size = (thrust[first:first + 256] ** 2).mean(axis=0)
+        for b, first in enumerate(data.first[i][r] if r == AIR else ()):  # at rest the rotors stand
+            size = (thrust[first:first + LENGTH[AIR]] ** 2).mean(axis=0)
             strength = rms ** 2 * (arms ** 2 @ size)
-            power_of_blocks[b, :, 2:6] = folded * strength
-        if r != "air":
-            power_of_blocks[:] = 0.0
+            power_of_blocks[b, :, LIFT_AND_TORQUE] = folded * strength
         out[r] = power_of_blocks
     return out
 

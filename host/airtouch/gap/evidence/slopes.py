@@ -8,8 +8,8 @@ from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects import Active
 
-STEP = 0.02  #: change of a scaled parameter over which slopes are taken
-FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
+STEP = 0.02  #: change of a scaled parameter over which slopes are taken; chosen
+FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew; chosen
 
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
@@ -24,15 +24,20 @@ def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
 
 
 class Slopes:
-    """First-order changes of the spectra by the mean effects' parameters, taken anew only where a fit has moved far."""
+    """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
+
+    at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;
+    rises (bins, axes): of the logarithm of the commands' power; powers (own,): of the floor of the torque; bent:
+    whether it changes the loop, in which nothing is linear. high (k,): largest parameters.
+    """
 
     def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
         self.problem, self.mean, self.high = problem, mean, high
         size = sum(len(t.free) for t in mean)
-        self.at = np.full(size, np.inf)  #: scaled parameters (k,) at which they were taken
+        self.at = np.full(size, np.inf)
         self.columns = [np.zeros(0)] * size
         self.rises, self.powers = [np.zeros(0)] * size, [np.zeros(0)] * size
-        self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
+        self.bent = np.ones(size, bool)
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
         """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or if anew."""
@@ -63,7 +68,8 @@ class Slopes:
         gradient, information = problem.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
         powers = np.array(self.powers)
         if powers.any():
-            push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
+            push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
+                                                              problem.own)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.likelihood import tailed
+from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.simulation import replay
@@ -25,12 +25,12 @@ from airtouch.simulation.plant import hover_speed
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
 WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one; chosen
 SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place, tried one by one; chosen
-KNOWN_SPEED = 0.02  #: relative error of a rotor's speed where the vehicle declares thrust over speed squared
+#: relative error of a rotor's speed where the vehicle declares thrust over speed squared; chosen
+KNOWN_SPEED = 0.02
 RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
-LOWEST_HZ = 3.0  #: below it forces of other origin are strong
-STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power over the floor's
-MOST_BLOCKS = 40  #: on which the place is looked for
-FREEDOM = 12.0  #: of the tails of a block's power, as in `problem`
+LOWEST_HZ = 3.0  #: below it forces of other origin are strong; chosen
+STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
+MOST_BLOCKS = 40  #: blocks in which the place of lines is looked for; chosen for time
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,7 @@ def speeds(flight: Flight, study: Study) -> np.ndarray:
 
 
 def _search(data: Data) -> Lines:
+    """The place and spread of the lines that explain some blocks of all flights best: on a coarse grid, then a fine."""
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
     each = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
@@ -125,6 +126,7 @@ class _Sample:
 
 
 def _judged() -> np.ndarray:
+    """Bins (bins,) in which lines are looked for."""
     f = np.fft.rfftfreq(BINS, PERIOD_S)
     return (f >= LOWEST_HZ) & (f < f[-1])
 

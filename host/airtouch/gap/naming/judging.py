@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import clock_gain
+from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import Fit, fit, judge
+from airtouch.gap.evidence.fit import Fit, cell_gains, fit, judge
 from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.screen import Screen
 from airtouch.gap.naming.selection import Hypothesis, Judged
@@ -20,19 +20,23 @@ from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s; chosen
+HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
 #: nats of held-out data that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap.md)
 LEAST_GAIN = 12.0
-FIRST_GAIN = 8.0  #: the same for the first effect, against a floor from nominal flights; chosen
+#: the same for the first effect, against a floor from nominal flights; chosen, after 6 nats had given 4 false alarms on
+#: 46 flights of a fresh set (2026-11-21)
+FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
-STRETCHED = 0.999  #: of a parameter's bound, from which it is at it
+STRETCHED = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
 ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What hypotheses are judged on: flights, their two halves, the log likelihood (2, 2) of no effect on each half, as
+    """What hypotheses are judged on.
 
-    sure of the commands' floor as without and with random effects, and what the first look has made so far.
+    parts: the two halves of the flights; base: log likelihood (2, 2) of no effect, as sure of the commands' floor as
+    without and with random effects, on each half; screen: what the first look has made so far.
     """
 
     data: Data
@@ -48,19 +52,18 @@ def trial_of(data: Data) -> Trial:
 
 
 def halves(data: Data) -> tuple[Part, Part]:
-    """Two halves: by flight where there are four or more, else alternating groups of blocks."""
+    """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     first, second = [], []
-    for i, f in enumerate(data.first):
-        for regime in (AIR, REST):
-            n = len(f[regime])
-            if not n:
-                continue
-            if len(data.flights) >= 4:
-                (first if i % 2 == 0 else second).append((i, regime, np.ones(n, bool)))
-            else:
-                even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
-                first.append((i, regime, even))
-                second.append((i, regime, ~even))
+    numbers = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
+    for i, regime, n in numbers:
+        if not n:
+            continue
+        if len(data.flights) >= HALVED_BY_FLIGHT:
+            (second if i % 2 else first).append((i, regime, np.ones(n, bool)))
+        else:
+            even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
+            first.append((i, regime, even))
+            second.append((i, regime, ~even))
     return Part(tuple(first)), Part(tuple(second))
 
 
@@ -71,60 +74,73 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
 
 
 def price_of(terms: Sequence[Term]) -> float:
-    """Held-out log likelihood that parameters beyond an effect's first must earn."""
+    """Held-out nats that parameters beyond an effect's first must earn."""
     return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
 def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
-    """Fit on each half, judge on the other; choice: what the choice of this variant costs.
+    """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
-    Beside a random effect the commands' floor is less certain, so what is chosen already gains less than it did; the
-    newcomer is not charged with that.
+    name, terms: the effect, and its variant; choice: nats that the choice among its variants costs. Its gain is that of
+    all effects over none, less what their parameters and the choice of their variants cost. Effects that are seen in
+    the commands alone gain less beside the first random one; it is not charged with that (`_gained_while_certain`).
     """
     held = chosen.terms if chosen else ()
-    joint = (*held, *terms)
-    timed = [t for t in terms if t.kind == CLOCK]
     paid = choice + (chosen.choice if chosen else 0.0)
-    beyond = chosen.beyond if chosen else 0.0
-    wider = 0.0
-    if chosen and chosen.fits and not random_of(held) and random_of(terms):
-        wider = sum(gain_of(on, test, chosen.fits[train].terms) - gain_of(on, test, chosen.fits[train].terms, True)
-                    for train, test in ROUND_TRIP)
-    gain, fits = 0.0, []
-    if chosen and not [t for t in terms if t.kind != CLOCK]:
-        gain, fits = chosen.gain, list(chosen.fits)
+    beyond = (chosen.beyond if chosen else 0.0) + _gained_while_certain(on, terms, chosen)
+    if chosen and all(t.kind == CLOCK for t in terms):  # nothing changes in the spectra
+        gain, fits = chosen.gain, chosen.fits
     else:
-        others = [t for t in joint if t.kind != CLOCK]
-        gain += sum(clock_gain(on.data, t)[1] for t in held if t.kind == CLOCK)
+        spectral = [t for t in (*held, *terms) if t.kind != CLOCK]
+        fits = tuple(_fit_on(on, half, spectral, chosen) for half in (0, 1))
+        gain = clock_gains(on.data, held)
         for train, test in ROUND_TRIP:
-            part = on.parts[train]
-            refined = _refined(on.data, part, fit(on.data, part, others, _start(chosen, others, train)))
-            gain += gain_of(on, test, refined.terms) if others else 0.0
-            fits.append(refined)
-        gain += beyond + wider - price_of(refined.terms if others else ()) - paid
-    fitted = list(fits[0].terms) if fits else []
-    for t in (t for t in joint if t.kind == CLOCK):
-        on_clock, clock_nats = clock_gain(on.data, t)
-        fitted.append(on_clock)
-        gain += clock_nats if t in timed else 0.0
+            gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
+        gain += beyond - price_of(fits[-1].terms) - paid
+    of_clock = [clock_gain(on.data, t)[0] for t in (*held, *terms) if t.kind == CLOCK]
+    fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, covariance=covariance,
-                  apart=apart, beyond=beyond + wider)
+    return Judged(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
+                  covariance=covariance, apart=apart, beyond=beyond)
+
+
+def _gained_while_certain(on: Trial, terms: Hypothesis, chosen: Judged | None) -> float:
+    """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
+
+    Beside a random effect the commands' floor is less certain.
+    """
+    if chosen is None or not chosen.fits or random_of(chosen.terms) or not random_of(terms):
+        return 0.0
+    return sum(gain_of(on, test, chosen.fits[train].terms) - gain_of(on, test, chosen.fits[train].terms, True)
+               for train, test in ROUND_TRIP)
+
+
+def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Judged | None) -> Fit:
+    """Effects fitted on a half, from where those that are chosen were found there."""
+    part = on.parts[half]
+    return _refined(on.data, part, fit(on.data, part, terms, _start(chosen, terms, half)))
 
 
 def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
-    """Log likelihood that fitted effects add on a half, over no effect as sure of the commands' floor.
+    """Nats that fitted effects add on a half, over no effect as sure of the commands' floor.
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
     return judge(on.data, on.parts[half], terms, wide) - on.base[wide or bool(random_of(terms))][half]
 
 
-def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scaled parameters (k,) of a term as fitted, the mean of both halves; covariance (k, k), 0 but for mean effects;
+def held_out_cell_gains(on: Trial, hypothesis: Judged) -> np.ndarray:
+    """Nats (GROUPS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
+    return np.sum([cell_gains(on.data, on.parts[test], hypothesis.fits[train].terms) for train, test in ROUND_TRIP],
+                  axis=0)
 
-    half of what the halves differ by (k,). k: of all parameters that the effect may have free; those that this variant
-    leaves alone are 0, and nobody knows how far they lie from it.
+
+def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Strength, covariance and difference between the halves of the scaled parameters of one term of a hypothesis.
+
+    strength (k,): the mean of both halves; covariance (k, k): 0 but for mean effects; difference (k,): half of what the
+    halves differ by. k: of all parameters that the effect may have free; those that this variant leaves alone are 0,
+    and nobody knows how far they lie from it. fitted: the hypothesis' terms; fits: those of its spectra on each half.
     """
     hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
     same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
@@ -141,7 +157,10 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
 
 
 def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
-    """Covariance of all parameters that an effect may have free, from that of a term's own; infinite for the others."""
+    """Covariance (n, n) of all parameters that an effect may have free, from that of a term's own (k, k).
+
+    It is infinite for the others.
+    """
     place = term.among_all(np.arange(len(term.free)), -1).astype(int)
     own = np.flatnonzero(place >= 0)
     out = np.diag(np.full(len(place), np.inf))
@@ -162,10 +181,10 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
     return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
 
 
-def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
-    """The parameters found before, NaN for those of the new effects; None where nothing was found."""
+def _start(chosen: Judged | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+    """The scaled parameters (k,) found on a half before, NaN for those of the new effects; None where none were."""
     if chosen is None or not chosen.fits:
         return None
-    known = chosen.fits[train].scaled
+    known = chosen.fits[half].scaled
     size = sum(len(t.free) for t in terms if t.kind == MEAN)
     return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -32,7 +32,7 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Ma
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
-    alone: every candidate judged alone.
+    candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
     """
     steps: list[Judged] = []
     for effect in dict.fromkeys(of.effect for of in inference.classes):
@@ -42,8 +42,8 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Ma
         if effect in judged:
             steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
     return Selection(alone, tuple(steps), inference.nameless_alone, inference.unexplained, on.parts,
-                     dict.fromkeys(alone, FIRST_GAIN), on.data.study.nominal, False, 0.0, True, True,
-                     inference=inference)
+                     dict.fromkeys(alone, FIRST_GAIN), on.data.study.nominal, assumed=False, nominal_gain=0.0,
+                     simulated=True, same_models=True, inference=inference)
 
 
 def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, spectra
-from airtouch.gap.evidence.fit import strongest
+from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import Part, Problem, problem_of
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY
@@ -19,19 +19,23 @@ from airtouch.gap.signatures.term import Term
 
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken; chosen
 ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen
-NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none
+NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none; chosen, far above rounding
+UNBOUNDED = 1e6  #: scaled parameter up to which the effects beside may give way: any
 
 
 @dataclass
 class Screen:
-    """Changes of the spectra by effect and parameter, made when first asked for."""
+    """Changes of the spectra by effect and parameter, made when first asked for.
+
+    judged: by the identity of an array of residuals, that array with the results of `before`.
+    """
 
     data: Data
     judged: dict[int, tuple[np.ndarray, float, float]] = field(default_factory=dict)
 
     def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
-        """Change of the flattened spectra per scaled parameter i of a term at neutral."""
-        gathered = problem._gather(self._change(term, i))
+        """Change (n,) of the flattened spectra per scaled parameter i of a term at neutral."""
+        gathered = problem.layout.gather(self._change(term, i))
         return np.where(problem.known, problem.with_commands(gathered), 0.0)
 
     def _change(self, term: Term, i: int) -> list[dict[str, np.ndarray]]:
@@ -57,7 +61,7 @@ class Screen:
                    for flight in self._change(term, i) for v in flight.values())
 
     def before(self, problem: Problem, residuals: np.ndarray, extra_power: np.ndarray) -> tuple[float, float]:
-        """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""
+        """Log likelihood of residuals (n,), offsets taken off, and nats that these cost; once for each array."""
         known = self.judged.get(id(residuals))
         if known is None or known[0] is not residuals:
             values, cost = without_offsets(problem, residuals, extra_power)
@@ -68,49 +72,63 @@ class Screen:
 def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
                 extra_power: Sequence[np.ndarray], terms: Sequence[Term],
                 beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray], list[np.ndarray]]:
-    """Held-out gain of mean effects to first order, their scaled parameters on each half, and the variances of these.
+    """Held-out gain of mean effects to first order, nats, their scaled parameters (k,) on each half, and the variances.
 
-    residuals, extra_power: for each part what the effects chosen before leave, and the power that
-    random ones add. beside: those effects, free to give way a little.
+    residuals, extra_power: for each part the flattened values (n,) that the effects chosen before leave, and the power
+    (n,) that random ones add. beside: those effects, free to give way a little.
     """
-    mean = [t for t in terms if t.kind == MEAN and t.name not in COMMAND_ONLY]
-    other = [t for t in beside if t.kind == MEAN and t.name not in COMMAND_ONLY]
-    gain, found, variances = 0.0, [], []
-    tables = []
-    for part in parts:
-        problem = problem_of(screen.data, part)
-        tables.append([screen.column(problem, t, i) for t in (*mean, *other) for i in range(len(t.free))])
+    mean, other = ([t for t in some if t.kind == MEAN and t.name not in COMMAND_ONLY] for some in (terms, beside))
+    tables = [_columns(screen, part, (*mean, *other)) for part in parts]
     n = sum(len(t.free) for t in mean)
-    low, high = limits(mean) if mean else (np.zeros(0), np.zeros(0))
-    wide = np.full(len(tables[0]) - n, 1e6)
-    low, high = np.concatenate([low, -wide]), np.concatenate([high, wide])
+    bounds = _bounds(mean, len(tables[0]) - n)
+    gain, found, variances = 0.0, [], []
     for train, test in ((0, 1), (1, 0)):
         problem = problem_of(screen.data, parts[train])
-        constants = problem.constant()
-        columns = np.array([*tables[train], *(-c for c, _ in constants)])
-        prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
-        x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))
-        nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
-        values = residuals[train]
-        for _ in range(ROUNDS):
-            change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, extra_power[train]),
-                                      x, offsets, low, high, nothing)
-            x = np.clip(x + change[:len(x)], low, high)
-            offsets = offsets + change[len(x):]
-            values = residuals[train] + np.concatenate([x, offsets]) @ columns
+        x, variance = _least_squares(problem, tables[train], residuals[train], extra_power[train], bounds)
         problem = problem_of(screen.data, parts[test])
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(residuals[test])))
         after, cost = without_offsets(problem, residuals[test] + moved, extra_power[test])
         before, paid = screen.before(problem, residuals[test], extra_power[test])
         gain += problem.likelihood(after, extra_power[test]) - cost - before + paid
         found.append(x[:n])
-        variances.append(np.diag(covariance)[:n])
+        variances.append(variance[:n])
     return gain, found, variances
+
+
+def _columns(screen: Screen, part: Part, terms: Sequence[Term]) -> list[np.ndarray]:
+    """Change (n,) of the flattened spectra of a part per scaled parameter, for all free parameters of some terms."""
+    problem = problem_of(screen.data, part)
+    return [screen.column(problem, t, i) for t in terms for i in range(len(t.free))]
+
+
+def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest scaled parameters of mean effects, followed by so many that are free."""
+    low, high = limits(mean)
+    wide = np.full(others, UNBOUNDED)
+    return np.concatenate([low, -wide]), np.concatenate([high, wide])
+
+
+def _least_squares(problem: Problem, table: Sequence[np.ndarray], residual: np.ndarray, extra_power: np.ndarray,
+                   bounds: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled parameters (k,) whose changes (n,) of a table explain a residual (n,) best, and their variances (k,)."""
+    size, constants = len(table), problem.unit_offsets
+    columns = np.array([*table, *(-c for c, _ in constants)])
+    prior = np.concatenate([np.full(size, PRIOR_UNITS), [deviation for _, deviation in constants]])
+    x, offsets = np.zeros(size), np.zeros(len(constants))
+    nothing = (np.zeros(size), np.zeros((size, size)))
+    values = residual
+    for _ in range(ROUNDS):
+        change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, extra_power),
+                                          x, offsets, *bounds, nothing)
+        x = np.clip(x + change[:size], *bounds)
+        offsets = offsets + change[size:]
+        values = residual + np.concatenate([x, offsets]) @ columns
+    return x, np.diag(covariance)
 
 
 def random_look(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
                 extra_power: Sequence[np.ndarray], term: Term) -> tuple[float, np.ndarray]:
-    """Held-out gain of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,).
+    """Held-out nats of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,).
 
     residuals, extra_power: as for `first_order`.
     """

@@ -11,26 +11,29 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Term
 
-#: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
+#: nats that a nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
+#: floor, and where none did; both chosen (host/docs/gap.md, "What `unknown` means")
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
-#: the loop in recorded flights, since its spectrum is assumed, not measured
+#: the loop in recorded flights, since its spectrum is assumed, not measured; both chosen
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
 SAME_MODELS = 0.5  #: of these in flights of this project's simulator: twice what right names left there, 78 flights
-TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
-BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
-BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
-Hypothesis = tuple[Term, ...]
+TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves; chosen
+BEHIND = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
+#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as BEHIND
+BELOW = 0.9
+Hypothesis = tuple[Term, ...]  #: terms that act together
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves.
+    """A hypothesis with its gain over no effect, held-out nats, and its fits of both halves.
 
-    strength: scaled parameters (k,) of its newest effect, the mean of both halves; covariance: (k, k) of those of a
-    mean effect, by chance; apart: half of what the halves differ by (k,). evidence: what that effect gains over the
-    hypothesis before, and no more than its strength says beyond the scatter of nominal flights. named: whether that is
-    enough; if not, it is a deviation that nominal flights have as well, and stands beside the effects that are named.
+    name: its newest effect; terms: all of them, with their values. strength: scaled parameters (k,) of the newest
+    effect, the mean of both halves; covariance (k, k): of those of a mean effect, by chance; apart (k,): half of what
+    the halves differ by. evidence: nats that that effect gains over the hypothesis before, and no more than its
+    strength says beyond the scatter of nominal flights. named: whether that is enough; if not, it is a deviation that
+    nominal flights have as well, and stands beside the effects that are named.
     """
 
     name: str
@@ -38,8 +41,8 @@ class Judged:
     gain: float
     fits: tuple[Fit, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
-    choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
-    #: of the gain, what effects before the first random one gained while the commands' floor was more certain
+    choice: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
+    #: nats of the gain that effects before the first random one gained while the commands' floor was more certain
     beyond: float = 0.0
     strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -47,7 +50,7 @@ class Judged:
     evidence: float = 0.0
     named: bool = True
     key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is held against
-    share: float = np.inf  #: where several effects are named: gain over the hypothesis of the others alone
+    share: float = np.inf  #: where several effects are named: nats over the hypothesis of the others alone
 
     @property
     def variance(self) -> np.ndarray:
@@ -65,12 +68,12 @@ class Judged:
 
 @dataclass(frozen=True)
 class Selection:
-    """singles: the best variant of every candidate; steps: effects added one after another;
+    """What a selection of effects found; gains are in held-out nats.
 
-    free_before, free_after: gain of the nameless model over no effect and over the last step; of_times: of the
-    latter, what the logged times hold; contradicted: log likelihood that the effects named lose in cells where they
-    say what the flights do not show, and the worst of these cells;
-    parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
+    singles: the best variant of every candidate; steps: effects added one after another. free_before, free_after: gain
+    of the nameless model over no effect and over the last step; of_times: of the latter, what the logged times hold;
+    contradicted: what the effects named lose in cells where they say what the flights do not show, and the worst of
+    these cells. parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
     assumed: whether a chosen effect is random, or changes the loop in recorded flights.
     """
 
@@ -150,50 +153,65 @@ class Selection:
         return self.unlike < 1.0
 
 
-def _against_none(gain: float, least: float, many: int = 1) -> float:
-    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
-
-    gain: the evidence, over `none` and over what nominal flights show.
-    """
-    if gain < least:
-        return TEMPERATURE * (gain - least - np.log(many))
-    return gain - least
-
-
-def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
-    """Score of every single candidate beside 0 for `none`; those that could be named keep the order of their gains."""
-    singles, least = selection.singles, selection.least
-    out = {n: _against_none(singles[n].evidence, least[n], len(names)) for n in names}
-    if selection.named and selection.named[0].name in names:
-        first = selection.named[0]
-        for n in names:
-            if out[n] >= 0.0:
-                behind = max(singles[first.name].gain - singles[n].gain, BEHIND) if n != first.name else 0.0
-                out[n] = max(out[first.name] - behind, -TEMPERATURE)
-    return [out[n] for n in names]
-
-
 def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
     """Of every single candidate, `none` and `unknown`; they sum to 1.
 
     at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
 
-    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square.
+    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
+    effect or `none` is the answer it stays below that.
     """
     names = list(selection.singles)
-    if selection.inference is not None:
-        alone = selection.inference.probabilities()
-        weight = np.array([alone[n] for n in (*names, "none")])
-    else:
-        score = np.array([*_scores(selection, names), 0.0])
-        weight = np.exp((score - score.max()) / TEMPERATURE)
+    weight = _weights(selection, names)
+    share = weight / weight.sum()
     odds = selection.unlike ** 2
     unknown = odds / (1.0 + odds)
-    if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
-        share = weight[names.index(selection.named[0].name)] / weight.sum()
-        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
+    if selection.chosen is not None and selection.explained:
+        unknown = _below(unknown, share[names.index(selection.named[0].name)])
     if at_floor:
-        share = weight[-1] / weight.sum()
-        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
+        unknown = _below(unknown, share[-1])
     known = (1.0 - unknown) * weight / weight.sum()
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
+
+
+def _below(unknown: float, share: float) -> float:
+    """Probability of `unknown`, BELOW that of an answer at most, which has this share of all others."""
+    return min(unknown, BELOW * share / (1.0 + BELOW * share))
+
+
+def _weights(selection: Selection, names: Sequence[str]) -> np.ndarray:
+    """Weight (k + 1,) of each of k candidates, and of `none`, beside one another."""
+    if selection.inference is not None:
+        alone = selection.inference.probabilities()
+        return np.array([alone[n] for n in (*names, "none")])
+    score = np.array([*_scores(selection, names), 0.0])
+    return np.exp((score - score.max()) / TEMPERATURE)
+
+
+def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
+    """Score of every single candidate beside 0 for `none`, nats; those that could be named keep the order of gains.
+
+    The first effect named leads them by BEHIND at least.
+    """
+    singles = selection.singles
+    out = [_against_none(singles[n].evidence, selection.least[n], len(names)) for n in names]
+    if not selection.named or selection.named[0].name not in names:
+        return out
+    first = names.index(selection.named[0].name)
+
+    def beside_first(i: int) -> float:
+        """Score of a candidate that could be named, or of the first effect itself."""
+        behind = max(singles[names[first]].gain - singles[names[i]].gain, BEHIND) if i != first else 0.0
+        return max(out[first] - behind, -TEMPERATURE)
+
+    return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
+
+
+def _against_none(gain: float, least: float, many: int = 1) -> float:
+    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
+
+    gain: the evidence, nats, over `none` and over what nominal flights show; least: what is needed.
+    """
+    if gain < least:
+        return TEMPERATURE * (gain - least - np.log(many))
+    return gain - least

@@ -1,23 +1,41 @@
-"""How strong every effect seems to be in a nominal flight, held against others: what the yardstick is made of."""
+"""How strong every effect seems to be in nominal flights, which have none: the scatter that others must exceed."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import strength_variance
-from airtouch.gap.evidence.gates import gated
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
+from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.select import nameless, seconds
+from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Judged
+from airtouch.gap.passing.gates import gated
+from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
-from airtouch.gap.signatures.nominal_scatter import Apparent, size_of
+from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, size_of
+from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
+from airtouch.gap.signatures.term import Term
 
+FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more adds time, and the table knows the rest
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
+#: formats of logs, up to the first "-", that only a vehicle or its ground station writes, never a simulator
+RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
+
+
+def nominal_scatter(study: Study, flights: Sequence[Flight], without: Sequence[str] = ()) -> Scatter:
+    """How far the apparent strengths of every effect but those of `without` scatter among the nominal flights.
+
+    It is measured in FLIGHTS of them, each held against the study of all.
+    """
+    return scatter_of(shared(partial(_apparent_in, study, without), evenly_chosen(flights)),
+                      any(is_recorded(f) for f in flights), study.vehicle.name)
 
 
 def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
@@ -32,16 +50,38 @@ def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
                      for n in GATED})
 
 
+def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
+    """At most FLIGHTS of the flights, evenly spaced; none where there is only one, which shows no scatter."""
+    if len(flights) < 2:
+        return []
+    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, FLIGHTS).astype(int))]
+
+
+def is_recorded(flight: Flight) -> bool:
+    """Whether the format of the flight's log, or of the log that it was converted from, is one of RECORDERS."""
+    return any(str(flight.log.meta.get(key, "")).split("-")[0] in RECORDERS for key in ("format", "origin_format"))
+
+
+def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Apparent:
+    """The apparent strengths of one nominal flight."""
+    return apparent(Data(study, [flight]), without)
+
+
 def _error(data: Data, judged: Judged) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
     term = strength_term(judged.terms)
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
-    if term.kind != SPECTRUM:
-        low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
-        pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
-        return np.where(at_bound(term, judged.strength) | pressed, NOBODY_KNOWS,
-                        np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
+    if term.kind == SPECTRUM:
+        return _error_of_random(data, judged, term)
+    low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
+    pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
+    return np.where(at_bound(term, judged.strength) | pressed, NOBODY_KNOWS,
+                    np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
+
+
+def _error_of_random(data: Data, judged: Judged, term: Term) -> np.ndarray:
+    """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]

@@ -38,6 +38,14 @@ CHANNELS = (
     Channel("command_thrust", "N", 0.6, 30.0),
     *(Channel(f"command_{a}", "N", 0.6, 30.0) for a in ("roll", "pitch", "yaw")),
 )
+#: each channel as a phrase, for notes, tables and pages
+CHANNEL_WORDS = {
+    "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",
+    "torque_x": "roll torque", "torque_y": "pitch torque", "torque_z": "yaw torque",
+    "rate_x": "roll rate", "rate_y": "pitch rate", "rate_z": "yaw rate",
+    "command_thrust": "thrust command", "command_roll": "roll command",
+    "command_pitch": "pitch command", "command_yaw": "yaw command",
+}
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
 KEPT = 12  #: residuals of one flight that are cached for gates to be put together from

@@ -34,7 +34,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
 
 
 def gated(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
-    """The variants of effects that may come and go, by name; `evidence.gates` sets their gates."""
+    """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
     without, out = set(without), {}
     for name in GATED:
         if name in EFFECTS and name not in without:

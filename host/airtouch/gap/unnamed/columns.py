@@ -10,8 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from airtouch.gap.evidence.cells import BANDS_HZ, GROUPS
 from airtouch.gap.evidence.data import Data, commanded
-from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem
+from airtouch.gap.evidence.problem import Part, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
@@ -77,7 +78,7 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
         for f in np.unique(flight):
             here = known[elements] & (flight[elements] == f)
             own = elements[here]
-            offsets = [(x[own], p) for x, p in problem.constant() if np.any(x[own])]
+            offsets = [(x[own], p) for x, p in problem.unit_offsets if np.any(x[own])]
             if len(own):
                 out.append(Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
                                  np.array([p for _, p in offsets])))
@@ -124,7 +125,7 @@ def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray
         if channel in ROLL_PITCH:
             loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
             columns = np.concatenate([columns, loop], axis=2)
-        rows.append(columns[:, problem.keep[r][:, channel]].reshape(-1, columns.shape[2]))
+        rows.append(columns[:, problem.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
 
 

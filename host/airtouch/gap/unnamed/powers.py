@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.problem import GROUPS
+from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor

@@ -16,7 +16,7 @@ from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import frequencies
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
@@ -28,13 +28,6 @@ from airtouch.logs.segments import KINDS
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause
 TINY = 1e-12  #: denominator at least, in a channel's unit: no rms over a floor of 0 is infinite
 
-CHANNEL_WORDS = {
-    "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",
-    "torque_x": "roll torque", "torque_y": "pitch torque", "torque_z": "yaw torque",
-    "rate_x": "roll rate", "rate_y": "pitch rate", "rate_z": "yaw rate",
-    "command_thrust": "thrust command", "command_roll": "roll command",
-    "command_pitch": "pitch command", "command_yaw": "yaw command",
-}
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
                "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
 

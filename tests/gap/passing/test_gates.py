@@ -7,13 +7,13 @@ import pytest
 
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.diagnose import brief
-from airtouch.gap.evidence import gates
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.naming.select import select
+from airtouch.gap.passing import gates, stretches
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
@@ -167,7 +167,7 @@ def test_words_say_when_and_what_is_open():
 
 
 def test_nothing_comes_and_goes_in_take_off_and_landing(study, nominal_flight):
-    ends = np.isin(nominal_flight.phase, gates.ENDS)
+    ends = np.isin(nominal_flight.phase, stretches.ENDS)
     assert ends.sum() * flight.PERIOD_S > 1.0
     force = nominal_flight.acceleration.copy()
     force[ends, 2] -= 0.1 * VEHICLE.gravity_mps2

@@ -10,10 +10,10 @@ import gap_real
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.passing import gates, overhead
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog

@@ -12,20 +12,23 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.gates import TOLD, Gate, within
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.passing.gates import TOLD, within
+from airtouch.gap.passing.stretches import Gate
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
 
 PLACE = ("x_m", "y_m", "z_m")
-#: where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
+#: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-APART_S = 0.1  #: stretches with less between them are one; like those below it was chosen
-LEAST_S = 0.05  #: shorter ones are none
-SHIFTS = 8  #: of the told seconds around the rest of the flight
-MARGIN_S = 0.25  #: around the told seconds, in which a wake may already or still act
+#: the rule by which told seconds are held against the rest of a flight was chosen among seven on recorded flights
+#: (host/docs/looks.md, 2026-11-25 04:11); of the numbers below none has a source of its own, all were chosen
+APART_S = 0.1  #: s, stretches with less between them are one
+LEAST_S = 0.05  #: s, shorter ones are none
+SHIFTS = 8  #: places of the told seconds around the rest of the flight
+MARGIN_S = 0.25  #: s around the told seconds, in which a wake may already or still act
 LEAST_SHARE = 0.5  #: of the told seconds that shifted ones must hold
 
 

@@ -1,0 +1,45 @@
+"""Cells of flattened spectra: each is one channel in one band of frequencies of one view.
+
+A cell's number is VIEW times the number of its view, plus COUNT times that of its band, plus that of its channel.
+"""
+
+import numpy as np
+
+from airtouch.gap.signals.channels import CHANNELS, COUNT
+
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell: about octaves; no other source
+REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: numbers of the views: in the air, on the ground, of the commands
+VIEW = 1000  #: numbers that are kept for the cells of a view
+GROUPS = 3 * VIEW  #: numbers of cells are below it
+AXES = 3  #: channels of one sensor (x, y and z), whose numbers follow one another
+
+
+def cell_numbers(view: int, band: np.ndarray, channel: np.ndarray) -> np.ndarray:
+    """Numbers of the cells of bands and channels, two arrays of integers that broadcast together.
+
+    Bands count from 0, those of the command view from 1.
+    """
+    return band * COUNT + channel + VIEW * view
+
+
+def channel_cells() -> np.ndarray:
+    """For each cell (GROUPS,) the number that stands for its view and channel, all bands together."""
+    cell = np.arange(GROUPS)
+    return cell - cell % VIEW + cell % VIEW % COUNT
+
+
+def sensor_cells() -> np.ndarray:
+    """For each cell (GROUPS,) the number of the first cell of its sensor, in the same view and band.
+
+    A sensor has AXES channels; of the commands thrust, roll and pitch count as one, yaw as another.
+    """
+    cell = np.arange(GROUPS)
+    return cell - cell % VIEW % COUNT % AXES
+
+
+def cell_words(cell: int) -> str:
+    """A cell in words: channel, band, and whether at rest."""
+    view, place = divmod(cell, VIEW)
+    band, channel = divmod(place, COUNT)
+    low, high = BANDS_HZ[max(band - (view == COMMAND_VIEW), 0):][:2]
+    return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"

@@ -1,0 +1,144 @@
+"""Fit of mean effects by Gauss-Newton on the whitened spectra, the offsets between flights beside them."""
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of
+from airtouch.gap.evidence.problem import LOOP, Problem
+from airtouch.gap.evidence.slopes import Slopes, active_at
+from airtouch.gap.signatures.term import Term
+
+ITERATIONS = 8  #: steps at most; chosen
+ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
+TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
+#: damping after a step that failed; factor on it after a step that gained; both chosen
+LEAST_DAMPING, CALMED = 0.01, 0.1
+COMMAND_PRIOR = 1.5  #: standard deviation, natural steps, of parameters of effects that only the commands show; chosen
+CLOSE = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
+#: scaled parameters from which effects of the loop may start; chosen
+GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
+
+
+class MeanFit(NamedTuple):
+    """Scaled parameters x (k,) with their covariance (k, k), offsets (m,) of flights, and the residual (n,)."""
+
+    x: np.ndarray
+    offsets: np.ndarray
+    covariance: np.ndarray
+    values: np.ndarray
+
+
+class _State(NamedTuple):
+    """Where a fit stands: parameters, offsets, residual (n,), power (n,) over the floor, minus the log posterior."""
+
+    x: np.ndarray
+    offsets: np.ndarray
+    values: np.ndarray
+    power: np.ndarray
+    cost: float
+
+
+class _Posterior:
+    """Posterior of mean effects' parameters beside random effects that stay as they are.
+
+    added (n,): power of the random effects; wide: whether the commands' floor is as uncertain as under such;
+    prior (k + m,): standard deviations of parameters and offsets.
+    """
+
+    def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
+                 wide: bool) -> None:
+        self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
+        of_loop = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
+        own = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
+        self.prior = np.concatenate([own, [deviation for _, deviation in problem.unit_offsets]])
+
+    def at(self, x: np.ndarray, offsets: np.ndarray) -> _State:
+        """The state at parameters x (k,) and offsets (m,)."""
+        active = active_at(self.mean, x)
+        values = self.problem.values(active) if self.mean else self.problem.base.copy()
+        for amount, (index, column, _) in zip(offsets, self.problem.offsets, strict=True):
+            values[index] -= amount * column
+        command_power, price = self.problem.commanded(active, self.wide)
+        power = self.added + command_power
+        return _State(x, offsets, values, power,
+                      price + cost_of(self.problem, values, power, x, offsets, self.prior))
+
+
+def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
+                 spread: np.ndarray | float, wide: bool) -> MeanFit:
+    """Mean effects of highest posterior, from scaled parameters x (k,) on.
+
+    added (n,): power of random effects; spread: standard deviation of the parameters' prior; wide: `_Posterior`. The
+    slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far from
+    where they were taken, takes them anew.
+    """
+    low, high = limits(mean)
+    x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.unit_offsets)), np.zeros((len(x), len(x)))
+    if not mean and not problem.unit_offsets:
+        return MeanFit(x, offsets, covariance, problem.base)
+    posterior = _Posterior(problem, mean, added, spread, wide)
+    now = posterior.at(x, offsets)
+    slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0
+    for _ in range(ITERATIONS):
+        slopes.take(now.x, stuck)
+        before = now.cost
+        now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)
+        gain = before - now.cost if gained else 0.0
+        if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
+            break
+        stuck = gain == 0.0
+    return MeanFit(now.x, now.offsets, covariance, now.values)
+
+
+def _step(posterior: _Posterior, slopes: Slopes, now: _State, bounds: tuple[np.ndarray, np.ndarray], damping: float,
+          ) -> tuple[_State, np.ndarray, float, bool]:
+    """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained.
+
+    It is shortened until it gains, TRIES times at most.
+    """
+    problem, size = posterior.problem, len(now.x)
+    columns = [*slopes.columns, *(-column for column, _ in problem.unit_offsets)]
+    weights = weights_of(problem, now.values, now.power)
+    of_power = slopes.of_power(now.x, now.values, now.power, posterior.wide)
+    for _ in range(TRIES):
+        change, covariance = bounded_step(columns, posterior.prior, now.values, weights, now.x, now.offsets, *bounds,
+                                          of_power, damping)
+        new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
+        if new.cost < now.cost - 1e-9:
+            return new, covariance, damping * CALMED, True
+        damping = max(damping, LEAST_DAMPING) / CALMED
+    return now, covariance, damping, False
+
+
+def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
+    """Scaled parameters (k,) at which a fit begins: the known ones, else (NaN) close to neutral.
+
+    Effects of the loop of which nothing is known begin where their likelihood is highest on a coarse grid.
+    """
+    size = sum(len(t.free) for t in mean)
+    known = np.full(size, np.nan) if known is None else known
+    x = np.where(np.isnan(known), CLOSE, known)
+    place = 0
+    for t in mean:
+        own = range(place, place + len(t.free))
+        place += len(t.free)
+        if t.name in LOOP and len(problem.commands) and np.isnan(known[own]).all():
+            x = _best_on_grid(problem, mean, x, own)
+    return x
+
+
+def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
+    """The parameters (k,) with that one of an effect's `own` moved to that place of GRID that is likeliest."""
+    low, high = limits(mean)
+    best, out = -np.inf, x
+    for i, amount in itertools.product(own, GRID):
+        trial = x.copy()
+        trial[i] = np.clip(amount, low[i], high[i])
+        command_power, cost = problem.commanded(active_at(mean, trial))
+        level = problem.likelihood(problem.base, command_power) - cost
+        if level > best:
+            best, out = level, trial
+    return out

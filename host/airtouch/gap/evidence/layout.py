@@ -1,0 +1,77 @@
+"""Where the values of a flight's blocks stand in one flat array."""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.spectra import AIR
+
+Piece = tuple[int, str, np.ndarray]  #: number of a flight, regime, and which of its blocks there (blocks,), bool
+
+
+@dataclass(frozen=True)
+class AirBlocks:
+    """Blocks in the air, numbered through all flights.
+
+    of (n,): number of the block of each flattened value, -1 for one on the ground; begin (b,): first sample of each
+    block; flight (b,): number of its flight.
+    """
+
+    of: np.ndarray
+    begin: np.ndarray
+    flight: np.ndarray
+
+
+class Layout:
+    """The order of values that count: piece by piece, block by block, bin by bin, channel by channel.
+
+    pieces: blocks of flights; keep[regime] (bins, COUNT): the bins of each channel that count.
+    """
+
+    def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:
+        self.pieces, self.keep = pieces, keep
+        self.sizes = [int(chosen.sum()) * int(keep[r].sum()) for _, r, chosen in pieces]  #: values of each piece
+
+    def gather(self, by_flight: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
+        """Values (n,) that count of spectra (blocks, bins, COUNT), by flight and regime."""
+        return _joined((by_flight[i][r].take(places)
+                        for (i, r, _), places in zip(self.pieces, self._places, strict=True)), complex)
+
+    def per_piece(self, value: Callable[[int, str], float]) -> np.ndarray:
+        """A number (n,) that a flight and a regime have, for each value."""
+        return _joined(np.full(size, value(i, r)) for (i, r, _), size in zip(self.pieces, self.sizes, strict=True))
+
+    def per_bin(self, table: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The entry (n,) of a table (bins, COUNT) by regime for each value; the same for all blocks."""
+        return _joined(np.tile(table[r][self.keep[r]], int(chosen.sum())) for _, r, chosen in self.pieces)
+
+    def channels(self) -> np.ndarray:
+        """The channel (n,) of each value."""
+        table = {r: np.broadcast_to(np.arange(COUNT), keep.shape) for r, keep in self.keep.items()}
+        return self.per_bin(table).astype(int)
+
+    def air_blocks(self, first: Sequence[Mapping[str, np.ndarray]]) -> AirBlocks:
+        """The blocks in the air. first: of every block the first sample, by flight and regime."""
+        of, begin, flight = [], [], []
+        for i, regime, chosen in self.pieces:
+            numbers = np.full(int(chosen.sum()), -1)
+            if regime == AIR:
+                numbers = len(begin) + np.arange(len(numbers))
+                begin += list(first[i][AIR][chosen])
+                flight += [i] * len(numbers)
+            of.append(np.repeat(numbers, int(self.keep[regime].sum())))
+        return AirBlocks(_joined(of, int), np.array(begin, int), np.array(flight, int))
+
+    @functools.cached_property
+    def _places(self) -> list[np.ndarray]:
+        """Of each piece, the indices of its values in the flattened spectra of its flight."""
+        return [np.flatnonzero(chosen[:, None, None] & self.keep[r]) for _, r, chosen in self.pieces]
+
+
+def _joined(parts: Iterable[np.ndarray], kind: type = float) -> np.ndarray:
+    """Arrays one after another; an empty one of a kind where there is none."""
+    parts = list(parts)
+    return np.concatenate(parts) if parts else np.zeros(0, kind)

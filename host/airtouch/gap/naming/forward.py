@@ -1,0 +1,136 @@
+"""Forward selection: effects are added one by one while held-out data ask for them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
+from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.selection import TEMPERATURE, Hypothesis, Judged
+from airtouch.gap.naming.shares import with_shares
+from airtouch.gap.naming.thresholds import needed_beside, random_by_misfit
+from airtouch.gap.signatures.candidates import is_random
+
+MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
+MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`_worth_adding`); chosen
+CERTAIN = 20.0  #: nats of evidence beyond which more does not rank a candidate higher (`_best_of`); chosen
+#: of FIRST_GAIN: candidates that gained less are not judged again beside a deviation; chosen, to save their fits
+WORTH_AGAIN = 0.25
+
+
+@dataclass(frozen=True)
+class Search:
+    """What effects are searched among.
+
+    alone: every candidate judged alone; least: nats that each must gain as the first effect; progress: is told the
+    name of every candidate that is judged.
+    """
+
+    on: Trial
+    candidates: Mapping[str, Sequence[Hypothesis]]
+    alone: Mapping[str, Judged]
+    least: Mapping[str, float]
+    progress: Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a forward selection stands.
+
+    steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last of
+    them, and need: nats that each must gain over it; singles: the best variant of every candidate, as judged before an
+    effect was named; least: nats that each must gain as the first effect.
+    """
+
+    steps: tuple[Judged, ...]
+    tried: Mapping[str, Judged]
+    need: Mapping[str, float]
+    singles: Mapping[str, Judged]
+    least: Mapping[str, float]
+
+    @property
+    def gain(self) -> float:
+        """Held-out nats that the last step gains over no effect."""
+        return self.steps[-1].gain if self.steps else 0.0
+
+    @property
+    def named(self) -> list[str]:
+        """Names of the effects that are named, in the order of the steps."""
+        return [s.name for s in self.steps if s.named]
+
+    @property
+    def deviations(self) -> int:
+        """How many steps stand there without a name."""
+        return len(self.steps) - len(self.named)
+
+
+def forward(search: Search, passing: Judged | None) -> State:
+    """Effects added one by one, after one that comes and goes where there is such; with what each adds to the others.
+
+    passing: the effect that comes and goes.
+    """
+    state = _begun(search, passing)
+    while len(state.named) < MOST_EFFECTS:
+        best = _best_of(_worth_adding(state))
+        if best is None:
+            break
+        state = _added(search, state, best)
+    return replace(state, steps=tuple(with_shares(search.on, state.steps)))
+
+
+def _begun(search: Search, passing: Judged | None) -> State:
+    """The state before the first effect is added, with an effect that comes and goes as a step already."""
+    if passing is None:
+        return State((), search.alone, search.least, search.alone, search.least)
+    singles = {**search.alone, passing.name: passing}
+    tried, need = _beside(search, (passing,), singles)
+    return State((passing,), tried, need, singles, {**search.least, passing.name: LEAST_GAIN})
+
+
+def _worth_adding(state: State) -> dict[str, Judged]:
+    """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
+    enough = {n: j for n, j in state.tried.items() if j.gain - state.gain >= state.need[n]}
+    if state.deviations == MOST_DEVIATIONS:
+        enough = {n: j for n, j in enough.items() if j.evidence >= FIRST_GAIN}
+    return enough
+
+
+def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
+    """The best of those that were fitted, and not only looked at; None where there is none.
+
+    Likelihoods of real flights are too sure of themselves (TEMPERATURE): of two that gain nearly as much, that whose
+    strength is the rarer in nominal flights.
+    """
+    return max((j for j in judged.values() if j.full), default=None,
+               key=lambda j: j.gain / TEMPERATURE + min(j.evidence, CERTAIN))
+
+
+def _added(search: Search, state: State, best: Judged) -> State:
+    """The state with a further step: named, or a deviation where its evidence or its gain is too small for a name."""
+    singles = state.singles
+    if not state.named:  # what nominal flights have as well stands beside every candidate
+        there = {s.name for s in state.steps}
+        singles = {**singles, **{n: j for n, j in state.tried.items() if n not in there}}
+    left_by_another = bool(state.named) and random_by_misfit(search.on, state.steps[-1], best)
+    steps = (*state.steps, replace(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
+    after = replace(state, steps=steps, singles=singles)
+    if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
+        return after
+    over_before = {n: replace(j, gain=j.gain - state.gain) for n, j in state.tried.items()}
+    tried, need = _beside(search, steps, over_before)
+    return replace(after, tried=tried, need=need)
+
+
+def _beside(search: Search, steps: Sequence[Judged], before: Mapping[str, Judged],
+            ) -> tuple[dict[str, Judged], dict[str, float]]:
+    """Candidates judged beside the steps so far, and the nats that each must gain.
+
+    before: as judged before the newest step, with their gain over the steps then. Beside a deviation of nominal flights
+    only those are judged again that gained something without it: a deviation takes gain from others, it seldom lends
+    any.
+    """
+    on, named = search.on, any(s.named for s in steps)
+    gained = {n for n, j in before.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
+    worth = {n: v for n, v in search.candidates.items() if named or n in gained}
+    sure = {n for n, j in before.items() if j.full and j.evidence >= LEAST_GAIN and not is_random(n)}
+    tried = round_of(on, worth, steps[-1], search.progress, promising=sure)
+    return tried, {n: needed_beside(on, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}

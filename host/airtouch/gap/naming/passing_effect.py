@@ -1,0 +1,62 @@
+"""Whether one effect that comes and goes is tried before those that always act."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
+from airtouch.gap.naming.selection import Judged
+from airtouch.gap.passing.gates import TOLD, Gated, gated
+from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.unnamed.generic import height_gain
+
+
+def passing_effect(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float], without: Sequence[str],
+                   ) -> Judged | None:
+    """The effect that comes and goes and explains most; None where none is news.
+
+    It must gain LEAST_GAIN more than every effect that always acts and has its evidence, and than what follows the
+    flight's own height, which needs no other vehicle; and as much more than it gains in nominal flights. Seconds in
+    which another vehicle is known to be overhead go before others, which are only likely. singles: candidates judged
+    alone; least: nats of evidence that each needs; without: names that are left out.
+    """
+    if on.data.study.scatter is None:
+        return None
+    steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
+    found = [g for g in gated(on.data, without).values()
+             if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+    if not found:
+        return None
+    told = [g for g in found if g.key == TOLD]
+    return _as_judged(on, max(told or found, key=lambda g: g.gain))
+
+
+def _as_judged(on: Trial, effect: Gated) -> Judged:
+    """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
+    terms = effect.fitted.terms
+    gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
+    return Judged(effect.name, terms, gain, (effect.fitted, effect.fitted), choice=effect.cost,
+                  strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
+                  key=effect.key)
+
+
+def as_in_nominal_flights(data: Data, passing: Judged, steps: Sequence[Judged]) -> bool:
+    """Whether an effect that comes and goes adds no more to the effects found after it than in nominal flights."""
+    return any(s.named and s.name == passing.name
+               and news(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
+
+
+def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
+    """Evidence, nats, for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights have as much.
+
+    key: `Gated.key`; gain: nats; strength (k,): of its parameters, in natural steps.
+    """
+    assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / seconds(data), strength)))
+
+
+def seconds(data: Data) -> float:
+    """How long the flights last together, s."""
+    return sum(len(f) for f in data.flights) * PERIOD_S

@@ -1,0 +1,103 @@
+"""Effects that come and go: what each explains within the stretches in which it acts, its gate.
+
+An effect is tried in the stretches of blocks that it explains best (`stretches`) and in bursts that are shorter than a
+block (`bursts`). A stretch may lie in one half of a split, so a gated effect is judged on what it is fitted on, at the
+price of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the choice of its gate.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import Fit, fit, judge
+from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.passing.bursts import bursts
+from airtouch.gap.passing.stretches import LEAST_BLOCKS, Gate, each_block, stretches_of
+from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import OVERHEAD
+from airtouch.gap.signatures.term import Term
+
+TOLD = "told"  #: a wake in seconds in which another vehicle is known to be overhead
+
+
+@dataclass(frozen=True)
+class Gated:
+    """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs, nats."""
+
+    name: str
+    fitted: Fit
+    gain: float
+    cost: float
+    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or TOLD
+
+    @property
+    def strength(self) -> np.ndarray:
+        """Scaled parameters (k,) of all its terms."""
+        return np.concatenate([t.scaled(t.values) for t in self.fitted.terms])
+
+
+@dataclass(frozen=True)
+class Ungated:
+    """Flights without any effect, against which one that comes and goes is held.
+
+    whole: all their blocks; each (b,): log likelihood of every block in the air; level: that of the flights, as sure of
+    the commands' floor as without (False) and with (True) random effects.
+    """
+
+    data: Data
+    whole: Part
+    each: np.ndarray
+    level: Mapping[bool, float]
+
+
+def ungated(data: Data) -> Ungated | None:
+    """Flights without any effect; None where they are too short to say when an effect acts."""
+    whole = whole_of(data)
+    each = each_block(data, whole, ())
+    if len(each) < LEAST_BLOCKS:
+        return None
+    return Ungated(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
+
+
+def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
+    """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
+
+    without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
+    TOLD.
+    """
+    base = ungated(data)
+    if base is None:
+        return {}
+    lively, out = bursts(data), {}
+    for name, variants in candidates.gated(without).items():
+        if name == OVERHEAD and data.study.overhead:
+            out[TOLD] = replace(_best(base, name, variants, data.study.overhead), key=TOLD)
+        tried = [(terms, gate, cost) for variant in variants for terms, gate, cost in (
+            stretches_of(data, base.whole, base.each, variant), (variant, *lively)) if gate]
+        if tried:
+            out[name] = max((_judged(base, name, *candidate) for candidate in tried), key=lambda j: j.gain)
+    return out
+
+
+def within(data: Data, name: str, gate: Gate) -> Gated | None:
+    """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
+    base = ungated(data)
+    return _best(base, name, candidates.gated()[name], gate) if base is not None else None
+
+
+def _best(base: Ungated, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> Gated:
+    """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
+    return max((_judged(base, name, v, gate, 0.0) for v in variants), key=lambda j: j.gain)
+
+
+def _judged(base: Ungated, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> Gated:
+    """An effect fitted within a gate, whose choice costs `cost` nats."""
+    acting = [replace(t, gate=gate) for t in terms]
+    fitted = fit(base.data, base.whole, acting)
+    free = sum(len(t.free) for t in acting)
+    without = base.level[bool(random_of(acting))]
+    gain = judge(base.data, base.whole, fitted.terms) - without - cost - 0.5 * free * np.log(len(base.each))
+    return Gated(name, fitted, gain, cost, name)

@@ -1,0 +1,149 @@
+"""When an effect acts: stretches of blocks in which it gains more than their choice costs."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit, judge, left_over
+from airtouch.gap.evidence.layout import AirBlocks
+from airtouch.gap.evidence.problem import Part, problem_of
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.signals.spectra import AIR, LENGTH
+from airtouch.gap.signatures.term import Term
+from airtouch.logs.segments import KINDS
+
+#: no number here has a source: all were chosen
+MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
+WORST = 0.25  #: share of the blocks, those explained worst, that an effect is first fitted to
+LEAST_WORST = 2  #: blocks that it is first fitted to at least
+ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches
+LEAST_BLOCKS = 6  #: blocks in the air, below which no stretch is sought
+STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
+WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
+#: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
+ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
+Gate = tuple[tuple[str, float, float], ...]  #: stretches (flight, from_s, to_s)
+
+
+def stretches_of(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term],
+                 ) -> tuple[Sequence[Term], Gate, float]:
+    """An effect as fitted where it acts, the stretches of blocks in which it does, and nats that their choice costs.
+
+    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; off (b,): log likelihood of each
+    in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in which
+    it gains, ROUNDS times at most; then the stretches' ends are moved.
+    """
+    air, price = problem_of(data, whole).air, price_of_stretches(len(off))
+    at_the_ends = _at_the_ends(data, air)
+    on = _explained_worst(air, off)
+    for _ in range(ROUNDS):
+        fitted = fit(data, _part(whole, on), terms)
+        gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - off)
+        stretches = best_stretches(gain, air.flight, price)
+        chosen = np.zeros(len(off), bool)
+        for first, last in stretches:
+            chosen[first:last + 1] = True
+        if not stretches or chosen.mean() > WHOLE:
+            return terms, (), 0.0
+        if (chosen == on).all():
+            break
+        on = chosen
+    gate = tuple((data.flights[air.flight[a]].name, *_seconds(air, a, b)) for a, b in stretches)
+    return fitted.terms, _sharpened(data, whole, fitted.terms, gate), price * len(stretches)
+
+
+def price_of_stretches(blocks: int) -> float:
+    """Nats that the choice of one stretch among so many blocks costs: log n for each of its ends."""
+    return 2.0 * np.log(blocks)
+
+
+def best_stretches(gain: np.ndarray, flight: np.ndarray, price: float) -> list[tuple[int, int]]:
+    """Disjoint stretches (first, last) of blocks of one flight with the largest sums of gain, each over its price.
+
+    gain (b,): nats of each block; flight (b,): its flight's number. MOST_STRETCHES for each flight at most.
+    """
+    remaining, out = gain.copy(), []
+    while len(out) < MOST_STRETCHES * (int(flight.max()) + 1):
+        stretch = _best_stretch(remaining, flight, price)
+        if stretch is None:
+            break
+        out.append(stretch)
+        remaining[stretch[0]:stretch[1] + 1] = -np.inf
+    return sorted(out)
+
+
+def _best_stretch(gain: np.ndarray, flight: np.ndarray, price: float) -> tuple[int, int] | None:
+    """The stretch (first, last) of the largest sum of gain over a price, in one pass (Kadane); None without one."""
+    best, stretch = price, None
+    total, begin = 0.0, 0
+    for k in range(len(gain)):
+        if total <= 0.0 or (k and flight[k] != flight[k - 1]):
+            total, begin = 0.0, k
+        total += gain[k]
+        if total > best:
+            best, stretch = total, (begin, k)
+    return stretch
+
+
+def each_block(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
+    """Log likelihood (b,) of every block in the air under a hypothesis."""
+    problem, values, power = left_over(data, part, terms)
+    each = problem.likelihood.each(values, power - problem.power)[:problem.own]
+    in_air = problem.air.of >= 0
+    return np.bincount(problem.air.of[in_air], each[in_air])
+
+
+def _explained_worst(air: AirBlocks, off: np.ndarray) -> np.ndarray:
+    """Which blocks (b,) are explained worst: a share WORST of them, of the least log likelihood `off` of a value."""
+    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(off)), 1)
+    out = np.zeros(len(off), bool)
+    out[np.argsort(off / count)[:max(int(WORST * len(off)), LEAST_WORST)]] = True
+    return out
+
+
+def _at_the_ends(data: Data, air: AirBlocks) -> np.ndarray:
+    """Blocks (b,) in the air most of which are take-off or landing."""
+    ends = [np.isin(data.flights[i].phase[first:first + LENGTH[AIR]], ENDS).mean() > 0.5
+            for i, first in zip(air.flight, air.begin, strict=True)]
+    return np.array(ends, bool)
+
+
+def _part(whole: Part, on: np.ndarray) -> Part:
+    """Those blocks in the air that are on (b,)."""
+    pieces, place = [], 0
+    for flight, regime, chosen in whole.pieces:
+        if regime == AIR:
+            pieces.append((flight, regime, on[place:place + len(chosen)]))
+            place += len(chosen)
+    return Part(tuple(pieces))
+
+
+def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
+    """From when to when a stretch of blocks lasts, s: without the outer quarters, which hardly count in its spectra."""
+    quarter = LENGTH[AIR] // 4
+    return float((air.begin[first] + quarter) * PERIOD_S), float((air.begin[last] + LENGTH[AIR] - quarter) * PERIOD_S)
+
+
+def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
+    """The gate with each end moved by less and less, as long as the likelihood grows."""
+
+    def level(tried: Gate) -> float:
+        """Log likelihood with the effect in a gate."""
+        return judge(data, whole, [replace(t, gate=tried) for t in terms])
+
+    best = level(gate)
+    for step, i, end, sign in itertools.product(STEPS_S, range(len(gate)), (0, 1), (-1.0, 1.0)):
+        moved = _moved(gate, i, end, sign * step)
+        if moved[i][1] < moved[i][2] and (gain := level(moved)) > best:
+            best, gate = gain, moved
+    return gate
+
+
+def _moved(gate: Gate, i: int, end: int, by_s: float) -> Gate:
+    """A gate with one end (0: begin, 1: end) of its stretch i moved."""
+    flight, *ends = gate[i]
+    ends[end] += by_s
+    return (*gate[:i], (flight, ends[0], ends[1]), *gate[i + 1:])

@@ -1,0 +1,89 @@
+"""Forward selection on candidates whose gain and evidence a test makes up: which are added, and which have a name."""
+
+import pytest
+
+from airtouch.gap.naming import forward as module
+from airtouch.gap.naming.forward import MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN, Search, forward
+from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN
+from airtouch.gap.naming.selection import Judged
+
+
+@pytest.fixture
+def select(monkeypatch):
+    """A selection among candidates {name: (own gain, evidence)}, which gain as much beside others as alone.
+
+    Returns the state, and the names that were judged in each round.
+    """
+    def run(candidates, passing=None, looked_at=()):
+        def judged(name, so_far=0.0):
+            gain, evidence = candidates[name]
+            return Judged(name, (), so_far + gain, full=name not in looked_at, evidence=evidence)
+
+        def round_of(on, worth, chosen, progress, promising):
+            names = [n for n in worth if n not in added]
+            rounds.append(names)
+            return {n: judged(n, chosen.gain) for n in names}
+
+        def best_of(worth):
+            best = original(worth)
+            if best is not None:
+                added.append(best.name)
+            return best
+
+        rounds, added, original = [], [], module._best_of
+        monkeypatch.setattr(module, "round_of", round_of)
+        monkeypatch.setattr(module, "_best_of", best_of)
+        monkeypatch.setattr(module, "needed_beside", lambda on, held, more: LEAST_GAIN)
+        monkeypatch.setattr(module, "random_by_misfit", lambda on, held, more: False)
+        monkeypatch.setattr(module, "with_shares", lambda on, steps: steps)
+        alone = {n: judged(n) for n in candidates}
+        search = Search(None, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, FIRST_GAIN),
+                        lambda _: None)
+        return forward(search, passing), rounds
+
+    return run
+
+
+def names(state):
+    return [(s.name, s.named) for s in state.steps]
+
+
+def test_effects_are_added_from_the_one_that_gains_most_on_and_no_more_than_may_be_named(select):
+    state, _ = select({n: (100.0 * k, 20.0) for k, n in enumerate("abcde", 1)})
+    assert names(state) == [("e", True), ("d", True), ("c", True)] and len(state.steps) == MOST_EFFECTS
+    assert state.gain == 1200.0
+
+
+def test_what_gains_too_little_or_was_only_looked_at_is_not_added(select):
+    state, _ = select({"a": (FIRST_GAIN - 0.1, 20.0), "b": (100.0, 20.0)}, looked_at=("b",))
+    assert state.steps == () and state.gain == 0.0
+    state, _ = select({"a": (50.0, 20.0), "b": (LEAST_GAIN - 0.1, 20.0)})
+    assert names(state) == [("a", True)], "beside another it needs more"
+
+
+def test_of_two_that_gain_nearly_as_much_the_rarer_is_taken_and_beyond_certainty_the_gain_decides(select):
+    assert names(select({"a": (103.0, 10.0), "b": (100.0, 15.0)})[0])[0][0] == "b"
+    assert names(select({"a": (103.0, 20.0), "b": (100.0, 90.0)})[0])[0][0] == "a"
+
+
+def test_what_nominal_flights_have_as_well_is_a_deviation_and_after_three_only_what_is_evident_is_added(select):
+    deviations = {n: (200.0 + k, FIRST_GAIN - 0.1) for k, n in enumerate("abcde")}
+    state, _ = select(deviations)
+    assert names(state) == [("e", False), ("d", False), ("c", False)] and state.deviations == MOST_DEVIATIONS
+    state, _ = select({**deviations, "f": (30.0, FIRST_GAIN)})
+    assert names(state)[3:] == [("f", True)] and state.named == ["f"]
+
+
+def test_beside_a_deviation_only_those_are_judged_again_that_gained_something(select):
+    least = WORTH_AGAIN * FIRST_GAIN
+    _, rounds = select({"a": (200.0, 0.0), "b": (least + 0.1, 9.0), "c": (least - 0.1, 9.0)})
+    assert rounds == [["b"]]
+    _, rounds = select({"a": (200.0, 20.0), "b": (least + 0.1, 9.0), "c": (least - 0.1, 9.0)})
+    assert rounds == [["b", "c"]], "beside an effect that is named all are"
+
+
+def test_an_effect_that_comes_and_goes_is_the_first_step(select):
+    passing = Judged("wake", (), 60.0, evidence=30.0)
+    state, _ = select({"a": (100.0, 20.0)}, passing)
+    assert names(state) == [("wake", True), ("a", True)]
+    assert state.singles["wake"] is passing and state.least["wake"] == LEAST_GAIN

@@ -1,0 +1,39 @@
+"""Which variants may stand beside the effects that are held, and what their choice costs."""
+
+import numpy as np
+import pytest
+
+from airtouch.gap.naming.looks import addable
+from airtouch.gap.signatures.candidates import all_candidates
+
+CANDIDATES = all_candidates()
+
+
+def held(name, number=0):
+    return CANDIDATES[name][number]
+
+
+def test_a_variant_pays_for_the_choice_among_those_of_as_many_terms():
+    costs = {(len(v.terms), v.choice) for v in addable("gust", CANDIDATES["gust"], ())}
+    assert costs == {(1, np.log(3.0)), (2, np.log(3.0))}, "three lengths, without and with drag"
+    assert [v.choice for v in addable("mass", CANDIDATES["mass"], ())] == [0.0]
+
+
+def test_what_is_held_is_not_added_again_but_for_another_rotor():
+    assert addable("mass", CANDIDATES["mass"], held("mass")) == []
+    others = addable("weak_motor", CANDIDATES["weak_motor"], held("weak_motor", 2))
+    assert [v.terms[0].values["rotor"] for v in others] == [1.0, 2.0, 4.0]
+    assert {v.choice for v in others} == {np.log(4.0)}
+
+
+@pytest.mark.parametrize(("name", "beside", "some"), [
+    ("thrust_coefficient", "mass", False), ("mass", "thrust_coefficient", False),
+    ("blade_flapping", "rotor_drag", False), ("inertia", "mass", True)])
+def test_another_name_for_the_same_thing_is_not_added(name, beside, some):
+    assert bool(addable(name, CANDIDATES[name], held(beside))) is some
+
+
+def test_a_companion_is_not_held_by_itself():
+    """Gusts with drag beside them leave the rotors' drag a candidate."""
+    gust_with_drag = next(v for v in CANDIDATES["gust"] if len(v) == 2)
+    assert addable("rotor_drag", CANDIDATES["rotor_drag"], gust_with_drag)

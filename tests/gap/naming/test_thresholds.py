@@ -1,0 +1,91 @@
+"""In which cells a further effect is held against what the effects before it gain there."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.evidence.cells import COMMAND_VIEW, GROUPS, REPLAY_VIEW, REST_VIEW, cell_numbers
+from airtouch.gap.naming import thresholds
+from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.selection import Judged
+from airtouch.gap.signals.channels import CHANNELS
+
+FORCE_X, FORCE_Z, TORQUE_X, RATE_Y = (
+    [c.name for c in CHANNELS].index(name) for name in ("force_x", "force_z", "torque_x", "rate_y"))
+#: (view, band, channel) of a gain of the effects before, and of another in the same sensor, band and view
+SAME_SENSOR = [
+    ((REPLAY_VIEW, 0, FORCE_X), (REPLAY_VIEW, 0, FORCE_Z)),
+    ((REPLAY_VIEW, 5, TORQUE_X + 1), (REPLAY_VIEW, 5, TORQUE_X)),
+    ((REST_VIEW, 3, RATE_Y), (REST_VIEW, 3, RATE_Y + 1)),
+    ((COMMAND_VIEW, 2, 9), (COMMAND_VIEW, 2, 11)),
+]
+#: the same in another sensor, band or view
+ELSEWHERE = [
+    ((REPLAY_VIEW, 1, FORCE_Z), (REPLAY_VIEW, 1, TORQUE_X)),
+    ((REPLAY_VIEW, 1, TORQUE_X + 2), (REPLAY_VIEW, 1, RATE_Y)),
+    ((REPLAY_VIEW, 1, FORCE_X), (REPLAY_VIEW, 2, FORCE_X)),
+    ((REPLAY_VIEW, 1, 12), (REPLAY_VIEW, 2, FORCE_X)),
+    ((REPLAY_VIEW, 1, FORCE_X), (REST_VIEW, 1, FORCE_X)),
+    ((REST_VIEW, 4, RATE_Y), (COMMAND_VIEW, 4, RATE_Y)),
+    ((REPLAY_VIEW, 1, 12), (REPLAY_VIEW, 1, 11)),  # the yaw command is no axis of those before it
+]
+
+
+def gains(*cells):
+    """Gains (GROUPS,) of so many nats in cells (view, band, channel), and 0 in the others."""
+    out = np.zeros(GROUPS)
+    for place, nats in cells:
+        out[cell_numbers(*place)] += nats
+    return out
+
+
+@pytest.mark.parametrize(("held", "further"), SAME_SENSOR)
+def test_what_is_gained_on_one_axis_counts_where_a_further_effect_gains_on_another(held, further):
+    assert thresholds.gained_where_more_is(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 50.0
+
+
+@pytest.mark.parametrize(("held", "further"), ELSEWHERE)
+def test_what_is_gained_in_another_sensor_band_or_view_does_not_count(held, further):
+    assert thresholds.gained_where_more_is(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 0.0
+
+
+def test_gains_of_the_axes_are_added_and_a_cell_counts_from_a_gain_of_one_nat():
+    x, z, other = (REPLAY_VIEW, 0, FORCE_X), (REPLAY_VIEW, 0, FORCE_Z), (REPLAY_VIEW, 0, TORQUE_X)
+    held = gains((x, 50.0), (z, -8.0), (other, -30.0))
+    assert thresholds.gained_where_more_is(held, held + gains((x, 3.0), (z, -1.9), (other, 5.0))) == 42.0
+    assert thresholds.gained_where_more_is(held, held + gains((x, 3.0), (z, -2.0), (other, 5.0))) == 0.0
+
+
+def trial(recorded=False, same_models=True):
+    """What a hypothesis is judged on, without a loop and without flights."""
+    return SimpleNamespace(data=SimpleNamespace(
+        study=SimpleNamespace(recorded=recorded, same_models=same_models, controller=None)))
+
+
+def fitted(gain, full=True):
+    return Judged("mass", (), gain, fits=(SimpleNamespace(), SimpleNamespace()), full=full)
+
+
+@pytest.fixture
+def cells(monkeypatch):
+    """Gains by cell: 3000 nats of the effects before in one cell, where a further one gains 30, and 7000 in another."""
+    here, there = (REPLAY_VIEW, 0, FORCE_X), (REPLAY_VIEW, 0, TORQUE_X)
+    held = gains((here, 3000.0), (there, 7000.0))
+    more = held + gains((here, 30.0))
+    monkeypatch.setattr(thresholds, "held_out_cell_gains", lambda on, j: held if j.gain == 10_000.0 else more)
+
+
+def test_in_simulated_flights_effects_are_wrong_by_a_share_of_what_they_gain_where_the_further_one_gains(cells):
+    held, more = fitted(10_000.0), fitted(10_030.0)
+    assert thresholds.misfit(trial(), held, more, 0.01) == pytest.approx(30.0)
+    assert thresholds.misfit(trial(), held, more, 0.0001) == LEAST_GAIN
+
+
+@pytest.mark.parametrize(("recorded", "everywhere", "full", "gain"), [
+    (True, False, True, 10_030.0), (False, True, True, 10_030.0), (False, False, False, 10_030.0),
+    (False, False, True, 10_100.0)])
+def test_else_by_a_share_of_all_that_they_gain(cells, recorded, everywhere, full, gain):
+    """Recorded flights, a random effect, one that was not fitted, or one that gains as much as the whole share."""
+    more = fitted(gain, full)
+    assert thresholds.misfit(trial(recorded), fitted(10_000.0), more, 0.01, everywhere) == pytest.approx(100.0)

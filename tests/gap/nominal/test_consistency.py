@@ -1,0 +1,81 @@
+"""Baseline flights of known trim: which are left out, which a note names, when it is said that they differ."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, differences, odd_flights, split_unlike, trims
+from gap_flights import VEHICLE, flight, study
+
+
+def baseline(*lifts):
+    """Hovers of one second whose mean force along the thrust is off by so much, m/s^2."""
+    return [flight(1.0, np.tile([0.0, 0.0, lift], (100, 1)), name=f"lift {lift}") for lift in lifts]
+
+
+def left_out(flights, far=FAR):
+    """Names of the flights that are left out, each in a note."""
+    same, notes = split_unlike(VEHICLE, flights, far)
+    missing = [f.name for f in flights if not any(f is s for s in same)]
+    assert [n.split(":")[0] for n in notes] == missing
+    return missing
+
+
+def test_the_trim_is_the_mean_residual_of_usable_samples_in_the_air():
+    (one,) = baseline(0.3)
+    assert trims([one], VEHICLE)[0, :3] == pytest.approx([0.0, 0.0, 0.3])
+    half = np.arange(100) < 50
+    pushed = replace(one, acceleration=one.acceleration + np.where(half, 5.0, 0.0)[:, None])
+    assert trims([replace(pushed, usable=~half)], VEHICLE)[0, 2] == pytest.approx(0.3)
+    assert trims([replace(pushed, phase=np.where(half, 0, one.phase).astype(np.int8))],
+                 VEHICLE)[0, 2] == pytest.approx(0.3)
+
+
+def test_a_flight_is_left_out_where_its_trim_is_odd_and_far_off():
+    assert left_out(baseline(0.0, 0.01, -0.01, 0.5)) == ["lift 0.5"]
+    assert not left_out(baseline(0.0, 0.01, -0.01, 0.35))  # odd, but no more than nominal flights may differ
+    assert not left_out(baseline(0.0, 0.2, -0.2, 0.9))  # far, but not beyond six deviations of the others
+
+
+def test_simulated_flights_may_differ_by_a_tenth():
+    assert left_out(baseline(0.0, 0.001, -0.001, 0.045), FAR_SIMULATED) == ["lift 0.045"]
+    assert not left_out(baseline(0.0, 0.001, -0.001, 0.035), FAR_SIMULATED)
+
+
+def test_the_note_tells_by_how_much_the_lift_is_off():
+    (note,) = split_unlike(VEHICLE, baseline(0.0, 0.0, 0.0, 0.5), FAR)[1]
+    assert note == "lift 0.5: declared nominal, yet unlike the others (lift +0.5 m/s^2); left out"
+
+
+def test_two_flights_cannot_say_which_is_unlike():
+    assert not left_out(baseline(0.0, 5.0))
+    assert left_out(baseline(0.0, 0.0, 5.0)) == ["lift 5.0"]
+
+
+def test_flights_stay_where_more_than_one_in_three_is_unlike():
+    assert len(left_out(baseline(0.0, 0.01, -0.01, 0.0, 5.0, -5.0))) == 2
+    assert not left_out(baseline(0.0, 0.01, -0.01, 5.0, -5.0))
+
+
+def test_a_note_names_the_channel_in_which_a_flight_is_odd():
+    flights = baseline(0.0, 0.01, -0.01, 0.02, 0.12)
+    (note,) = odd_flights(study(), flights)
+    assert note.startswith("lift 0.12: declared nominal, yet its lift is") and note.endswith("from the others'")
+    assert not odd_flights(study(), baseline(0.0, 0.01, -0.01, 0.02, 0.05))
+    assert not odd_flights(study(), baseline(0.0, 5.0))
+
+
+def test_differences_beyond_what_nominal_flights_may_differ_are_said():
+    (note,) = differences(study(), baseline(0.0, 0.25))
+    assert note.startswith("the baseline flights are not consistent: among themselves they differ by 0.25 m/s^2 in "
+                           "lift;")
+    assert not differences(study(), baseline(0.0, 0.15)) and not differences(study(), [])
+    assert "not known" in differences(study(), baseline(0.0))[0]
+
+
+def test_differences_within_six_standard_errors_are_chance():
+    """Gusts of one second whose means differ by chance."""
+    steps = np.repeat(np.random.default_rng(1).normal(0.0, 1.0, 8), [13, 13, 13, 13, 12, 12, 12, 12])
+    gusty = [flight(1.0, np.outer(sign * steps + 0.3 * (sign > 0), [0.0, 0.0, 1.0])) for sign in (1, -1)]
+    assert abs(np.ptp(trims(gusty, VEHICLE)[:, 2])) > 0.2 and not differences(study(), gusty)
