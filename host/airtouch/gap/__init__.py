@@ -34,8 +34,9 @@ Where each decision is made; a folder imports only those above it:
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
-- `answer`: the verdict and the `ranking`; the `named_effects` with their intervals; how far: `shrink`; what stays
-  open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
+- `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
+  intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
+  `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.

@@ -9,17 +9,17 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module, measure
 from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
+from airtouch.gap.answer.controls import arms, control
 from airtouch.gap.answer.ranking import alike_of, ranked
-from airtouch.gap.answer.shrink import Cells, Shrink, cells_of, shrink_of
+from airtouch.gap.answer.shrink import Cells, cells_of, shrink_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.fit import fit
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.select import select
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Selection
 from airtouch.gap.naming.thresholds import LOOP_SHARE
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
@@ -29,18 +29,19 @@ from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.signature import CLOCK, MEAN
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
-MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
+MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
+LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
-STANDS_OUT = 1.1  #: gap from which what comes and goes must close it; the halves seldom share its seconds
-WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
+#: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
+#: seconds; chosen
+STANDS_OUT = 1.1
 
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
@@ -60,53 +61,42 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if partner and len(flights) != 1:
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = seconds_overhead(flights[0], partner) if partner else ()
-    left_out: list[str] = []
-    nominal = list(measure.usable(baseline, vehicle, left_out))
-    seen = list(measure.usable(flights, vehicle, left_out))
-    if not seen:
-        raise AirTouchError(left_out[-1] if left_out else "no flight to diagnose")
-    if balance_result.applies(seen, nominal, vehicle):
-        return balance_result.diagnosis(seen, nominal, vehicle, left_out, without, pictures)
+    notes: list[str] = []
+    nominal = list(measure.usable(baseline, vehicle, notes))
+    usable = list(measure.usable(flights, vehicle, notes))
+    if not usable:
+        raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
+    if balance_result.applies(usable, nominal, vehicle):
+        return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
-    if before is not None and before.held is not None:
-        study, fitted = before.held
-    else:
-        study, fitted = calibrate.calibrated(vehicle, nominal, without=without) if nominal \
-            else (declared_study(vehicle, ()), None)
-    some = _some(seen)
-    held = (study, fitted)
+    held = before.held if before is not None and before.held is not None else _calibrated(vehicle, nominal, without)
+    study, calibration = held
     if partner:
-        study = with_overhead(study, seen[0], seconds)
-        left_out.append(f"the other vehicle was overhead for {sum(b - a for a, b in seconds):.1f} s" if seconds
-                        else "the other vehicle was never overhead")
-    data = _data(study, some)
+        study = with_overhead(study, usable[0], seconds)
+        notes.append(f"the other vehicle was overhead for {sum(end - begin for begin, end in seconds):.1f} s" if seconds
+                     else "the other vehicle was never overhead")
+    judged = flights_to_judge(usable)
+    data = _data(study, judged)
     selection, gap_cells = _selected(data, without, say)
     say("how far")
-    ranking, overall, verdict, effects = ranked(data, selection, gap_cells)
-    named = [candidates.term_of(e) for e in effects]
-    made = gap_map(study, seen, nominal, named)
-    first = summary.headline(made.cells, bool(named))
-    cells = tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(made)))
-    alike = alike_of(selection)
-    notes = [n for f in seen for n in f.notes] + left_out
-    notes += list(fitted.notes) if fitted else [NO_BASELINE]
-    notes += differences(study, nominal)
-    notes += measure.flown_unlike(study, seen)
-    if len(some) < len(seen):
-        notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
-    control = _control(data, selection, gap_cells) if verdict == "effect" else {}
-    arms = _arms(vehicle, nominal, fitted, some, selection, overall) if verdict == "effect" else {}
-    steps = advices.steps(verdict, effects, alike, first, seen, bool(nominal), vehicle.name)
-    return Diagnosis(
-        verdict, tuple(effects), tuple(ranking), alike, cells,
-        {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
-         "floor": 1.0},
-        overall.share if verdict == "effect" else None, control, advices.advice(steps),
-        arms, tuple(dict.fromkeys(notes)),
-        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
-        tuple(unexplained(study, some, selection, cells)) if verdict == "unknown" else (), made, first, steps,
-        vehicle.name, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        picture.of(study, seen, nominal, named, first, cells) if pictures else None, held)
+    result = _answer(data, selection, gap_cells)
+    effects, is_effect = list(result.effects), result.verdict == "effect"
+    terms = [candidates.term_of(e) for e in effects]
+    whole_map = gap_map(study, usable, nominal, terms)
+    headline = summary.headline(whole_map.cells, bool(terms))
+    cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + where(whole_map)))
+    steps = advices.steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
+                          vehicle.name)
+    return replace(
+        result, where=cells, map=whole_map, headline=headline,
+        arms=arms(vehicle, nominal, calibration, judged, selection, result) if is_effect else {},
+        unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
+        next=steps, advice=advices.advice(steps),
+        notes=_notes(study, calibration, usable, nominal, judged, notes),
+        cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
+        calibration=calibration.parameters if calibration else {},
+        pictures=picture.of(study, usable, nominal, terms, headline, cells) if pictures else None, held=held)
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -115,14 +105,48 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    selection, gap_cells = _selected(data, tuple(without))
+    return replace(_answer(data, *_selected(data, tuple(without))), flights=tuple(f.name for f in flights))
+
+
+def _answer(data: Data, selection: Selection, gap_cells: Cells) -> Diagnosis:
+    """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control.
+
+    gap_cells: in which the gap is measured.
+    """
     ranking, overall, verdict, effects = ranked(data, selection, gap_cells)
-    named = verdict == "effect"
+    is_effect = verdict == "effect"
     return Diagnosis(
-        verdict, tuple(effects), tuple(ranking), alike_of(selection), (),
-        {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
-        overall.share if named else None, _control(data, selection, gap_cells) if named else {}, "",
-        flights=tuple(f.name for f in flights))
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
+        where=(), gap={"before": overall.before, "after": overall.after if is_effect else overall.before, "floor": 1.0},
+        shrink=overall.share if is_effect else None, control=control(data, selection, gap_cells) if is_effect else {},
+        advice="")
+
+
+def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],
+                ) -> tuple[Study, calibrate.Calibration | None]:
+    """The study of the vehicle, calibrated on nominal flights if there are any; and the calibration."""
+    if not nominal:
+        return declared_study(vehicle, ()), None
+    return calibrate.calibrated(vehicle, nominal, without=without)
+
+
+def _notes(study: Study, calibration: calibrate.Calibration | None, usable: Sequence[Flight],
+           nominal: Sequence[Flight], judged: Sequence[Flight], of_logs: Sequence[str]) -> tuple[str, ...]:
+    """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
+    notes = [note for f in usable for note in f.notes] + [*of_logs]
+    notes += list(calibration.notes) if calibration else [NO_BASELINE]
+    notes += differences(study, nominal)
+    notes += measure.flown_unlike(study, usable)
+    if len(judged) < len(usable):
+        notes.append(f"candidates were judged on {len(judged)} of {len(usable)} flights, evenly chosen")
+    return tuple(dict.fromkeys(notes))
+
+
+def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
+    """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
+    seconds = sum(len(f) for f in flights) * 0.01
+    keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
+    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
@@ -167,52 +191,6 @@ def _of_the_loop(data: Data, selection: Selection) -> bool:
         return False
     terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
     return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
-
-
-def _some(flights: Sequence[Flight]) -> list[Flight]:
-    """Evenly chosen flights of MOST_SECONDS together; all where there are no more."""
-    total = sum(len(f) for f in flights) * 0.01
-    keep = max(int(len(flights) * min(MOST_SECONDS / total, 1.0)), min(len(flights), 4))
-    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
-
-
-def _start(terms: Sequence[Term], chosen: Judged) -> np.ndarray | None:
-    """Scaled parameters of mean effects as they were fitted."""
-    if not chosen.fits:
-        return None
-    return np.concatenate([np.zeros(0),
-                           *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == MEAN)])
-
-
-def _control(data: Data, selection: Selection, cells: Cells) -> dict[str, object]:
-    """The gap with a deliberately wrong effect in the model."""
-    taken = {n for g in alike_of(selection) for n in g} | {s.name for s in selection.named}
-    every = candidates.all_candidates()
-    for name in WRONG:
-        if name in every and name not in taken:
-            fits = tuple(fit(data, p, every[name][0]) for p in selection.parts)
-            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits), cells)
-            return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
-    return {}
-
-
-def _arms(vehicle: Vehicle, nominal: Sequence[Flight], fitted: calibrate.Calibration | None, some: Sequence[Flight],
-          selection: Selection, overall: Shrink) -> dict[str, object]:
-    """The shrink with the vehicle as calibrated (or declared, without baseline) and as its file declares it."""
-    if not nominal or selection.chosen is None:
-        return {"declared": _plain(overall)}
-    known = fitted.declared if fitted is not None else None
-    data = Data(known or declared_study(vehicle, nominal), some)
-    parts = halves(data)
-    terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
-    fits = tuple(fit(data, p, terms, _start(terms, selection.chosen)) for p in parts)
-    declared = Judged(selection.chosen.name, terms, 0.0, fits)
-    one = shrink_of(data, parts, declared, cells_of(data, parts, declared))
-    return {"declared": _plain(one), "calibrated": _plain(overall)}
-
-
-def _plain(shrink: Shrink) -> dict[str, object]:
-    return {"before": shrink.before, "after": shrink.after, "shrink": shrink.share.plain()}
 
 
 callable_module(__name__)

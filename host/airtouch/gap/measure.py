@@ -27,7 +27,7 @@ from airtouch.logs.flight_log import RPM, FlightLog
 from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle
 
-LEAST_RPM = 500.0  #: of a rotor in flight
+LEAST_RPM = 500.0  #: of a rotor in flight; chosen, far below any hover
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,8 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
 
 
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """What logs cannot say, each reason once, with the number of flights where it is not all. flights: reasons of each.
+    """
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
 
@@ -177,20 +179,21 @@ def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
                      np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
 
 
-def _rotors(found: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
-    known = [s for s in found if s is not None]
-    if not known:
-        return ()
-    made = []
-    for i in range(4):
-        pairs = np.array([s[:, i] for s in known if np.isfinite(s[0, i])])
+def _rotors(speeds: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
+    """Mean logged and modelled speed of each rotor, 1/min, and their ratio with its range over the flights.
+
+    speeds: (2, 4) of each flight, see `_rotor_speeds`. A rotor that no flight logs is left out.
+    """
+    out = []
+    for rotor in range(4):
+        pairs = np.array([s[:, rotor] for s in speeds if s is not None and np.isfinite(s[0, rotor])])
         if len(pairs):
             ratio = pairs[:, 0] / np.maximum(pairs[:, 1], 1.0)
-            logged, model = pairs.mean(axis=0)
-            made.append({"rotor": i + 1, "logged": float(logged), "modelled": float(model),
-                         "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
-                         "flights": len(pairs)})
-    return tuple(made)
+            logged, modelled = pairs.mean(axis=0)
+            out.append({"rotor": rotor + 1, "logged": float(logged), "modelled": float(modelled),
+                        "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
+                        "flights": len(pairs)})
+    return tuple(out)
 
 
 def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:
@@ -206,16 +209,19 @@ def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:
 
 
 def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict[str, Any]:
-    """The command view: mean spectra of the commands, empty without a steady stretch in flight."""
+    """The command view: mean spectra of the commands, empty without a steady stretch in flight.
+
+    flown, nominal: `_command_power` (bins, 4) of each flight.
+    """
     total = np.sum(flown, axis=0)
     if not len(flown) or not total[0, -1]:
         return {}
     made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
-    usual = np.sum(nominal, axis=0) if len(nominal) else None
+    of_nominal = np.sum(nominal, axis=0) if len(nominal) else None
     for i, axis in enumerate(AXES):
         made[axis] = {"flown": (total[:, i] / total[0, -1]).tolist()}
-        if usual is not None and usual[0, -1]:
-            made[axis]["nominal"] = (usual[:, i] / usual[0, -1]).tolist()
+        if of_nominal is not None and of_nominal[0, -1]:
+            made[axis]["nominal"] = (of_nominal[:, i] / of_nominal[0, -1]).tolist()
     return made
 
 

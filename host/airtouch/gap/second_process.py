@@ -14,7 +14,7 @@ from airtouch.simulation.effects import Effect, get
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-MOST = 255  #: pieces that are shared at once: one byte each in a pipe
+MOST_ITEMS = 255  #: that are shared at once: each is one byte in a pipe
 
 
 def shared(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
@@ -24,14 +24,14 @@ def shared(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Re
     What the fork computes beside its results is lost. `function` must depend on its item alone and print nothing.
     """
     items = list(items)
-    if not 2 <= len(items) <= MOST or not spare_core():
+    if not 2 <= len(items) <= MOST_ITEMS or not spare_core():
         return [function(x) for x in items]
     tickets, filled = os.pipe()  # one byte for each item, which one process reads
     os.write(filled, bytes(range(len(items))))
     os.close(filled)
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe(duplex=False)
-    other = context.Process(target=_work, args=(function, items, tickets, theirs), daemon=True)
+    other = context.Process(target=_do_items, args=(function, items, tickets, theirs), daemon=True)
     other.start()
     theirs.close()
     try:
@@ -57,7 +57,7 @@ def _taken(tickets: int) -> Iterator[int]:
         yield byte[0]
 
 
-def _work(function: Callable[[Any], Any], items: list, tickets: int, results: Connection) -> None:
+def _do_items(function: Callable[[Any], Any], items: list, tickets: int, results: Connection) -> None:
     """Do items as long as there are any, and send them all; nothing if one fails, so that it fails in the parent."""
     sys.stderr = open(os.devnull, "w")  # another thread of the parent may have held the lock of its own  # noqa: SIM115
     done = {i: function(items[i]) for i in _taken(tickets)}

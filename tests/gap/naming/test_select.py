@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from airtouch.gap.answer.unexplained import fails
+from airtouch.gap.answer.reasons import shortfall
 from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
@@ -290,8 +290,8 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,), free_after=1.0)
     assert exact.unlike == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
-    assert fails(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
-        and worst in fails(exact, selection.singles["imu_bias"])
+    assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
+        and worst in shortfall(exact, selection.singles["imu_bias"])
 
 
 def test_a_right_effect_is_not_contradicted():

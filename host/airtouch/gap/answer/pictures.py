@@ -13,7 +13,7 @@ from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import Cell
-from airtouch.gap.signals.channels import CHANNELS, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
@@ -26,8 +26,6 @@ MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
 FEWEST_BLOCKS = 8  #: blocks of nominal flights above which their mean power is the floor of a spectrum
 TINY = 1e-12  #: power of a floor at least, in a channel's unit squared
-#: column of each channel, by its name
-PLACE = {c.name: i for i, c in enumerate(CHANNELS)}
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ def _signal(study: Study, flight: Flight, effects: Sequence[Term], cell: Cell) -
     """The curves of one flight in a cell's channel, up to the end of its band."""
     active = [t.active() for t in effects if t.kind == MEAN]
     band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else 0
-    c = PLACE[cell.channel]
+    c = COLUMN[cell.channel]
     measured = _measured(flight, c)
     def lowpass(values):
         return None if values is None else _lowpass(flight, values, band)
@@ -111,7 +109,7 @@ def _signal(study: Study, flight: Flight, effects: Sequence[Term], cell: Cell) -
 
 def _median_flight(study: Study, flights: Sequence[Flight], cell: Cell) -> Flight:
     """The flight whose gap in the cell's channel is the median of all flights'."""
-    c = PLACE[cell.channel]
+    c = COLUMN[cell.channel]
     size = [np.nan_to_num(np.nanstd(_residual(study, f)[f.usable & (f.phase != GROUND), c])) for f in flights]
     return flights[int(np.argsort(size)[len(size) // 2])]
 
@@ -161,6 +159,6 @@ def _spectra(study: Study, flights: Sequence[Flight], effects: Sequence[Term], c
                        sensor_power(sensor_noise(study.vehicle), AIR), TINY)
     power, power_after = np.mean(before, axis=0), np.mean(after, axis=0)
     power_after = floor + np.abs(power_after - floor - random_power / len(before)) if random else power_after
-    return tuple(Spectrum(name, CHANNELS[PLACE[name]].unit, power[:, PLACE[name]],
-                          power_after[:, PLACE[name]] if effects else None, floor[:, PLACE[name]])
-                 for name in channels if np.isfinite(power[:, PLACE[name]]).all())
+    return tuple(Spectrum(name, CHANNELS[COLUMN[name]].unit, power[:, COLUMN[name]],
+                          power_after[:, COLUMN[name]] if effects else None, floor[:, COLUMN[name]])
+                 for name in channels if np.isfinite(power[:, COLUMN[name]]).all())

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from airtouch.gap.answer.named_effects import chosen_effects
+from airtouch.gap.answer.reasons import why_not
 from airtouch.gap.answer.shrink import Cells, Shrink, nearer, shrink_of
-from airtouch.gap.answer.unexplained import why_not
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Selection, probabilities

@@ -6,7 +6,7 @@ A cell's own floor is 1 by definition: where less is left, the flights were calm
 ones by so much, and that is taken off the floor, not off the gap.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,14 +22,14 @@ from airtouch.gap.signatures.term import Term
 
 SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
-FEWEST = 12  #: values that a cell needs
-DRAWS = 400  #: bootstrap samples of the shrink
-PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws
+FEWEST = 12  #: values that a cell needs; chosen
+DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
+PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws; chosen
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
-LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap
-LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given
-LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least
-CLOCK_PIECES = 8  #: parts of a flight, of which every other one is a half of the data
+LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
+LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
+LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least; chosen
+JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,10 @@ class Cells:
 
 
 def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
-    """The cells in which the gap of two halves of the data is measured. named: the effects named."""
+    """The cells in which the gap of two halves of the data is measured, each half's as the other shows them.
+
+    parts: the two halves; named: the effects named.
+    """
     terms = _terms(named)
     chosen = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
     after = _energies(data, parts, terms, chosen)
@@ -66,19 +69,50 @@ def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
 def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells, seed: int = 0) -> Shrink:
     """The gap over all held-out blocks, each half judged under the fit of the other. seed: of the bootstrap."""
     if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
-        return _clock(data)
+        return shrink_of_jitter(data)
     before = cells.before
     if not len(before):
         return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
     after = cells.calm + _energies(data, parts, _terms(judged), cells.chosen)
-    rng = np.random.default_rng(seed)
-    pieces = min(PIECES, len(before))
-    a, b = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
-    pick = rng.integers(0, pieces, (DRAWS, pieces))
-    shares = [_share(x, y) for x, y in zip(a[pick].mean(axis=1), b[pick].mean(axis=1), strict=True)]
-    low, high = np.percentile(shares, INTERVAL)
+    low, high = _interval(before, after, seed)
     return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
-                  Quantity(_share(before.mean(), after.mean()), float(low), float(high)))
+                  Quantity(share_closed(before.mean(), after.mean()), low, high))
+
+
+def shrink_of_jitter(data: Data) -> Shrink:
+    """The shrink where only the logged times are odd: how well the jitter of one half predicts the other's.
+
+    Gap is the rms of the logged times around regular ones, over that of nominal flights. After: the floor and what the
+    halves differ by.
+    """
+    floor = max(data.study.floor.clock_s, LEAST_JITTER_S)
+    rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
+                                                 np.array_split(f.clock_s, JITTER_PIECES)[half::2]]) ** 2)))
+           for half in (0, 1)]
+    before = float(np.mean(rms)) / floor
+    after = 1.0 + abs(rms[0] - rms[1]) / floor
+    share = share_closed(before ** 2, after ** 2)
+    return Shrink(before, after, Quantity(share, share, share))
+
+
+def share_closed(before: float, after: float) -> float:
+    """Share of the gap that is gone, (rms before - rms after) / (rms before - 1), within -1 and 1; the floor is 1.
+
+    before, after: energies, the squares of these rms values. A gap of LEAST_GAP or less has no share: 0.
+    """
+    over = np.sqrt(before) - 1.0
+    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_GAP else 0.0
+
+
+def _interval(before: np.ndarray, after: np.ndarray, seed: int) -> tuple[float, float]:
+    """Ends of the share's 90 % interval by block bootstrap of the held-out energies (n,) before and after."""
+    pieces = min(PIECES, len(before))
+    means_before, means_after = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
+    drawn = np.random.default_rng(seed).integers(0, pieces, (DRAWS, pieces))
+    shares = [share_closed(b, a) for b, a in zip(means_before[drawn].mean(axis=1), means_after[drawn].mean(axis=1),
+                                                 strict=True)]
+    low, high = np.percentile(shares, INTERVAL)
+    return float(low), float(high)
 
 
 def nearer(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells) -> bool:
@@ -93,11 +127,9 @@ def nearer(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cell
 def _off_floor(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], cells: Cells) -> float:
     """Distance of the chosen cells' energy from the floor, above or below, summed over their values."""
     total, count = np.zeros(GROUPS), np.zeros(GROUPS)
-    for k in (0, 1):
-        problem, values, power = left_over(data, parts[k], terms[1 - k])
-        use = problem.known & cells.chosen[k][problem.groups]
-        total += np.bincount(problem.groups[use], np.minimum(squared(values[use]) / power[use], LARGEST), GROUPS)
-        count += np.bincount(problem.groups[use], minlength=GROUPS)
+    for groups, energies in _held_out(data, parts, terms, cells.chosen):
+        total += np.bincount(groups, energies, GROUPS)
+        count += np.bincount(groups, minlength=GROUPS)
     return float(np.abs(total - count).sum())
 
 
@@ -108,13 +140,20 @@ def _terms(judged: Judged | None) -> Sequence[Sequence[Term]]:
 
 def _energies(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], chosen: Sequence[np.ndarray],
               ) -> np.ndarray:
-    """Energy (n,) over the floor that effects fitted to each half leave of the other's values in chosen cells."""
-    out = []
-    for k in (0, 1):
-        problem, values, power = left_over(data, parts[k], terms[1 - k])
-        use = problem.known & chosen[k][problem.groups]
-        out.append(np.minimum(squared(values[use]) / power[use], LARGEST))
-    return np.concatenate(out)
+    """Energies (n,) of both halves: see `_held_out`."""
+    return np.concatenate([energies for _, energies in _held_out(data, parts, terms, chosen)])
+
+
+def _held_out(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], chosen: Sequence[np.ndarray],
+              ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """For each half, group (n,) and energy (n,) over the floor of its values in chosen cells.
+
+    The energy is what effects as fitted to the other half leave. chosen: mask (GROUPS,) for each half.
+    """
+    for half in (0, 1):
+        problem, values, power = left_over(data, parts[half], terms[1 - half])
+        use = problem.known & chosen[half][problem.groups]
+        yield problem.groups[use], np.minimum(squared(values[use]) / power[use], LARGEST)
 
 
 def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
@@ -127,21 +166,3 @@ def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST)
-
-
-def _clock(data: Data) -> Shrink:
-    """The shrink of jitter in the logged times: how well the rms of one half predicts the other's, over the floor."""
-    floor = max(data.study.floor.clock_s, LEAST_JITTER_S)
-    rms = [float(np.sqrt(np.mean(np.concatenate([h for f in data.flights
-                                                  for h in np.array_split(f.clock_s, CLOCK_PIECES)[k::2]]) ** 2)))
-           for k in (0, 1)]
-    before = float(np.mean(rms)) / floor
-    after = 1.0 + abs(rms[0] - rms[1]) / floor
-    share = _share(before ** 2, after ** 2)
-    return Shrink(before, after, Quantity(share, share, share))
-
-
-def _share(before: float, after: float) -> float:
-    """The share of the gap that went, (before - after) / (before - floor) of rms values with a floor of 1."""
-    over = np.sqrt(before) - 1.0
-    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_GAP else 0.0

@@ -21,19 +21,20 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 
 def _where(diagnosis: Diagnosis) -> str:
-    one = diagnosis.headline
-    if one is None:
+    """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
+    cell = diagnosis.headline
+    if cell is None:
         return "Nowhere does the gap stand out of its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
-    spread = len({c.phase for c in summary.same_place(cells, one)})
+    standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND})
-    return (f"The gap lies mostly in {CHANNEL_WORDS[one.channel]} at {band_in_words(one)}: {PHASE_WORDS[one.phase]} it "
-            "is "
-            f"{short(one.gap)} {one.unit}, {short(ratio(one))} times the floor"
-            + (f", and it stands out in {spread} of {flown} phases in the air." if flown > 1 else "."))
+    return (f"The gap lies mostly in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
+            f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
+            + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 
 
 def _which(diagnosis: Diagnosis) -> str:
+    """The effects named with their probability; where none is, what comes nearest."""
     chance = f"{diagnosis.ranking[0].probability:.0%}" if diagnosis.ranking else "not known"
     if diagnosis.verdict == "none":
         return f"No unmodelled effect stands out (probability {chance})."
@@ -56,29 +57,33 @@ def _named(effect: Found) -> str:
 
 
 def _how_far(diagnosis: Diagnosis) -> str:
+    """How far the effects named close the gap; how large it is where none is named."""
     before, after = (diagnosis.gap.get(k) for k in ("before", "after"))
     if before is None or after is None:
         return "How far it would close is not known."
+    if diagnosis.verdict == "none":
+        size = "at the floor" if short(before) == "1" else f"{short(before)} times the floor"
+        return f"Over all it is {size}, so there is nothing to close."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
-        if diagnosis.verdict == "none":
-            size = "at the floor" if short(before) == "1" else f"{short(before)} times the floor"
-            return f"Over all it is {size}, so there is nothing to close."
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
-    cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
+    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
+            f"floor on data held out, from {short(before)} to {short(after)} times the floor"
+            f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}.")
+
+
+def _cells_in_words(cells: Sequence[Cell]) -> str:
+    """How many cells still stand out with the effects named, and how many got worse; "" where neither."""
     open_cells, worse_cells = summary.remaining(cells), summary.worse(cells)
     over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
-    remark = ""
+    out = ""
     if open_cells:
-        remark = f"; {len(open_cells)} of {over} cells still stand out, mostly {_after_in_words(open_cells[0])}"
-    if worse_cells:
-        remark += f", and {len(worse_cells)} got worse"
-    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
-            "floor on data "
-            f"held out, from {short(before)} to {short(after)} times the floor{remark}.")
+        out = f"; {len(open_cells)} of {over} cells still stand out, mostly {_after_in_words(open_cells[0])}"
+    return out + (f", and {len(worse_cells)} got worse" if worse_cells else "")
 
 
 def _after_in_words(cell: Cell) -> str:
+    """`at take-off in lift at 0-0.5 Hz (6.1 to 4 times the floor)`."""
     before, after = short(ratio(cell)), short(summary.after(cell))
     change = f"{before} to {after} times the floor" if after != before else f"{after} times the floor, as before"
     return f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} ({change})"
@@ -115,8 +120,8 @@ def all_open_in_words(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """One line for each place where the gap stays open. Phases that share their worst seconds share a line."""
     lines: dict[str, tuple[Mapping[str, Any], list[str]]] = {}
     for entry in entries:
-        same = open_in_words({**entry, "phase": ""})
-        lines.setdefault(same, (entry, []))[1].append(entry["phase"])
+        line_without_phase = open_in_words({**entry, "phase": ""})
+        lines.setdefault(line_without_phase, (entry, []))[1].append(entry["phase"])
     return [open_in_words({**entry, "phase": joined(phases)}) for entry, phases in lines.values()]
 
 
@@ -125,8 +130,8 @@ def open_in_words(entry: Mapping[str, Any]) -> str:
     low, high = entry["band_hz"]
     follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
     return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to "
-            f"{entry['over_floor']:.1f} times the "
-            f"floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of {Path(entry['flight']).name}{follows}")
+            f"{entry['over_floor']:.1f} times the floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of "
+            f"{Path(entry['flight']).name}{follows}")
 
 
 def nearest_in_words(diagnosis: Diagnosis) -> list[str]:

@@ -1,22 +1,32 @@
 """The diagnosis of flights without a gyro, from the balance of the motors in hover (`hover_balance`)."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from airtouch.gap import measure
 from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
+from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, hypotheses, pattern, reference
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where import summary
-from airtouch.simulation.effects import get
+from airtouch.simulation.effects import Parameter, get
 from airtouch.vehicle import Vehicle
 
-LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for com_offset to be named
+LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for com_offset to be named; chosen
+COMPETES = 0.5  #: of the answer's probability, from which on another name counts as one that fits alike; chosen
+#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen
+WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
+#: the two names of a weight: on the vehicle; so far off centre that its own mass does not show
+WEIGHT, OFF_CENTRE = "mass", "com_offset"
+NO_GYRO = ("no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
+           "leave both as they are were not tried")
+NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
@@ -30,89 +40,121 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
               notes: Sequence[str] = (), without: Iterable[str] = (), pictures: bool = False) -> Diagnosis:
     """Which of the hypotheses of `hover_balance` the flights' mean pattern fits best."""
     left_out = set(without)
-    every = [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
+    candidates = [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
     voltage = all(f.log.has("vbat_V") for f in (*flights, *nominal))
     base = reference(np.array([pattern(f, vehicle, voltage) for f in nominal]))
-    table = np.array([pattern(f, vehicle, voltage) for f in flights])
-    seen = np.nanmean(table, axis=0)
-    logs, weights = evidence(seen, base, every)
+    seen = np.nanmean(np.array([pattern(f, vehicle, voltage) for f in flights]), axis=0)
+    logs, weights = evidence(seen, base, candidates)
+    total = probabilities(logs, candidates)
+    first, probability = likeliest(total)
+    best = {n: max((i for i, h in enumerate(candidates) if h.name == n), key=logs.__getitem__) for n in total}
+    shrink = {n: _shrink(seen, base, candidates[i], weights[i]) for n, i in best.items()}
+    hypothesis, weight = candidates[best[first]], weights[best[first]]
+    verdict = first if first in ("none", "unknown") else "effect"
+    effects = _found(hypothesis, weight) if verdict == "effect" else []
+    cells = _cells(seen, base, vehicle, hypothesis, weight, len(flights))
+    alike = _alike(effects, total, first, probability)
+    headline = summary.headline(cells, bool(effects))
+    steps = advices.steps(verdict, effects, alike, headline, flights, True, vehicle.name)
+    return Diagnosis(
+        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
+        indistinguishable=alike, where=cells,
+        gap={"before": shrink[first].before, "floor": 1.0,
+             "after": shrink[first].after if verdict == "effect" else shrink[first].before},
+        shrink=shrink[first].share if verdict == "effect" else None,
+        control=_control(total, first, shrink) if verdict == "effect" else {},
+        advice=advices.advice(steps), notes=_notes(voltage, notes),
+        cannot=measure.cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
+        map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
+        vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
+        pictures=picture.of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)
+
+
+def probabilities(logs: np.ndarray, candidates: Sequence[Hypothesis]) -> dict[str, float]:
+    """Posterior probability of each name, all its hypotheses together. logs: log evidence of each hypothesis."""
     chance = np.exp(logs - logs.max())
     chance /= chance.sum()
-    names = list(dict.fromkeys(h.name for h in every))
-    total = {n: float(sum(c for c, h in zip(chance, every, strict=True) if h.name == n)) for n in names}
-    family = {n: total[n] for n in names}
-    if "mass" in family:
-        family["mass"] += family.get("com_offset", 0.0)  # a weight, whether its own mass shows or not
+    return {name: float(sum(c for c, h in zip(chance, candidates, strict=True) if h.name == name))
+            for name in dict.fromkeys(h.name for h in candidates)}
+
+
+def likeliest(total: Mapping[str, float]) -> tuple[str, float]:
+    """The likeliest name, and the probability that other names are held against.
+
+    A weight on the vehicle and one off centre count as one; of the two the likelier is the answer. The probability is
+    that of both for the one on the vehicle, its own for the one off centre, with which the other may compete.
+    """
+    family = dict(total)
+    if WEIGHT in family:
+        family[WEIGHT] += family.get(OFF_CENTRE, 0.0)
     first = max(family, key=family.__getitem__)
-    if first == "mass" and total.get("com_offset", 0.0) > total["mass"]:
-        first = "com_offset"
-    best = {n: max((i for i, h in enumerate(every) if h.name == n), key=logs.__getitem__) for n in names}
-    share = {n: _shrink(seen, base, every[i], weights[i]) for n, i in best.items()}
-    ranking = _ranking(names, first, total, family, {n: s[1] for n, s in share.items()})
-    verdict = first if first in ("none", "unknown") else "effect"
-    effects = _found(every[best[first]], weights[best[first]]) if verdict == "effect" else ()
-    cells = _cells(seen, base, vehicle, every[best[first]], weights[best[first]], len(flights))
-    before, after = share[first][0]
+    if first == WEIGHT and total.get(OFF_CENTRE, 0.0) > total[WEIGHT]:
+        first = OFF_CENTRE
+    return first, family[first]
+
+
+def _alike(effects: Sequence[Found], total: Mapping[str, float], first: str, probability: float,
+           ) -> tuple[tuple[str, ...], ...]:
+    """Sets of names that the flights cannot tell apart: names of one thing, and those that COMPETE with the answer."""
     alike = [tuple(sorted(group[0])) for e in effects if (group := names_alike(e.name))]
-    others = [n for n in names if n not in (first, "unknown") and total[n] > 0.5 * family[first]]
+    others = [n for n in total if n not in (first, "unknown") and total[n] > COMPETES * probability]
     if others:
         alike.append(tuple(sorted({first, *others})))
-    wrong = next((n for n in ("com_offset", "slung_load", "mass", "weak_motor") if n in names and n != first
-                  and total[n] < 0.1), None)
-    control = {}
-    if verdict == "effect" and wrong is not None:
-        (gap, left), part = share[wrong]
-        control = {"name": wrong, "before": gap, "after": left, "shrink": part.plain()}
-    said = ["no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
-            "leave both as they are were not tried", *notes]
-    if not voltage:
-        said.append("no battery voltage in some flights: their lift may differ for that alone")
-    alike = list(dict.fromkeys(alike))
-    headline = summary.headline(cells, bool(effects))
-    made = GapMap(cells, BASELINE, tuple(f.name for f in flights))
-    steps = advices.steps(verdict, effects, alike, headline, flights, True, vehicle.name)
-    study = declared_study(vehicle, ())
-    return Diagnosis(
-        verdict, tuple(effects), tuple(ranking), tuple(alike), cells,
-        {"before": before, "after": after if verdict == "effect" else before, "floor": 1.0},
-        share[first][1] if verdict == "effect" else None, control,
-        advices.advice(steps), {}, tuple(said), measure.cannot_of([f.cannot for f in flights]),
-        tuple(f.name for f in flights), (), made, headline, steps, vehicle.name, tuple(f.name for f in nominal), {},
-        picture.of(study, flights, nominal, [], headline, cells) if pictures else None)
+    return tuple(dict.fromkeys(alike))
 
 
-def _ranking(names: Sequence[str], first: str, total: Mapping[str, float], family: Mapping[str, float],
-             share: Mapping[str, Quantity]) -> list[Ranked]:
+def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> dict[str, Any]:
+    """The gap with a deliberately wrong effect, JSON-ready; empty where none of WRONG is surely wrong."""
+    wrong = next((n for n in WRONG if n in total and n != first and total[n] < WRONG_BELOW), None)
+    if wrong is None:
+        return {}
+    return {"name": wrong, "before": shrink[wrong].before, "after": shrink[wrong].after,
+            "shrink": shrink[wrong].share.plain()}
+
+
+def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
+    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
+    return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
+
+
+def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[Ranked]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     chance = dict(total)
-    weight = "com_offset" if first == "mass" else "mass"
-    if first in ("mass", "com_offset") and weight in chance:
+    weight = OFF_CENTRE if first == WEIGHT else WEIGHT
+    if first in (WEIGHT, OFF_CENTRE) and weight in chance:
         chance[first], chance[weight] = chance[first] + chance[weight], 0.0
     why = {}
     if chance.get(weight) == 0.0:
         why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
     best = max(chance.values())
-    return sorted((Ranked(n, chance[n], share[n],
+    return sorted((Ranked(n, p, shrink[n].share,
                           "" if n == first
-                          else why.get(n, f"{best / max(chance[n], 1e-12):.3g} times less probable than {first}"))
-                   for n in names), key=lambda r: (r.name != first, -r.probability))
+                          else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
+                   for n, p in chance.items()), key=lambda r: (r.name != first, -r.probability))
 
 
-def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis,
-            weight: np.ndarray) -> tuple[tuple[float, float], Quantity]:
-    """Gap before and after in deviations of the floor, and the share of it that goes, with its interval."""
+def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis, weight: np.ndarray) -> Shrink:
+    """Gap before and after in deviations of the floor, and the share of it that goes, with its interval.
+
+    seen: pattern (8,); weight (samples,): of the hypothesis's samples.
+    """
     gap, spread = base.difference(seen)[:4], np.sqrt(base.variance[:4])
-    def rms(x):
-        return float(np.sqrt(np.mean((x / spread) ** 2)))
+
+    def rms(difference: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((difference / spread) ** 2)))
+
     before, after = rms(gap), rms(gap - weight @ h.change)
-    each = np.sqrt((((gap - h.change) / spread) ** 2).mean(axis=1))
-    def part(a):
-        return float(np.clip((before - a) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
-    low, high = _quantile(each, weight, 0.95), _quantile(each, weight, 0.05)
-    return (before, after), Quantity(part(after), min(part(low), part(after)), max(part(high), part(after)))
+    after_each = np.sqrt((((gap - h.change) / spread) ** 2).mean(axis=1))
+
+    def share(rest: float) -> float:
+        return float(np.clip((before - rest) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
+
+    low, high = share(_quantile(after_each, weight, 0.95)), share(_quantile(after_each, weight, 0.05))
+    return Shrink(before, after, Quantity(share(after), min(low, share(after)), max(high, share(after))))
 
 
 def _quantile(values: np.ndarray, weight: np.ndarray, q: float) -> float:
+    """The q-quantile of samples (n,) with weights (n,) that add up to 1."""
     order = np.argsort(values)
     return float(np.interp(q, np.cumsum(weight[order]), values[order]))
 
@@ -124,24 +166,26 @@ def _found(h: Hypothesis, weight: np.ndarray) -> list[Found]:
         if name == "com_offset" and len(h.effects) > 1 and not any(
                 max(weight @ (v > 0), weight @ (v < 0)) > LEAST_SHIFT for v in drawn.values()):
             continue
-        parameters = {}
-        for p in get(name).parameters:
-            if p.name in drawn:
-                v = drawn[p.name]
-                interval = () if p.integer else (_quantile(v, weight, 0.05), _quantile(v, weight, 0.95))
-                parameters[p.name] = Quantity(float(weight @ v), *interval, unit=p.unit) if interval \
-                    else Quantity(float(v[0]), unit=p.unit)
-        out.append(Found(name, parameters))
+        out.append(Found(name, {p.name: _posterior(drawn[p.name], weight, p)
+                                for p in get(name).parameters if p.name in drawn}))
     return out
+
+
+def _posterior(samples: np.ndarray, weight: np.ndarray, parameter: Parameter) -> Quantity:
+    """Mean and 90 % interval of a parameter; an integer, as a rotor's number, is the same in all samples."""
+    if parameter.integer:
+        return Quantity(float(samples[0]), unit=parameter.unit)
+    return Quantity(float(weight @ samples), _quantile(samples, weight, 0.05), _quantile(samples, weight, 0.95),
+                    parameter.unit)
 
 
 def _cells(seen: np.ndarray, base: Reference, vehicle: Vehicle, h: Hypothesis, weight: np.ndarray,
            flights: int) -> tuple[Cell, ...]:
-    """The pattern as forces and angular accelerations in hover, largest over the floor first."""
-    g, half = vehicle.gravity_mps2, vehicle.arm_m / np.sqrt(2.0)
-    inertia, lift = vehicle.inertia_kg_m2, vehicle.mass_kg * vehicle.gravity_mps2
-    unit = np.array([g, lift * half / inertia[0], lift * half / inertia[1],
-                     lift * vehicle.yaw_torque_over_thrust_m / inertia[2]])
+    """The pattern (8,) as lift and angular accelerations in hover, largest over the floor first."""
+    half_side, lift = vehicle.arm_m / np.sqrt(2.0), vehicle.mass_kg * vehicle.gravity_mps2
+    inertia = vehicle.inertia_kg_m2
+    unit = np.array([vehicle.gravity_mps2, lift * half_side / inertia[0], lift * half_side / inertia[1],
+                     lift * vehicle.yaw_torque_over_thrust_m / inertia[2]])  # of each entry in its channel's unit
     gap = base.difference(seen)[:4]
     after = gap - weight @ h.change
     floor = np.sqrt(base.variance[:4])

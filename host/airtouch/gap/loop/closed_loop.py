@@ -114,14 +114,16 @@ class ClosedLoop:
 
     def _change(self, row: Any, f: np.ndarray) -> Change:
         """`torque_change` of the effects that make a plant row."""
-        plain = self._plain
+        plain, roll = self._plain, AXES[1]
         after, before = self._shares(row, f), self._shares(plain, f)
         share = after / before if self.by_firmware else np.ones_like(before)
-        motors = self._torque(row, AXES[1], f) / self._torque(plain, AXES[1], f)
+        motors = self._torque(row, roll, f) / self._torque(plain, roll, f)
         share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
-        logged = logged_over_flown(firmware(plain, AXES[1]), f)
-        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]), logged[:, None],
-                      np.stack([self._unexplained(plain, f), self._unexplained(row, f)]))
+        _, stepped, stepped_as_nominal = share
+        return Change(motors=motors[:, None], share=share[:2], before=before[:2],
+                      cut=np.abs(stepped - stepped_as_nominal),
+                      logged=logged_over_flown(firmware(plain, roll), f)[:, None],
+                      unexplained=np.stack([self._unexplained(plain, f), self._unexplained(row, f)]))
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
@@ -218,6 +220,7 @@ class ClosedLoop:
         return np.fft.irfft(spectrum, len(logged), axis=0)
 
     def _gyro_noise(self) -> np.ndarray:
+        """Rms (3,) of the calibrated gyro's noise, rad/s."""
         return np.maximum(self._plain["gyro_noise"], 1e-9)
 
     def nominal_power(self) -> np.ndarray:
@@ -225,6 +228,7 @@ class ClosedLoop:
         return self.workspace.once("power", (), lambda: self._power(self._plain))
 
     def _power(self, row: Any) -> np.ndarray:
+        """Modelled power of the commands (bins, AXES) of a plant row, N^2/Hz; far above any where it would not fly."""
         f = fine_frequencies()
         by_axis = []
         for i, axis in enumerate(AXES):
@@ -238,6 +242,7 @@ class ClosedLoop:
 
 
 def _power_and_phase(row: Any, axis: str, f: np.ndarray, controller: Controller) -> tuple[np.ndarray, float]:
+    """`noise_power` (sources, bins) and `excess_phase`, rad."""
     return noise_power(controller, row, axis, f), excess_phase(controller, row, axis)
 
 

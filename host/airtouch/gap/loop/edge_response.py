@@ -15,6 +15,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
+from airtouch.logs.segments import KINDS as PHASES
 from airtouch.logs.segments import PLATFORM_STEP_M
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import flights as simulated
@@ -25,8 +26,14 @@ BEFORE, AFTER = 30, 130  #: samples around an edge
 BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust, speed, height
 COUNT = sum(n for _, n in BINS)
 KINDS = ("entry", "exit")
+LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
 SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges are simulated
-LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter
+LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
+WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
+#: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
+SHRINKAGE = 0.3
+#: speed (m/s) and seconds of a crossing where a log does not show them
+USUAL_MPS, USUAL_S = 0.3, 2.5
 _MISSION = """
 name = "edge-response"
 [[platform]]
@@ -96,27 +103,39 @@ def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int)
 def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
     """Mean response and scatter of flights declared nominal; None where they cross no edge."""
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
-    windows = []
+    without_edge: list[np.ndarray] = []
     for f in flights:
         edges = edges_of(f)
         for e in edges:
             responses[e.kind].append(response(f.log, vehicle, f.turn, e.sample))
-        level = np.isin(f.phase, (2, 3, 4))
-        for at in range(BEFORE, len(f) - AFTER, 20):
-            if level[at - BEFORE:at + AFTER].all() and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges):
-                windows.append(response(f.log, vehicle, f.turn, at))
-    if not all(responses.values()) or len(windows) < LEAST_WINDOWS:
+        without_edge += [response(f.log, vehicle, f.turn, at) for at in _without_edge(f, edges)]
+    if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
         return None
-    scatter = np.array(windows) - np.mean(windows, axis=0)
-    spread = np.cov(scatter.T)
-    mixed = 0.7 * spread + 0.3 * np.diag(np.diag(spread)) + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9)
-    nominal = {k: np.mean(v, axis=0) for k, v in responses.items()}
-    counts = {k: len(v) for k, v in responses.items()}
-    deviations = np.array([x - nominal[k] for k, v in responses.items() if len(v) > 1 for x in v])
+    covariance = _covariance(np.array(without_edge), responses)
+    return EdgeFloor(vehicle, tuple(calibration), {k: np.mean(v, axis=0) for k, v in responses.items()},
+                     {k: len(v) for k, v in responses.items()}, np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
+    """Samples of level flight that have no edge near them, WINDOW_STEP apart."""
+    level = np.isin(flight.phase, LEVEL)
+    return [at for at in range(BEFORE, len(flight) - AFTER, WINDOW_STEP) if level[at - BEFORE:at + AFTER].all()
+            and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges)]
+
+
+def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]]) -> np.ndarray:
+    """Covariance (COUNT, COUNT) of a response: of stretches without an edge, and what edges scatter beyond them.
+
+    without_edge: responses (stretches, COUNT); at_edges: those of each kind of edge.
+    """
+    spread = np.cov((without_edge - np.mean(without_edge, axis=0)).T)
+    out = ((1.0 - SHRINKAGE) * spread + SHRINKAGE * np.diag(np.diag(spread))
+           + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9))
+    deviations = np.array([x - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1 for x in v])
     if len(deviations):
-        own = deviations.T @ deviations / max(sum(n - 1 for n in counts.values()), 1)
-        mixed += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
-    return EdgeFloor(vehicle, tuple(calibration), nominal, counts, np.linalg.inv(np.linalg.cholesky(mixed)))
+        own = deviations.T @ deviations / max(sum(len(v) - 1 for v in at_edges.values()), 1)
+        out += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
+    return out
 
 
 def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
@@ -157,7 +176,7 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
 
 
 def _place(flight: Flight) -> tuple[float, float, float, float]:
-    """Height, clearance, speed and length of crossing, rounded so that flights share a simulation."""
+    """Height and clearance (m), speed (m/s) and length (m) of crossing, rounded so that flights share a simulation."""
     edges = edges_of(flight)
     if not edges:
         raise ValueError(f"{flight.name}: no edge in this flight")
@@ -165,11 +184,11 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
     leave = next((e for e in edges if e.kind == "exit" and (entry is None or e.sample > entry.sample)), None)
     edge = entry or leave or edges[0]
     high, low = max(edge.height_before_m, edge.height_after_m), min(edge.height_before_m, edge.height_after_m)
-    speed = 0.3
+    speed = USUAL_MPS
     if flight.log.has(*VELOCITY[:2]):
         v = motion.held(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
-    seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else 2.5
+    seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else USUAL_S
     speed = float(np.clip(speed, 0.1, 0.9))
     length = float(np.clip(seconds * speed, 0.4, 2.0))
     return round(high, 1), round(max(low, 0.01), 2), round(speed, 1), round(length, 1)
@@ -194,6 +213,7 @@ def _simulated_responses(floor: EdgeFloor, place: tuple[float, float, float, flo
 
 def _simulate(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
                ) -> dict[str, np.ndarray]:
+    """Mean response (COUNT,) by kind of two flights over a platform; 0 for a kind that neither crosses."""
     height, low, speed, length = place
     text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
                            way=1.5 + length + 1.5 * speed + 0.3, speed=speed)

@@ -27,7 +27,11 @@ from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-FEWEST = 6  #: blocks of nominal flights, for a command view
+FEWEST = 6  #: blocks of nominal flights, for a command view; chosen
+#: nats by which fitted gains must be likelier than the firmware's documented ones, for each axis; chosen
+FREE_GAINS = 1.5
+FLOOR_SMOOTH = 3.0  #: bins, standard deviation of the Gaussian that smooths the floor over the model's shape; chosen
+STEPS = 300  #: updates of noise strengths; chosen
 
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
@@ -42,26 +46,30 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     row = prepare(vehicle, calibration)[0][0]
     documented = [noise_strengths(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
     searched = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
-    weight = 0.5 * len(powers)
-    by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in searched) + 1.5 * len(AXES)
-    controllers = documented if by_firmware else searched
-    loop = ClosedLoop(vehicle, tuple(calibration), tuple(c[2] for c in controllers), by_firmware,
-                      tuple(c[0] for c in controllers), power, len(powers), slopes,
+    weight = 0.5 * len(powers)  # half overlapping blocks hold every sample twice
+    by_firmware = (weight * sum(misfit for _, misfit, _ in documented)
+                   < weight * sum(misfit for _, misfit, _ in searched) + FREE_GAINS * len(AXES))
+    strengths, _, controllers = zip(*(documented if by_firmware else searched), strict=True)
+    loop = ClosedLoop(vehicle, tuple(calibration), controllers, by_firmware, strengths, power, len(powers), slopes,
                       edge_floor_of(flights, vehicle, calibration))
     model = loop.nominal_power()
-    return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
+    return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), FLOOR_SMOOTH, axis=0,
+                                                                mode="nearest")))
 
 
 def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarray,
-                    steps: int = 300) -> tuple[np.ndarray, float, Controller]:
-    """Noise strengths of highest Whittle likelihood for a command's power, its negative a block, and the controller."""
+                    steps: int = STEPS) -> tuple[np.ndarray, float, Controller]:
+    """Noise strengths (sources,) of highest Whittle likelihood for a command's power (bins,), and their controller.
+
+    Between them the misfit: the negative log likelihood a block, nats, above that of a model that fits every bin.
+    """
     shapes = through_window(noise_power(controller, row, axis, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
-    a = np.full(len(shapes), 1.0 / len(shapes))
-    _update(a, np.ascontiguousarray(shapes), np.ascontiguousarray(power), steps)
-    e = power / (a @ shapes)
-    return a * scale, float((e - np.log(e) - 1.0).sum()), controller
+    strengths = np.full(len(shapes), 1.0 / len(shapes))
+    _update(strengths, np.ascontiguousarray(shapes), np.ascontiguousarray(power), steps)
+    over_model = power / (strengths @ shapes)
+    return strengths * scale, float((over_model - np.log(over_model) - 1.0).sum()), controller
 
 
 @njit(types.void(float64[::1], float64[:, ::1], float64[::1], int64), cache=True, error_model="numpy")

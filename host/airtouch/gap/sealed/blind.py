@@ -30,11 +30,11 @@ from airtouch.simulation.effects import Active, get
 from airtouch.vehicle import Vehicle, load
 
 SCENARIO, VEHICLE = "diagnosis", "crazyflie-2.1-flow"
-CAL = 6  #: flights free of effects
-SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects
-PAIR_LEVELS = (1, 2)  #: severities of the effects of a pair: not the weakest
+CAL = 6  #: flights free of effects; chosen
+SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects; chosen
+PAIR_LEVELS = (1, 2)  #: severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
-TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength
+TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
 Say = Callable[[str], None]
 
@@ -47,15 +47,9 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     there is a set or a key already and `force` is not given.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
-    for path in (out / "sealed.json", key):
-        if path.exists() and not force:
-            raise AirTouchError(f"{path}: exists already; use --force to replace it")
-    out.mkdir(parents=True, exist_ok=True)
-    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob("opened.json")] if force else []:
-        old.unlink()
+    _clear(out, key, force)
     vehicle = load(VEHICLE)
-    text = (resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes()
-    write_bytes(text, out / "vehicle.toml", True)
+    write_bytes((resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes(), out / "vehicle.toml", True)
     progress("nominal flights")
     cal = nominal(vehicle, CAL_FIRST, CAL, seed)
     for i, log in enumerate(cal):
@@ -70,11 +64,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         progress(name)
         log, effects = _flight(vehicle, drawn, levels, seed, number, rng)
         write(log, out / f"{name}.csv.gz", force=True)
-        answers[name] = {"effects": effects}
-        if len(effects) == 1:  # what a test sees that is told the truth
-            of = effects[0]
-            answers[name]["nats"] = log_ratio(Data(study, list(measure.usable([log], vehicle, []))),
-                                              Active(get(of["name"]), of["values"]))
+        answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
     table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
              "severities": {k: list(v) for k, v in levels.items()}, "answers": answers}
     content = (json.dumps(table, indent=1) + "\n").encode()
@@ -82,6 +72,24 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": flights, "calibration_flights": CAL}
     write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
     return key
+
+
+def _clear(out: Path, key: Path, force: bool) -> None:
+    """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised."""
+    for path in (out / "sealed.json", key):
+        if path.exists() and not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    out.mkdir(parents=True, exist_ok=True)
+    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob("opened.json")] if force else []:
+        old.unlink()
+
+
+def _nats_when_told(study: Study, log: FlightLog, effects: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Log ratio that a test sees which is told effect and values, as the key has it; nothing of pairs and nominal."""
+    if len(effects) != 1:
+        return {}
+    told = Active(get(effects[0]["name"]), effects[0]["values"])
+    return {"nats": log_ratio(Data(study, list(measure.usable([log], study.vehicle, []))), told)}
 
 
 def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
@@ -164,7 +172,7 @@ def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Gener
     names = list(levels)
     every = [(n, level) for level in range(3) for n in names]
     cases: list[list[tuple[str, int]]] = []
-    while len(cases) < singles:
+    while len(cases) < singles:  # every kind at every severity equally often
         cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
     for _ in range(count - singles - none):
         while True:

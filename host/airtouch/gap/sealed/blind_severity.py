@@ -33,8 +33,10 @@ FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(
 #: nats, half of what the means of two log ratios differ by whose deviations are these, as those of normal variables are
 APART = 0.5 * (FALSE_ALARM + POWER) ** 2
 SEEN = 0.5 * FALSE_ALARM ** 2  #: log ratio that chance exceeds in so many flights (Wilks 1938)
-TRIES = 8  #: flights with and without the effect
-HALVINGS = 6
+TRIES = 8  #: flights with and without the effect; chosen
+FEWEST = 3  #: of them that must fly to the end, else the effect is so strong that it is seen anyhow; chosen
+RANGE = 300.0  #: highest plausible strength over the weakest that is tried; chosen
+HALVINGS = 6  #: of the logarithm of that range, so that the strength is known to a tenth; chosen
 FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most the highest plausible
 FIRST = 900_000  #: number of the first flight, beyond those of any set
 
@@ -49,7 +51,7 @@ def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], se
     rng_seed = [seed, sum(map(ord, kind.effect)), int(1e6 * kind.highest)]
     if not _seen(kind, kind.highest, study, scenario, without, rng_seed, seen):
         return None
-    low, high = np.log(kind.highest / 300.0), np.log(kind.highest)
+    low, high = np.log(kind.highest / RANGE), np.log(kind.highest)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if _seen(kind, float(np.exp(middle)), study, scenario, without, rng_seed, seen):
@@ -61,8 +63,8 @@ def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], se
 
 def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Sequence[Data],
           seed: list[int], seen: Callable[[FlightLog], FlightLog]) -> bool:
-    """Whether the likelihood ratio tells flights with the effect from those without."""
-    ratio = {True: [], False: []}
+    """Whether the likelihood ratio tells flights with the effect from those without; the arguments are `weakest`'s."""
+    with_effect, without_effect = [], []
     for i in range(TRIES):
         active = kind.active(strength, np.random.default_rng([*seed, i]))
         log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
@@ -71,14 +73,14 @@ def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Seq
         flights = list(measure.usable([seen(log)], study.vehicle, []))
         if not flights:
             continue
-        ratio[True].append(log_ratio(Data(study, flights), active))
-        ratio[False].append(log_ratio(without[i % len(without)], active))
-    if len(ratio[True]) < 3:
+        with_effect.append(log_ratio(Data(study, flights), active))
+        without_effect.append(log_ratio(without[i % len(without)], active))
+    if len(with_effect) < FEWEST:
         return True  # so strong that it cannot fly
-    yes, no = np.array(ratio[True]), np.array(ratio[False])
+    yes, no = np.array(with_effect), np.array(without_effect)
     alarm = no.mean() + FALSE_ALARM * no.std(ddof=1)
-    told = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
-    return bool(told and 0.5 * (yes.mean() - no.mean()) > APART)
+    told_apart = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
+    return bool(told_apart and 0.5 * (yes.mean() - no.mean()) > APART)
 
 
 def log_ratio(data: Data, active: Active) -> float:

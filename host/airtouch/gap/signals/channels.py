@@ -38,6 +38,7 @@ CHANNELS = (
     Channel("command_thrust", "N", 0.6, 30.0),
     *(Channel(f"command_{a}", "N", 0.6, 30.0) for a in ("roll", "pitch", "yaw")),
 )
+COLUMN = {c.name: i for i, c in enumerate(CHANNELS)}  #: of each channel, by its name
 #: each channel as a phrase, for notes, tables and pages
 CHANNEL_WORDS = {
     "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",

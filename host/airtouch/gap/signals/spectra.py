@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
-from airtouch.gap.signals.channels import CHANNELS, COUNT
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT
 
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
@@ -89,7 +89,7 @@ def judged(regime: str) -> np.ndarray:
         force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
         keep = np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
     else:
-        keep[:, [c.name for c in CHANNELS].index("rate_z")] = False
+        keep[:, COLUMN["rate_z"]] = False
     return keep
 
 

@@ -47,7 +47,11 @@ def no_floor() -> UnnamedFloor:
 
 @dataclass(frozen=True)
 class Cell:
-    """One channel of one flight: elements own, columns (elements, free and offsets), spread of the offsets."""
+    """One channel of one flight, for a regression.
+
+    own (elements,): its places among the problem's values; columns (elements, free + offsets): what they are regressed
+    on; offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
+    """
 
     channel: int
     own: np.ndarray
@@ -71,6 +75,7 @@ def cells_of(data: Data, part: Part, problem: Problem) -> list[Cell]:
 
 
 def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
+    """A cell for each channel of each flight that has known values."""
     out = []
     channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
     for c in range(CHANNELS):

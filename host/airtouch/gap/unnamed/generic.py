@@ -31,16 +31,17 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     floor = data.study.unnamed_floor or no_floor()
     linear = power = 0.0
     for train, test in ((0, 1), (1, 0)):
-        a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
-        residuals = [h.values.copy() for h in (a, b)]
+        halves = [HalfResiduals(data, parts[k], terms[train]) for k in (train, test)]
+        trained, held_out = halves
+        residuals = [half.values.copy() for half in halves]
         for channel in range(CHANNELS):
-            fitted = coefficients(a, channel, floor, answerable(data, terms[train], channel))
-            for k, h in enumerate((a, b)):
-                for cell in (c for c in h.cells if c.channel == channel):
-                    residuals[k][cell.own], _ = h.without(cell, fitted, floor)
-            linear += linear_gain(b, channel, fitted, floor)
-        one, two = (h.powers(x) for x, h in zip(residuals, (a, b), strict=True))
-        power += power_gain(one, two, floor, data.study.simulated)
+            fitted = coefficients(trained, channel, floor, answerable(data, terms[train], channel))
+            for half, residual in zip(halves, residuals, strict=True):
+                for cell in (c for c in half.cells if c.channel == channel):
+                    residual[cell.own], _ = half.without(cell, fitted, floor)
+            linear += linear_gain(held_out, channel, fitted, floor)
+        of_trained, of_held_out = (half.powers(x) for half, x in zip(halves, residuals, strict=True))
+        power += power_gain(of_trained, of_held_out, floor, data.study.simulated)
     return linear, power
 
 

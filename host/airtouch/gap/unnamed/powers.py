@@ -9,11 +9,12 @@ from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor
 
-BELIEF = 2.0  #: nominal flights that the scatter of all channels together counts as in the band of one
+BELIEF = 2.0  #: nominal flights that the scatter of all channels together counts as in the band of one; chosen
 #: Least standard deviation of the logarithm of power between flights, simulated and recorded: no effect's spectrum, and
-#: no recorded flight's air, is modelled any better.
+#: no recorded flight's air, is modelled any better. Chosen.
 LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
-CHANCE = 4.0  #: nats that a band must gain on the half that it is fitted to; chance gives about one
+CHANCE = 4.0  #: nats that a band must gain on the half that it is fitted to; chosen, chance gives about one
+UPDATES, LONGEST = 8, 1.5  #: Newton steps towards the power of highest posterior, and the longest of them, nepers
 #: for each group the first of its view and sensor: force, torque, rate; commands, one axis each
 SENSOR = np.arange(GROUPS) // 1000 * 1000 + np.arange(GROUPS) % 1000 % COUNT // 3 * 3
 ABOVE_MEANS = np.arange(GROUPS) % 1000 >= COUNT  #: groups above the lowest band
@@ -29,15 +30,20 @@ def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
 
 def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
                   spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log likelihood there."""
+    """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log posterior (GROUPS,) there.
+
+    e, nu, tail, groups (n,): see `regression.HalfResiduals.powers`. middle, spread (GROUPS,): of the normal prior of
+    the logarithm. In a group without values it is the prior's.
+    """
     out = middle.copy()
     count = np.bincount(groups, minlength=GROUPS)
     precision = 1.0 / np.maximum(spread ** 2, NOTHING)
-    mean_nu = np.bincount(groups, nu / (nu + 3.0), GROUPS)
-    for _ in range(8):
+    information = np.bincount(groups, nu / (nu + 3.0), GROUPS)
+    for _ in range(UPDATES):
         scaled = e * np.exp(-out[groups])
         push = np.bincount(groups, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
-        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * mean_nu + precision), -1.5, 1.5)
+        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * information + precision),
+                       -LONGEST, LONGEST)
     out[count == 0] = middle[count == 0]
     scaled = e * np.exp(-out[groups])
     level = np.bincount(groups, -OVERLAP_WEIGHT * (out[groups] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
@@ -45,7 +51,7 @@ def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.nd
 
 
 def power_gain(one: Powers, two: Powers, floor: UnnamedFloor, simulated: bool) -> float:
-    """Log likelihood that free powers, fitted to one half, gain on the other.
+    """Log likelihood that free powers, fitted to one half, gain on the other (`two`).
 
     They are those of every cell, or of all the bands of a sensor together, where slightly stronger noise shows.
     """

@@ -11,10 +11,10 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Cell, UnnamedFloor, cells_of, no_floor
 from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
-ROUNDS = 3  #: iterations of the weights of a fit
-MOST_COLUMNS = 4  #: columns of one channel that may be used
-SURE = 3.0  #: standard deviations by which coefficients must scatter more than by chance
-CHANCE = 4.0  #: nats that a column must gain on the half that it is fitted to; chance gives about one
+ROUNDS = 3  #: iterations of the weights of a fit; chosen
+MOST_COLUMNS = 4  #: columns of one channel that may be used; chosen
+SURE = 3.0  #: standard deviations by which coefficients must scatter more than by chance; chosen
+CHANCE = 4.0  #: nats that a column must gain on the half that it is fitted to; chosen, chance gives about one
 
 
 class HalfResiduals:
@@ -31,14 +31,21 @@ class HalfResiduals:
         self.cells = cells_of(data, part, problem)
 
     def system(self, cell: Cell, values: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Normal matrix and right-hand side for values of a cell; tails as those of their residual."""
+        """Normal matrix (columns, columns) and right-hand side (columns,) for values (elements,) of a cell.
+
+        residual (elements,): by which each is weighted, as its tails are Student's.
+        """
         nu, tail, power = self.problem.freedom[cell.own], self.problem.tail[cell.own], self.power[cell.own]
         weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
         weighted = cell.columns.conj().T * weights
         return 2.0 * (weighted @ cell.columns).real, 2.0 * (weighted @ values).real
 
     def without(self, cell: Cell, fitted: np.ndarray, floor: UnnamedFloor) -> tuple[np.ndarray, float]:
-        """Residual of a cell under fitted coefficients, less what nominal flights may have, and its likelihood."""
+        """Residual (elements,) of a cell under fitted coefficients, and its log likelihood.
+
+        What nominal flights may have of the columns is taken off as well. fitted (columns,): the coefficients that all
+        flights share.
+        """
         values = self.values[cell.own] - cell.columns[:, :cell.free] @ fitted[:cell.free]
         residual, precision = values, cell.precision(floor)
         for _ in range(2):
@@ -130,15 +137,15 @@ def linear_gain(half: HalfResiduals, channel: int, fitted: np.ndarray, floor: Un
 def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
     """rms (CHANNELS, WIDEST) of the coefficients of nominal flights, two or more, beyond what chance alone gives."""
     n = len(halves)
-    columns, surprise = np.zeros((2, CHANNELS, WIDEST))
-    for h in halves:
-        for cell in h.cells:
-            estimate, variance = _one_by_one(h, cell)
-            columns[cell.channel, :cell.free] += (estimate ** 2 - variance) / (n - 1)
-            surprise[cell.channel, :cell.free] += estimate ** 2 / variance / n
-    columns[surprise < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
-    few = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
-    return np.sqrt(np.maximum(few * columns, 0.0))
+    beyond_chance, over_chance = np.zeros((2, CHANNELS, WIDEST))
+    for half in halves:
+        for cell in half.cells:
+            estimate, variance = _one_by_one(half, cell)
+            beyond_chance[cell.channel, :cell.free] += (estimate ** 2 - variance) / (n - 1)
+            over_chance[cell.channel, :cell.free] += estimate ** 2 / variance / n
+    beyond_chance[over_chance < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
+    of_another = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
+    return np.sqrt(np.maximum(of_another * beyond_chance, 0.0))
 
 
 def _one_by_one(half: HalfResiduals, cell: Cell) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,99 @@
+"""Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
+
+from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
+
+NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
+
+
+def why_not(selection: Selection, name: str, verdict: str) -> str:
+    """The reason why a candidate of the ranking is not the answer, "" for the answer.
+
+    name: an effect, "none" or "unknown". verdict: see `ranking.verdict_of`.
+    """
+    first = selection.named[0].name if selection.named else ""
+    step = next((s for s in selection.named[1:] if s.name == name), None)
+    if name == verdict or (verdict == "effect" and name == first):
+        return ""
+    if step is not None and verdict == "effect":
+        return _why_beside(selection, step)
+    if name == "unknown":
+        return _why_not_unknown(selection)
+    if name == "none":
+        return _why_not_none(selection)
+    return shortfall(selection, selection.singles[name])
+
+
+def nearest(selection: Selection) -> list[dict[str, str]]:
+    """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
+    gaining = (j for j in selection.singles.values() if selection.gained(j) > 0.0)
+    most = sorted(gaining, key=lambda j: -selection.gained(j))
+    return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
+
+
+def shortfall(selection: Selection, judged: Judged) -> str:
+    """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
+    if selection.inference is not None:
+        return shortfall_by_relations(selection, selection.inference, judged.name)
+    least = selection.least[judged.name]
+    if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
+        return against(selection)
+    if judged.gain < least:
+        return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
+    if judged.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
+                f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+    if selection.chosen:
+        return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
+                f"{selection.chosen.gain:.0f}")
+    return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+
+
+def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
+    """What an effect lacks to be named by the relations of the signals, in nats."""
+    gain = inference.evidence[name]
+    first = [s.name for s in selection.named]
+    if name in first:
+        return against(selection)
+    if gain < LEAST_EVIDENCE:
+        return f"the relations of the signals gain {gain:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
+    if not first:
+        return f"the relations of the signals gain {gain:.1f} nats by it, and more by a model without names"
+    return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
+
+
+def against(selection: Selection) -> str:
+    """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
+    lost, worst = selection.contradicted
+    if selection.loss == selection.unlike:
+        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
+                f"{selection.least_left:.0f} may be chance")
+    return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
+            f"{selection.allowed:.0f} may be left")
+
+
+def _why_beside(selection: Selection, step: Judged) -> str:
+    """The reason why an effect named beside the first has no more probability than the ranking says."""
+    first = selection.named[0].name
+    if selection.inference is not None:
+        return f"named beside {first}: the probability is that it acts alone"
+    before = selection.steps[selection.steps.index(step) - 1].gain
+    return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
+
+
+def _why_not_unknown(selection: Selection) -> str:
+    """The reason why the answer is not that no known effect explains the gap."""
+    if not selection.explained:
+        return "the gap as a whole is at its floor"
+    return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} "
+            "may be left")
+
+
+def _why_not_none(selection: Selection) -> str:
+    """The reason why the answer is not that there is no gap."""
+    if selection.chosen is None:
+        return (f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
+                "left")
+    first = selection.named[0].name
+    gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
+    return f"{first} gains {gain:.0f} nats over it"

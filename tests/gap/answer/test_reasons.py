@@ -1,0 +1,87 @@
+"""Why a candidate is not the answer: each reason, by replay and by the relations of the signals."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.answer.reasons import nearest, shortfall, why_not
+from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.relations.inference import LEAST_EVIDENCE
+
+EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
+TERMS = {name: (SimpleNamespace(name=name, kind="mean"),) for name in EVIDENCE}
+
+
+def judged(name, gain, evidence=None):
+    return Judged(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
+
+
+def selection(named=("mass",), inference=False, **more):
+    """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing."""
+    singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
+    steps, total = [], 0.0
+    for n in named:
+        total += EVIDENCE[n]
+        steps.append(judged(n, total))
+    evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0) if inference else None
+    settings = {"free_before": 150.0, "free_after": 4.0, "parts": (None, None), "least": dict.fromkeys(EVIDENCE, 8.0),
+                "nominal": 5, "assumed": False, "nominal_gain": 0.0, **more}
+    return Selection(singles, tuple(steps), inference=evidence, **settings)
+
+
+def test_the_answer_needs_no_reason():
+    assert why_not(selection(), "mass", "effect") == ""
+    assert why_not(selection(), "none", "none") == why_not(selection(), "unknown", "unknown") == ""
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("inertia", "held-out data gain 2.0 nats by it, 8 are needed"),
+    ("wind", "as strong as it often seems to be in nominal flights: 40 nats, of which 3.0 beyond that scatter, 8 are "
+             "needed"),
+    ("gust", "gains 20 nats, mass 200"),
+    ("none", "mass gains 200 nats over it"),
+    ("unknown", "a model without names adds 4 nats, up to 20 may be left")])
+def test_by_replay(name, words):
+    assert why_not(selection(), name, "effect") == words
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("inertia", f"the relations of the signals gain 2.0 nats by it, {LEAST_EVIDENCE:.0f} are needed"),
+    ("wind", "the relations of the signals gain 40 nats by it, 200 by mass"),
+    ("none", "mass gains 200 nats over it"),
+    ("unknown", "a model without names adds 4 nats, up to 30 may be left")])
+def test_by_the_relations_of_the_signals(name, words):
+    assert why_not(selection(inference=True), name, "effect") == words
+
+
+def test_a_second_effect_is_told_apart_from_one_that_acts_alone():
+    pair = selection(("mass", "wind"))
+    assert why_not(pair, "wind", "effect") == ("named beside mass: adds 40 nats to it; the probability is that it "
+                                               "acts alone")
+    related = selection(("mass", "wind"), inference=True)
+    assert why_not(related, "wind", "effect") == "named beside mass: the probability is that it acts alone"
+
+
+def test_where_nothing_is_named():
+    nothing = selection((), free_after=40.0)
+    assert not nothing.explained
+    assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
+    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 of the 150 nats that a model without names gains"
+    related = selection((), inference=True, free_after=40.0)
+    assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
+                                                   "model without names")
+    assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
+
+
+def test_what_is_named_and_not_enough_is_held_against_itself():
+    """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
+    left = selection(free_after=70.0)
+    assert why_not(left, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
+    contradicted = selection(contradicted=(60.0, "yaw torque"))
+    assert why_not(contradicted, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
+                                                        "most in yaw torque; 18 may be chance")
+
+
+def test_the_three_that_gain_most_are_nearest():
+    assert [n["name"] for n in nearest(selection(()))] == ["mass", "wind", "gust"]
+    assert all(n["fails"] for n in nearest(selection(())))

@@ -1,0 +1,90 @@
+"""What stays open: the seconds and the signals that a gap of known shape follows."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.answer.unexplained import followed_signals, over_floor, unexplained, worst_stretch
+from airtouch.gap.nominal.build_study import declared_study
+from airtouch.gap.signals.channels import COLUMN
+from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, starts
+from airtouch.simulation import signals as at
+from gap_flights import VEHICLE, flight, noise
+from made_diagnosis import cell
+
+STUDY = declared_study(VEHICLE, ())
+SECONDS = 40.0
+CELL = cell("force_x", "hover", 1.0, band_hz=(2.0, 8.0))
+
+
+def hover(strength, seed=1, **more):
+    """A hover whose forward gap is white noise of rms `strength` (n,) or one number, m/s^2."""
+    force = noise(SECONDS, 1.0, seed) * np.broadcast_to(strength, 4000)[:, None] * [1.0, 0.0, 0.0]
+    return flight(SECONDS, force, **more)
+
+
+def test_the_ratio_is_the_rms_over_the_floor_of_the_cell():
+    """White noise of 0.5 m/s^2 at 100 Hz has 0.5^2 / 50 in each Hz."""
+    f = frequencies(AIR)
+    band = (f >= 2.0) & (f <= 8.0)
+    floor = STUDY.floor.power[AIR][band, COLUMN["force_x"]].mean()
+    ratio = over_floor(STUDY, hover(0.5), (), CELL)
+    assert len(ratio) == len(starts(hover(0.5), AIR))
+    assert np.sqrt(np.mean(ratio ** 2)) == pytest.approx(np.sqrt(0.5 ** 2 / 50.0 / floor), rel=0.1)
+    assert not len(over_floor(STUDY, flight(1.0), (), CELL))
+
+
+def test_the_worst_stretch_ends_where_the_gap_is_half_way_to_its_median():
+    assert worst_stretch(np.array([1.0, 1.0, 3.1, 5.0, 2.9, 4.0, 1.0, 1.0, 1.0])) == (2, 3)
+    assert worst_stretch(np.array([5.0, 1.0, 1.0])) == (0, 0)
+    assert worst_stretch(np.array([2.0, 2.0, 2.0])) == (0, 2)
+
+
+def test_an_entry_tells_flight_and_seconds_of_the_strongest_gap():
+    strength = np.where((np.arange(4000) >= 2000) & (np.arange(4000) < 2800), 3.0, 0.1)
+    flights = [hover(0.1, name="calm.csv"), hover(strength, name="windy.csv")]
+    (entry,) = unexplained(STUDY, flights, selection(), [cell("force_x", "ground", 9.0), CELL,
+                                                         cell("force_x", "hover", 1.0, regime="low")])
+    assert entry["flight"] == "windy.csv" and entry["channel"] == "force_x" and entry["phase"] == "hover"
+    assert entry["from_s"] == pytest.approx(20.0, abs=LENGTH[AIR] / 100.0)
+    assert entry["to_s"] == pytest.approx(28.0, abs=LENGTH[AIR] / 100.0)
+
+
+def test_five_cells_are_told_at_most():
+    cells = [cell("force_x", phase, 1.0, band_hz=(low, 8.0)) for low in (0.5, 2.0) for phase in ("hover", "cruise",
+                                                                                                "landing")]
+    assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
+
+
+def test_the_signal_is_named_that_the_power_follows():
+    """A gap that grows with time; the height, which does not change, and signals of the made hover say nothing."""
+    growing = hover(np.linspace(0.1, 3.0, 4000))
+    assert followed_signals(STUDY, [(growing, over_floor(STUDY, growing, (), CELL))]) == ["time"]
+    steady = hover(1.0)
+    assert not followed_signals(STUDY, [(steady, over_floor(STUDY, steady, (), CELL))])
+
+
+def test_a_signal_that_one_flight_lacks_is_not_named():
+    """Height that goes with the gap in two flights, of which one log has none."""
+    climbing = np.linspace(0.1, 3.0, 4000)[::-1]
+    pair = []
+    for with_height in (True, False):
+        one = hover(climbing)
+        if with_height:
+            one.log.columns["z_m"] = climbing
+        one.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = climbing[:, None]
+        pair.append((one, over_floor(STUDY, one, (), CELL)))
+    assert "height" in followed_signals(STUDY, pair[:1])
+    assert "height" not in followed_signals(STUDY, pair)
+
+
+@pytest.mark.parametrize(("seconds", "names"), [(19.2, []), (21.8, ["time"])])
+def test_seven_blocks_that_do_not_overlap_are_not_tested(seconds, names):
+    one = flight(seconds)
+    assert followed_signals(STUDY, [(one, np.arange(1.0, len(starts(one, AIR)) + 1.0))]) == names
+
+
+def selection():
+    """A selection without candidates, of which only those are asked here."""
+    return SimpleNamespace(whole=None, singles={})

@@ -1,0 +1,47 @@
+"""The answer of a hover's balance from probabilities of known size: a weight has two names, other names compete."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.answer.shrink import Shrink
+from airtouch.gap.balance import balance_result
+from airtouch.gap.balance.balance_result import likeliest, probabilities
+from airtouch.gap.result import Found, Quantity
+
+
+def test_the_hypotheses_of_a_name_count_together():
+    """Odds of 1, 1 and 2: two rotors of one name are as probable as the weight."""
+    named = [SimpleNamespace(name=n) for n in ("weak_motor", "weak_motor", "mass")]
+    assert probabilities(np.log([1.0, 1.0, 2.0]) + 900.0, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
+
+
+@pytest.mark.parametrize(("total", "answer"), [
+    ({"none": 0.4, "mass": 0.35, "com_offset": 0.25}, ("mass", 0.6)),
+    ({"none": 0.4, "mass": 0.25, "com_offset": 0.35}, ("com_offset", 0.35)),
+    ({"none": 0.5, "mass": 0.2, "com_offset": 0.3}, ("none", 0.5)),
+    ({"none": 0.3, "com_offset": 0.7}, ("com_offset", 0.7))])
+def test_a_weight_on_the_vehicle_and_off_centre_count_as_one(total, answer):
+    name, probability = likeliest(total)
+    assert (name, probability) == (answer[0], pytest.approx(answer[1]))
+
+
+def test_the_other_name_of_a_weight_is_counted_with_the_answer():
+    shrink = {n: Shrink(3.0, 1.0, Quantity(1.0)) for n in ("none", "mass", "com_offset")}
+    ranking = balance_result._ranking("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, shrink)
+    assert [(r.name, round(r.probability, 6)) for r in ranking] == [("mass", 0.8), ("none", 0.2), ("com_offset", 0.0)]
+    assert ranking[2].why.startswith("counted with mass") and ranking[1].why == "4 times less probable than mass"
+
+
+def test_names_of_half_the_probability_fit_alike():
+    total = {"none": 0.26, "mass": 0.5, "slung_load": 0.24, "unknown": 0.3}
+    assert balance_result._alike([], total, "mass", 0.5) == (("mass", "none"),)
+    assert balance_result._alike([Found("mass", {})], {"mass": 1.0}, "mass", 1.0) == (("mass", "thrust_coefficient"),)
+
+
+def test_the_wrong_effect_of_the_control_is_improbable():
+    shrink = {n: Shrink(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
+    total = {"com_offset": 0.2, "slung_load": 0.05, "mass": 0.7, "weak_motor": 0.05}
+    assert balance_result._control(total, "mass", shrink)["name"] == "slung_load"
+    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", shrink) == {}
