@@ -119,11 +119,10 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     paths = [f for f in inputs if isinstance(f, (str, Path))]
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
-        speed = speed_mps or _flown_speed(log)
+        file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
         scoring.check(log, scoring.spare_of(module))
-        if scoring.truth(log) and speed is None:
+        if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
-        file = FlightFile(Path(log.source), Condition(speed_mps=speed))
         scores.append(scoring.evaluate_flight(file, log, module, trained).score)
     name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
     return scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
@@ -211,12 +210,6 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)
-
-
-def _flown_speed(log: FlightLog) -> float | None:
-    """Commanded speed, m/s, in a log's metadata (of a converted or a simulated flight); None without one."""
-    drawn = log.meta.get("condition")
-    return log.meta.get("speed_mps") or (drawn.get("speed") if isinstance(drawn, Mapping) else None)
 
 
 def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:
