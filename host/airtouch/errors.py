@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
-_P, _R = ParamSpec("_P"), TypeVar("_R")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 #: option of the command line, as messages have it -> argument of the Python functions
 _ARGUMENTS = ((r"--force\b", "force=True"), (r"--speed\b", "speed_mps"), (r"--detector (\S+)", r'detector="\1"'),
               (r"--model\b", "model"))
