@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
 from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, hypotheses, pattern, reference

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import measure
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
