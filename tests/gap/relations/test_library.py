@@ -1,5 +1,6 @@
 """The shipped library: for which flights it holds, that it is no older than the code, and what it names end to end."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +31,14 @@ def test_the_scatter_of_distances_is_found_in_flights_of_which_some_hit_somethin
     excess[:40] += 5000.0
     assert checks.scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
     assert checks.scatter(19.0 * rng.standard_t(checks.TAIL, 4000), evidence, 19.0) < 0.002
+
+
+def test_another_process_reads_the_shipped_library_from_its_own_package():
+    shipped = library.shipped()
+    sent = pickle.dumps(shipped)
+    assert len(sent) < 200 and pickle.loads(sent) is shipped
+    part = shipped.without(["mass"])
+    assert pickle.loads(pickle.dumps(part)).effects == part.effects == shipped.effects - {"mass"}
 
 
 def test_a_file_holds_what_was_saved(tmp_path):
