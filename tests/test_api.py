@@ -54,6 +54,19 @@ def test_the_speed_of_a_simulated_flight_is_known(log):
     assert at.evaluate(log, "baseline")["per_flight"] == at.evaluate(log, "baseline", speed_mps=speed)["per_flight"]
 
 
+def test_messages_name_the_arguments_of_python_not_the_options_of_the_command_line(log, path, tmp_path):
+    for write in (at.write, at.logs.write):
+        with pytest.raises(at.AirTouchError, match=r"exists already; use force=True to replace it$"):
+            write(log, path)
+    command = [sys.executable, "-m", "airtouch", "evaluate", str(path), "--json", str(path)]
+    assert "use --force to replace it" in subprocess.run(command, capture_output=True, text=True).stderr
+    at.write(at.FlightLog(log.columns, {}), tmp_path / "no_speed.csv")
+    (left_out,) = at.evaluate(tmp_path / "no_speed.csv", "baseline")["left_out"]
+    assert left_out["reason"].endswith("give speed_mps, or speed_mps in a manifest.csv beside the flight")
+    with pytest.raises(at.AirTouchError, match='leave model out$'):
+        at.detect(log, "baseline", model="m.npz")
+
+
 def test_a_table_goes_there_and_back(log):
     back = at.from_pandas(at.to_pandas(log).assign(more=1.0))
     assert back.meta["vehicle"] == log.meta["vehicle"] and set(back.columns) == set(log.columns)

@@ -24,8 +24,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
+import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
-from airtouch.gap import measure
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_python, python_words
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ __all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", 
 DEFAULT_VEHICLE = "crazyflie-2.1-flow"
 
 
+@in_python
 def read(flight: "Flight") -> FlightLog:
     """The flight log in a file of any known format or in a pandas table; a `FlightLog` is returned as it is.
 
@@ -46,6 +47,7 @@ def read(flight: "Flight") -> FlightLog:
     return from_pandas(flight)
 
 
+@in_python
 def write(flight: "Flight", path: str | Path, *, force: bool = False) -> None:
     """Write a flight as canonical CSV (`.csv`, `.csv.gz`) or Parquet (`.parquet`), by the ending of the name.
 
@@ -56,6 +58,7 @@ def write(flight: "Flight", path: str | Path, *, force: bool = False) -> None:
     logs.write(read(flight), Path(path), force=force)
 
 
+@in_python
 def to_pandas(flight: "Flight") -> "DataFrame":
     """The log's columns as a pandas table, one row for each sample, with the metadata in `attrs`.
 
@@ -81,6 +84,7 @@ def from_pandas(table: "DataFrame") -> FlightLog:
     return FlightLog({name: table[name].to_numpy(dtype=float) for name in names}, meta)
 
 
+@in_python
 def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | Path | None = None) -> "Trace":
     """Detect the edges of a flight of n samples at 100 Hz.
 
@@ -98,6 +102,7 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     return module.run(log, module.model_for(trained, log) if hasattr(module, "model_for") else trained)
 
 
+@in_python
 def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *,
              speed_mps: float | None = None, model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights; true edges come from their down range.
@@ -119,16 +124,17 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     paths = [f for f in inputs if isinstance(f, (str, Path))]
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
-        speed = speed_mps or _flown_speed(log)
+        file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
         scoring.check(log, scoring.spare_of(module))
-        if scoring.truth(log) and speed is None:
+        if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
-        file = FlightFile(Path(log.source), Condition(speed_mps=speed))
         scores.append(scoring.evaluate_flight(file, log, module, trained).score)
     name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
+    left_out = [(file, python_words(reason)) for file, reason in left_out]
     return scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
 
 
+@in_python
 def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
              effects: Mapping[str, Mapping[str, float]] | Sequence[tuple[str, Mapping[str, float]]] = (),
              without: Sequence[str] = (), seed: int = 0) -> list[FlightLog]:
@@ -151,6 +157,7 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     return [f for f in logs if isinstance(f, FlightLog)]
 
 
+@in_python
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
              baseline: "Flight | Iterable[Flight]" = (), *, without: Iterable[str] = (),
              report: str | Path | None = None, force: bool = False) -> "Diagnosis":
@@ -160,7 +167,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     effects to exclude. report: HTML file to write. The result's `plain()` is the JSON of `airtouch gap diagnose`.
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
-    from airtouch.gap import diagnose as module
+    import airtouch.gap.diagnose as module
     from airtouch.report import gap_report
 
     logs = _logs(flights)
@@ -171,15 +178,17 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     return diagnosis
 
 
+@in_python
 def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
             baseline: "Flight | Iterable[Flight]" = ()) -> "Measurement":
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
-    from airtouch.gap import measure as module
+    import airtouch.gap.measure as module
 
     logs = _logs(flights)
     return module.measure(logs, _vehicle(vehicle, logs), _logs(baseline))
 
 
+@in_python
 def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin: str | Path | None = None,
           speed_mps: float | None = None, seed: int = 0, hold_out: bool = True, force: bool = False,
           progress: "Progress | None" = None) -> "Adapted":
@@ -211,12 +220,6 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)
-
-
-def _flown_speed(log: FlightLog) -> float | None:
-    """Commanded speed, m/s, in a log's metadata (of a converted or a simulated flight); None without one."""
-    drawn = log.meta.get("condition")
-    return log.meta.get("speed_mps") or (drawn.get("speed") if isinstance(drawn, Mapping) else None)
 
 
 def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:

@@ -1,9 +1,18 @@
 """The exception that users see, and functions that prepare text for its message."""
 
 import difflib
+import functools
+import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+#: option of the command line, as messages have it -> argument of the Python functions
+_ARGUMENTS = ((r"--force\b", "force=True"), (r"--speed\b", "speed_mps"), (r"--detector (\S+)", r'detector="\1"'),
+              (r"--model\b", "model"))
 
 
 class AirTouchError(ValueError):
@@ -21,6 +30,26 @@ def in_one_line(program: str) -> Iterator[None]:
     except AirTouchError as error:
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def python_words(text: str) -> str:
+    """A message with the command line's options as arguments of the Python functions: `force=True` for `--force`."""
+    for option, argument in _ARGUMENTS:
+        text = re.sub(option, argument, text)
+    return text
+
+
+def in_python(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """The function for callers from Python: messages of its AirTouchErrors are in `python_words`."""
+    @functools.wraps(function)
+    def call(*arguments: _P.args, **options: _P.kwargs) -> _R:
+        try:
+            return function(*arguments, **options)
+        except AirTouchError as error:
+            error.args = (python_words(str(error)),)
+            raise
+
+    return call
 
 
 def printable(text: str, most: int = 40) -> str:

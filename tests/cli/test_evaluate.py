@@ -7,8 +7,11 @@ import shutil
 import pytest
 from click.testing import CliRunner
 
+import airtouch as at
+from airtouch import logs
 from airtouch.cli.evaluate import command
 from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
 
 KEYS = {"detector", "flights", "edges", "mean_abs_error_m", "missed", "false_per_minute", "hit", "balanced_accuracy",
         "intervals", "per_flight", "missed_count", "false_count", "airborne_minutes", "mean_abs_error_s", "ece",
@@ -90,15 +93,28 @@ def test_the_reason_and_the_remedy(bad, name, message):
 
 
 def test_speed_must_be_known(generated, tmp_path):
-    shutil.copy(generated / "f0.csv.gz", tmp_path)
+    log = logs.read(generated / "f0.csv.gz")
+    logs.write(FlightLog(log.columns, {k: v for k, v in log.meta.items() if k != "condition"}), tmp_path / "f0.csv.gz")
     result = run(tmp_path, "--detector", "baseline")
     assert result.exit_code == 2 and "--speed" in result.stderr
     assert run(tmp_path, "--detector", "baseline", "--speed", 0.3).exit_code == 0
 
 
-def test_without_down_range_detections_are_listed_not_judged(generated, tmp_path):
-    from airtouch import logs
+@pytest.mark.parametrize("written", ["simulate", "collect"])
+def test_the_speed_in_the_log_serves_where_no_manifest_is_beside_it(generated, tmp_path, written):
+    log = logs.read(generated / "f0.csv.gz")
+    speed, out = log.meta["condition"]["speed"], tmp_path / "out.json"
+    if written == "collect":
+        log = FlightLog(log.columns, {**log.meta, "condition": {}, "speed_mps": speed})
+    logs.write(log, tmp_path / "alone.csv.gz")
+    assert run(tmp_path / "alone.csv.gz", "--detector", "baseline", "--json", out).exit_code == 0
+    (alone,), table = json.loads(out.read_text())["per_flight"], at.evaluate(log, "baseline")
+    assert alone["condition"]["speed_mps"] == pytest.approx(speed)
+    assert alone["edges"] == at.evaluate(tmp_path / "alone.csv.gz", "baseline")["per_flight"][0]["edges"]
+    assert alone["edges"] == table["per_flight"][0]["edges"]
 
+
+def test_without_down_range_detections_are_listed_not_judged(generated, tmp_path):
     log = logs.read(generated / "f0.csv.gz")
     del log.columns["zrange_m"]
     logs.write(log, tmp_path / "f.csv")

@@ -9,10 +9,11 @@ import time
 import pytest
 from rich.console import Console
 
+import airtouch.gap.diagnose as diagnose
 from airtouch.cli.gap import show
 from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
-from airtouch.gap import diagnose, example
+from airtouch.gap import example
 from airtouch.logs import read
 from airtouch.report.columns import COLUMNS
 from airtouch.vehicle import load

@@ -28,6 +28,24 @@ def test_collect_wants_a_drone_and_a_mission(tmp_path):
                                          "a")
 
 
+def test_without_a_drone_no_empty_folder_stays(tmp_path, monkeypatch):
+    def nobody(*_, **__):
+        raise AirTouchError("nobody answers")
+
+    monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", nobody)
+    (tmp_path / "mine").mkdir()
+    for out in (tmp_path / "flights", tmp_path / "mine" / "a" / "b", tmp_path / "mine"):
+        assert refusal("collect", "--out", out, "--uri", "x", "--mission", "sweep") == "nobody answers"
+    assert list(tmp_path.rglob("*")) == [tmp_path / "mine"]
+
+
+def test_a_folder_that_holds_something_stays(tmp_path):
+    with collect.no_empty_folders(tmp_path / "a" / "b"):
+        collect.prepare_folder(tmp_path / "a" / "b", print)
+        (tmp_path / "a" / "b" / "flight.csv.gz.part").write_text("t_s")
+    assert (tmp_path / "a" / "b" / "flight.csv.gz.part").is_file()
+
+
 def test_an_existing_flight_is_not_flown_over(tmp_path):
     path = recorder.flight_path(tmp_path, "sweep", 3)
     path.write_bytes(b"mine")

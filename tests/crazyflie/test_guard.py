@@ -80,3 +80,22 @@ def test_it_gives_up_in_the_end(monkeypatch):
     monkeypatch.setattr("cflib.crtp.get_link_driver", lambda *_: link)
     assert not guard.land("udp://127.0.0.1:1", 0.0, 2.0, patience_s=3.0)
     assert 3.0 <= clock.now < 3.5 and link.send_packet.call_count == 8  # one in 0.4 s
+
+
+def test_help_says_what_it_is_for_and_how_to_use_it():
+    said = subprocess.run([sys.executable, "-m", "airtouch.crazyflie.guard", "--help"], stdin=subprocess.DEVNULL,
+                          capture_output=True, text=True, check=True).stdout
+    for words in ("lands the drone if the flying process dies", "`airtouch collect` starts it", "uri", "height",
+                  "m: where it took off", "guard radio://0/80/2M/E7E7E7E7E7 0 3"):
+        assert words in said
+    wrong = subprocess.run([sys.executable, "-m", "airtouch.crazyflie.guard", "udp://127.0.0.1:1", "low", "3"],
+                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert wrong.returncode == 2 and "height: invalid float value: 'low'" in wrong.stderr
+
+
+def test_a_height_below_the_start_is_a_height_and_no_option(drone):
+    with guard.guarding(uri(drone), -1e-05, 3.0):
+        pass  # it ends without a landing, as a killed one does
+    data, sender = drone.recvfrom(64)
+    drone.sendto(bytes([LAND_HEADER, 8, 0, 0, 0]), sender)
+    assert struct.unpack("<BBff?f", data[1:])[2] == pytest.approx(-1e-05)

@@ -6,10 +6,10 @@ import json
 import pytest
 from click.testing import CliRunner
 
+import airtouch.gap.diagnose as module
 from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError
-from airtouch.gap import diagnose as module
 from airtouch.gap import example
 from airtouch.simulation.effects import EFFECTS
 

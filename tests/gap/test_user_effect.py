@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.diagnose import brief, diagnose
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load

@@ -1,5 +1,6 @@
 """What is kept is made once, by kind and key; the least recently used goes first; a changed copy has nothing."""
 
+import pickle
 from dataclasses import dataclass, field, replace
 
 from airtouch.gap.workspace import Workspace
@@ -43,3 +44,10 @@ def test_a_changed_copy_of_its_owner_begins_with_nothing():
     owner.workspace.once("a", 1, lambda: "x")
     assert replace(owner, size=2).workspace.once("a", 1, lambda: "y") == "y"
     assert owner == Owner(1)
+
+
+def test_one_that_is_sent_to_another_process_begins_with_nothing():
+    space = Workspace()
+    space.once("a", 1, lambda: bytes(10 ** 6))
+    sent = pickle.dumps(space)
+    assert len(sent) < 100 and pickle.loads(sent).once("a", 1, lambda: "y") == "y"

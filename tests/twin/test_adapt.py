@@ -20,7 +20,7 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from airtouch.twin import adapt
+from airtouch.twin import adapt, overlay
 from skips import needs
 from twin_courses import PLAIN
 
@@ -68,6 +68,7 @@ def test_command_trains_says_and_goes_on(sweeps, quick, tmp_path, monkeypatch):
     repeat = CliRunner().invoke(airtouch, arguments)
     assert repeat.exit_code != 0 and "--force" in str(repeat.exception)
     monkeypatch.setattr(best, "fit", lambda *_, **__: pytest.fail("trained again"))
+    monkeypatch.setattr(overlay, "_response", lambda *_: pytest.fail("simulated again"))
     resumed = CliRunner().invoke(airtouch, [*arguments, "--force"])
     assert resumed.exit_code == 0, resumed.output + str(resumed.exception)
     model = best.load(tmp_path / "mine.npz")

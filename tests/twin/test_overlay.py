@@ -40,6 +40,28 @@ def test_same_seed_same_responses_and_another_seed_others(scene, vehicle, respon
     assert others[0].values.shape != responses[0].values.shape or np.any(others[0].values != responses[0].values)
 
 
+def test_a_stopped_simulation_continues_with_what_it_stored(scene, vehicle, responses, tmp_path, monkeypatch):
+    """Also a flight without a response is not flown again."""
+    flown, fly = [], overlay._response
+
+    def response(scene, vehicle, seed, number):
+        flown.append(number)
+        return fly(scene, vehicle, seed, number - 1) if number else None
+
+    def stop(done, _):
+        if len(flown) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(overlay, "_response", response)
+    with pytest.raises(KeyboardInterrupt):
+        overlay.simulate_responses(scene, vehicle, 3, 4, stop, tmp_path / "edges")
+    again = overlay.simulate_responses(scene, vehicle, 3, seed=4, folder=tmp_path / "edges")
+    assert flown == [0, 1, 2, 3]
+    for one, other in zip(again, responses, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+        assert one.edges == other.edges
+
+
 def test_free_air_holds_no_edge(sweeps):
     """Of flights whose platform is known: everything but the platform, and all of it recorded."""
     air = overlay.free_air([log for _, log, _ in sweeps])

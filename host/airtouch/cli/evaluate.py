@@ -23,7 +23,7 @@ from airtouch.logs.files import check_free
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of flights without one in their manifest.")
+              help="Commanded speed of flights without one in their manifest; default: the log's.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")

@@ -13,6 +13,7 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import write
 from airtouch.logs.formats.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
@@ -125,7 +126,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         elif ending == RERUN[1:]:
             write_bytes(rerun_file.recording(log), target, force)
         else:
-            logs.write(log, target, force)
+            write(log, target, force)
         written.add(target)
         return target
 

@@ -50,10 +50,11 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     log = logs.read(flight)
     for line in remarks(log):
         click.echo(f"airtouch: {flight}: {line}", err=True)
-    edge_map.track(log, speed or file.condition.speed_mps)  # raises if both are missing, before the detector runs
+    speed = speed or dataset.with_flown_speed(file, log).condition.speed_mps
+    edge_map.track(log, speed)  # raises if both are missing, before the detector runs
     source = edge_map.true_edges_of(log) if truth else edge_map.detected_edges(log, detector, model)
     plane = edge_map.edge_map(log, source.edges, lag_s=source.lag_s, sigma_s=sigma or source.sigma_s,
-                              speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
+                              speed_mps=speed, heading_deg=heading)
     content = edge_map.geojson(plane.points, plane.platforms, {
         "flight": flight.name, "detector": "truth" if truth else detector, "position": plane.position,
         "lag_s": plane.lag_s, "sigma_s": plane.sigma_s})

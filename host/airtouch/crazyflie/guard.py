@@ -1,10 +1,12 @@
 """A second process that lands the drone if the flying process dies before it has landed.
 
-Without it the high-level commander would hover until the battery is empty. `python -m airtouch.crazyflie.guard
-URI HEIGHT SECONDS` waits for the end of its standard input, which means that the flying process is gone. Then it
-sends land commands until one is answered. After a normal landing the flying process ends the guard.
+Without it the high-level commander would hover until the battery is empty. `airtouch collect` starts it; nobody else
+has to. `python -m airtouch.crazyflie.guard URI HEIGHT SECONDS` waits for the end of its standard input, which means
+that the flying process is gone. Then it sends land commands until one is answered, for a minute at most. After a normal
+landing the flying process ends the guard.
 """
 
+import argparse
 import contextlib
 import signal
 import struct
@@ -36,7 +38,7 @@ class Guard:
 @contextlib.contextmanager
 def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
     """Run a guard process during the body of a `with` statement."""
-    command = [sys.executable, "-m", "airtouch.crazyflie.guard", uri, str(height_m), str(seconds)]
+    command = [sys.executable, "-m", "airtouch.crazyflie.guard", "--", uri, str(height_m), str(seconds)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
     guard = Guard()
     try:
@@ -85,14 +87,21 @@ def _answered(link: Any) -> bool:
 
 def main() -> None:
     """Wait for the end of standard input, then land. The modules for landing are imported before."""
+    parser = argparse.ArgumentParser("python -m airtouch.crazyflie.guard", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter,
+                                     epilog="To land a drone by hand, with Ctrl-D at once:\n"
+                                            "  python -m airtouch.crazyflie.guard radio://0/80/2M/E7E7E7E7E7 0 3")
+    parser.add_argument("uri", help="of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850")
+    parser.add_argument("height", type=float, help="to land at, m: where it took off")
+    parser.add_argument("seconds", type=float, help="that the landing takes, s")
+    given = parser.parse_args()
     from airtouch.crazyflie.connection.link import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     cflib_or_error()
     sys.stdin.read()
-    uri, height, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-    done = land(uri, height, seconds)
+    done = land(given.uri, given.height, given.seconds)
     what = "landing" if done else "NO CONTACT, land by hand"
     print(f"airtouch: the flying process is gone; {what}", file=sys.stderr)
 

@@ -47,7 +47,12 @@ Where each decision is made; a folder imports only those above it:
 import importlib
 import sys
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what a call of them takes and returns; import the modules as `import airtouch.gap.diagnose as ...`
+    from airtouch.api import diagnose, measure
+
+__all__ = ["callable_module", "diagnose", "measure"]
 
 
 class _Callable(ModuleType):
@@ -62,7 +67,8 @@ def callable_module(name: str) -> None:
     sys.modules[name].__class__ = _Callable
 
 
-def __getattr__(name: str) -> Any:
-    if name in ("diagnose", "measure"):
-        return importlib.import_module(f"airtouch.gap.{name}")
-    raise AttributeError(f"module 'airtouch.gap' has no attribute {name!r}")
+if not TYPE_CHECKING:  # so that a type checker tells a name that is not there
+    def __getattr__(name: str) -> Any:
+        if name in ("diagnose", "measure"):
+            return importlib.import_module(f"airtouch.gap.{name}")
+        raise AttributeError(f"module 'airtouch.gap' has no attribute {name!r}")

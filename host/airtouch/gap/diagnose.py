@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import callable_module, measure
+from airtouch.gap import callable_module
 from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
 from airtouch.gap.answer.controls import arms, control

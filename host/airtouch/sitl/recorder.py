@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch import logs
 from airtouch.errors import AirTouchError
+from airtouch.logs import files
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 DECIMALS = 6
@@ -35,4 +35,4 @@ class Recorder:
         table = np.round(np.array(self._rows), DECIMALS)
         meta = {"source": self._path.name, **self._meta}
         log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, meta)
-        logs.write(log, self._path, force=self._force)
+        files.write(log, self._path, force=self._force)

@@ -120,7 +120,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     absent = absent_sensors(flights)
     start = start.serving(absent) if start else None
     key = _key(flights, scene, vehicle, start, seed)
-    twin_flights, origin = simulated_flights(flights, scene, vehicle, seed, progress)
+    twin_flights, origin = simulated_flights(flights, scene, vehicle, seed, progress, work)
     twin_flights = replace(twin_flights, logs=[sensors.without(log, absent) for log in twin_flights.logs])
     labelled = [f for f in flights if f.labelled]
     twin = cache.model(work / f"twin_{key}.npz", lambda: best.fit(
@@ -147,10 +147,11 @@ def absent_sensors(flights: Sequence[Flight]) -> tuple[str, ...]:
 
 
 def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
-                      progress: Progress | None) -> tuple[SimulatedFlights, dict[str, Any]]:
+                      progress: Progress | None, work: Path | None = None) -> tuple[SimulatedFlights, dict[str, Any]]:
     """Flights of the twin, added to the recorded flights' free air if there is any, and a description for metadata.
 
-    Raises AirTouchError if too many simulated flights diverge.
+    work: folder in which simulated edges are stored, so that the same call continues after a stop. Raises
+    AirTouchError if too many simulated flights diverge.
     """
     air = overlay.free_air([f.log for f in flights if f.labelled])
     if not air:
@@ -158,7 +159,9 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
                                                             progress=progress)
         return SimulatedFlights(twin_logs, [None] * len(twin_logs)), description
     report = (lambda done, total: progress("simulated edges", done, total, "")) if progress else (lambda *_: None)
-    responses = overlay.simulate_responses(scene, vehicle, TWIN_FLIGHTS, seed, report)
+    digest = hashlib.sha256(repr((STAGE_VERSION, scene.table, vehicle, seed)).encode()).hexdigest()[:12]
+    responses = overlay.simulate_responses(scene, vehicle, TWIN_FLIGHTS, seed, report,
+                                           work / f"edges_{digest}" if work else None)
     factors = edge_strength.strengths([f.log for f in flights if f.labelled], responses)
     scaled = [edge_strength.scale(r, factors) for r in edge_strength.balance_heights(responses)]
     twin_logs, edges = overlay.flights(air, scaled, seed)

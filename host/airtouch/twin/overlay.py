@@ -5,8 +5,10 @@ difference of two simulated flights with the same random numbers, one with the p
 parts of recorded flights far from any edge, it gives flights with known edges in real air.
 """
 
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from airtouch import logs
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.reference.finite import PWM_MAX, hold_finite
 from airtouch.simulation import flight, scenario
@@ -70,16 +73,24 @@ class FreeAir:
 
 
 def simulate_responses(scene: Scenario, vehicle: Vehicle, count: int, seed: int = 0,
-                       progress: Callable[[int, int], None] = lambda *_: None) -> list[Response]:
+                       progress: Callable[[int, int], None] = lambda *_: None,
+                       folder: Path | None = None) -> list[Response]:
     """The first `count` responses of a scenario's flights over one platform.
 
-    progress: as progress(done, total). Raises AirTouchError if too many flights diverge.
+    progress: as progress(done, total). folder: where each is stored, so that the same call continues after a stop; it
+    is for this scenario, vehicle and seed only. Raises AirTouchError if too many flights diverge.
     """
     out: list[Response] = []
     for number in range(MAX_TRIES * count):
         if len(out) == count:
             break
-        response = _response(scene, vehicle, seed, number)
+        path = folder / f"{number:04d}.npz" if folder else None
+        if path and path.is_file():
+            response = _load(path)
+        else:
+            response = _response(scene, vehicle, seed, number)
+            if path:
+                _save(path, response)
         if response is not None:
             out.append(response)
             progress(len(out), count)
@@ -111,6 +122,28 @@ def _response(scene: Scenario, vehicle: Vehicle, seed: int, number: int) -> Resp
     values[-fade:] *= np.linspace(1.0, 0.0, fade)[:, None]
     entry, leave = (replace(e, sample=e.sample - first) for e in edges)
     return Response(values, (entry, leave))
+
+
+def _save(path: Path, response: Response | None) -> None:
+    """Write what one flight gave to a file (.npz), also where that is nothing."""
+    data = io.BytesIO()
+    if response is None:
+        np.savez_compressed(data)
+    else:
+        np.savez_compressed(data, values=response.values, edges=[
+            (e.sample, e.height_before_m, e.height_after_m) for e in response.edges])
+    make_folder(path.parent)
+    write_bytes(data.getvalue(), path, force=True)
+
+
+def _load(path: Path) -> Response | None:
+    """What `_save` wrote, bit for bit."""
+    with np.load(path) as stored:
+        if "values" not in stored:
+            return None
+        entry, leave = (Edge(int(sample), kind, float(before), float(after))
+                        for kind, (sample, before, after) in zip(("entry", "exit"), stored["edges"], strict=True))
+        return Response(stored["values"], (entry, leave))
 
 
 def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+import airtouch.gap.measure as measure
 import gap_flights
 from airtouch import vehicle as vehicles
-from airtouch.gap import measure
 from airtouch.logs.flight_log import FlightLog
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.flights.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
 
 FIRST = np.array([0, 128, 256])

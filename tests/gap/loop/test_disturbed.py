@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
-from airtouch.gap import measure
 from airtouch.gap.loop.controller import firmware_of
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual

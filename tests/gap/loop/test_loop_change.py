@@ -6,9 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+import airtouch.gap.diagnose as diagnose
+import airtouch.gap.measure as measure
 import gap_flights
 from airtouch import vehicle as vehicles
-from airtouch.gap import diagnose, measure
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.edge_response import calm
 from airtouch.gap.nominal.build_study import declared_study

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from airtouch.gap import diagnose
+import airtouch.gap.diagnose as diagnose
 from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select

@@ -1,5 +1,6 @@
 """The shipped library: for which flights it holds, that it is no older than the code, and what it names end to end."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,14 @@ from gap_flights import VEHICLE, fly, ready
 def nominal():
     """Features of nominal flights of a seed that nothing was learned from."""
     return [features(f, VEHICLE) for f in fly(5, 77)]
+
+
+def test_another_process_reads_the_shipped_library_from_its_own_package():
+    shipped = library.shipped()
+    sent = pickle.dumps(shipped)
+    assert len(sent) < 200 and pickle.loads(sent) is shipped
+    part = shipped.without(["mass"])
+    assert pickle.loads(pickle.dumps(part)).effects == part.effects == shipped.effects - {"mass"}
 
 
 def test_a_file_holds_what_was_saved(tmp_path):

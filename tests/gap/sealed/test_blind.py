@@ -5,7 +5,9 @@ import os
 import pickle
 import select
 import signal
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,11 +16,13 @@ from scipy.stats import chi2
 
 from airtouch import logs
 from airtouch.cli.gap import command
+from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
 from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity
 from airtouch.gap.sealed.blind_severity import severities
 from airtouch.gap.signatures.random_draws import KINDS
 
+ROOT = Path(__file__).parents[3]
 CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_offset": (5e-4, 1e-3, 2e-3),
          "rotor_drag": (0.004, 0.008, 0.016), "time_jitter": (0.002, 0.004, 0.006)}
 
@@ -107,8 +111,31 @@ def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path)
             yield function(item)
 
     blind_run.answer(folder, tmp_path / "answers", [(name, ())], study=study, spread=spread)
-    assert len(jobs) == 1
+    assert len(jobs) == 1 and len(jobs[0]) < 2e6  # dask warns of 10 MB
     assert (tmp_path / "answers" / f"{name}.json").read_bytes() == (folder / "answers" / f"{name}.json").read_bytes()
+
+
+def test_the_search_for_strengths_says_where_it_is(monkeypatch):
+    monkeypatch.setattr(blind, "nominal", lambda *_: [])
+    monkeypatch.setattr(blind, "weakest", lambda *_: None)
+    steps = []
+    assert blind.strengths(SimpleNamespace(vehicle=None), 0, ["wind", "mass"], steps.append) == {}
+    assert [s.partition(",")[2] for s in steps] == [" effect 1 of 2", " effect 2 of 2"]
+    assert {s.partition(",")[0] for s in steps} == {"severities of wind", "severities of mass"}
+
+
+def test_make_says_at_once_how_long_it_takes_and_a_line_every_two_seconds(tmp_path, monkeypatch):
+    def slow(*_, progress, **__):
+        progress("severities of mass, effect 1 of 26")
+        time.sleep(2.0)
+        return tmp_path / "key.json"
+
+    monkeypatch.setattr(blind, "make", slow)
+    result = CliRunner().invoke(command, ["blind", "make", str(tmp_path / "set"), "-n", "3"])
+    first, second, *_ = result.stderr.splitlines()
+    assert first.startswith("3 flights; first the strengths of every effect, which take ") and "minutes" in first
+    assert second.endswith("s] severities of mass, effect 1 of 26")
+    assert SEVERITIES_TAKE in (ROOT / "host/docs/gap-blind.md").read_text("utf-8")
 
 
 def test_flights_say_nothing_of_their_effect(blind_check):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
-from airtouch.gap import measure
 from airtouch.gap.loop import controller, loop_model, turning
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual

@@ -31,6 +31,8 @@ EFFECT = Effect("own_load", "falls onto the drone", (Parameter("size", "N", 0.03
 FILES = {
     "own_battery": SETTINGS.format(name="own_battery", unit="ohm", default=0.3, most=1.0, body=(
         'plant["battery_strength"], plant["battery_charge"], plant["battery_resistance"] = 1.0, 0.9, v["size"]')),
+    "own_resistance": SETTINGS.format(name="own_resistance", unit="ohm", default=0.15, most=1.0,
+                                      body='plant["battery_resistance"] += v["size"]'),
     "own_gyro": SETTINGS.format(name="own_gyro", unit="1", default=0.3, most=1.0,
                                 body='plant["gyro_scale"] *= 1.0 + v["size"]'),
     "own_slow": SETTINGS.format(name="own_slow", unit="s", default=0.05, most=1.0,
@@ -65,6 +67,12 @@ def test_an_old_battery_gives_less_voltage(fly_columns):
     low_ohm_v, high_ohm_v = (hovering(fly_columns("own_battery", size=ohm), "vbat_V").mean() for ohm in (0.05, 0.15))
     current = 85.0 * 4 * (0.0362 * 9.81 / 4) ** 1.5 / low_ohm_v  # power of a hover, W, over volts
     assert low_ohm_v - high_ohm_v == pytest.approx(0.1 * current, rel=0.25)
+
+
+def test_a_resistance_alone_changes_nothing_while_the_motors_see_the_nominal_voltage(fly_columns):
+    nominal, alone = fly_columns(), fly_columns("own_resistance", size=0.15)
+    for name in nominal:
+        np.testing.assert_array_equal(alone[name], nominal[name])
 
 
 def test_a_gyro_that_reads_too_much_shows_a_turn_as_larger(fly_columns):

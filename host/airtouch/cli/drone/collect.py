@@ -80,13 +80,14 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     name = name or Path(first.name).name
     plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
                         link_timeout, force)
-    collect.prepare_folder(out, click.echo)
-    first_number = number or recorder.next_number(out, name)
-    check_free(recorder.flight_path(out, name, first_number), force)
-    click.echo(first.describe())
-    missions = {i: mission.load(mission_name, seed, i) for i in range(first_number, first_number + flights)}
-    with stopping() as stop:
-        planned = _fly(plan, missions, cache, stop, ask=sys.stdin.isatty() and not yes)
+    with collect.no_empty_folders(out):
+        collect.prepare_folder(out, click.echo)
+        first_number = number or recorder.next_number(out, name)
+        check_free(recorder.flight_path(out, name, first_number), force)
+        click.echo(first.describe())
+        missions = {i: mission.load(mission_name, seed, i) for i in range(first_number, first_number + flights)}
+        with stopping() as stop:
+            planned = _fly(plan, missions, cache, stop, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
 
 

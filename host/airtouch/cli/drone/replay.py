@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 @click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X",
               type=click.FloatRange(0, 1000), help="Times real time; 1 is as it was flown.")
 @click.option("--flown-at", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of a flight without one in its manifest; needed for errors in metres.")
+              help="Commanded speed of a flight without one in manifest or log; needed for errors in metres.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained `best` model (.npz); the shipped one if left out.")
 def command(flight: Path, speed: float, flown_at: float | None, model: Path | None) -> None:
@@ -40,15 +40,16 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     if len(files) != 1 or flight.is_dir():
         raise AirTouchError(f"{flight}: give one flight, not a folder")
     log = evaluate.read_flight(files[0], evaluate.spare_of(best))
+    file = dataset.with_flown_speed(files[0], log)
     detector = HostDetector(best.load(model), sensors.missing(log))
     board = boards.Board(flight.name, "best", detector.lag_s)
     with stopping(quiet=True) as stop, screen(bool(speed)) as (show, say):
-        fed = replay.run(log, board, detector, speed=speed, speed_mps=files[0].condition.speed_mps, stop=stop,
+        fed = replay.run(log, board, detector, speed=speed, speed_mps=file.condition.speed_mps, stop=stop,
                          show=show, on_edge=lambda edge: say(boards.edge_line(edge)))
     if fed < len(log):
         click.echo(f"stopped after {fed / 100:.1f} of {len(log) / 100:.1f} s; no score")
         sys.exit(1)
-    result = replay.result(files[0], log, detector)
+    result = replay.result(file, log, detector)
     for edge in result.score.edges:
         click.echo(_in_words(edge))
     if result.score.false:

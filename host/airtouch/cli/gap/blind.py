@@ -7,10 +7,12 @@ import click
 
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
-from airtouch.cli.gap.progress import Bar
+from airtouch.cli.gap.progress import Bar, Steps
 from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
 from airtouch.logs.files import make_folder
+
+SEVERITIES_TAKE = "two to three minutes"  #: on an idle processor, 2026-11-25 (host/docs/gap-blind.md)
 
 
 @click.group("blind", cls=Suggesting)
@@ -28,9 +30,13 @@ def blind() -> None:
               "default: OUT.key.json beside OUT.")
 @click.option("--force", is_flag=True, help="Replace a set in OUT.")
 def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
-    """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
+    """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart.
+
+    First it finds how strong each effect must be to show at all; that takes minutes, however few the flights.
+    """
     make_folder(out)
-    with Bar() as bar:
+    click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
+    with Bar(line_s=Steps.LINE_S) as bar:
         from airtouch.gap.sealed import blind as sealed
 
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
@@ -79,6 +85,8 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     need("plots", "scoring a sealed set")
     spread = runner(dask, ()) if dask else None
     make_folder(out)
+    if not (out / "sealed.json").exists():
+        click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
     with Bar() as bar:
         from airtouch.gap.sealed import blind_run as check
 

@@ -23,8 +23,8 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     """
     check_free(report, json_path, force)
     with Bar() as bar:
+        import airtouch.gap.measure as measure
         from airtouch.cli.gap import files, show
-        from airtouch.gap import measure
         from airtouch.gap.sealed import on_cluster
 
         flights, nominal = files.Flights(real), files.Flights(baseline)

@@ -40,19 +40,21 @@ class Steps:
 class Bar:
     """A progress bar on stderr that appears when the work takes longer than PATIENCE_S; lines without a terminal.
 
-    Call it with a description of each step. total: number of steps, None if unknown.
+    Call it with a description of each step. total: number of steps, None if unknown. line_s: between two lines without
+    a terminal.
     """
 
-    LINE_S = 10.0  #: between two lines without a terminal: a log of hours stays short
+    LINE_S = 10.0  #: a log of hours stays short
 
-    def __init__(self, total: int | None = None, text: str = "loading; the first time compiles, for a minute") -> None:
+    def __init__(self, total: int | None = None, text: str = "loading; the first time compiles, for a minute",
+                 line_s: float = LINE_S) -> None:
         console = Console(stderr=True)
         self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(),
                                  TimeElapsedColumn(), console=console, transient=True)
         self.task = self.progress.add_task(text, total=total)
         self.timer = threading.Timer(PATIENCE_S, self.progress.start)
         self.timer.daemon = True
-        self.lines = None if console.is_terminal else Steps(time.monotonic(), self.LINE_S)
+        self.lines = None if console.is_terminal else Steps(time.monotonic(), line_s)
         self._say(text)
 
     def __enter__(self) -> "Bar":

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.detector.evaluation import summary
-from airtouch.detector.evaluation.data.dataset import FlightFile
+from airtouch.detector.evaluation.data.dataset import FlightFile, with_flown_speed
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore, score_flight
 from airtouch.detector.registry import Detector
 from airtouch.detector.shared import sensors, training_set
@@ -35,7 +35,7 @@ class Result:
 def read_flight(file: FlightFile, spare: int = 0) -> FlightLog:
     """A log that can be scored; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
     log = read_usable(file, spare)
-    if truth(log) and file.condition.speed_mps is None:
+    if truth(log) and with_flown_speed(file, log).condition.speed_mps is None:
         raise AirTouchError(f"{file.path}: speed unknown, so errors in metres are too: "
                             "give --speed, or speed_mps in a manifest.csv beside the flight")
     return log
@@ -109,7 +109,8 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
 
 def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
     """The score of a trace that the detector gave with this model."""
-    score = score_flight(file.path.name, file.condition, truth(log), logs.airborne(log), trace.probability,
+    condition = with_flown_speed(file, log).condition
+    score = score_flight(file.path.name, condition, truth(log), logs.airborne(log), trace.probability,
                          trace.edges, detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)

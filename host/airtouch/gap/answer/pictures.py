@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight

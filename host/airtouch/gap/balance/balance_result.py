@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.answer import advice as advices
 from airtouch.gap.answer import pictures as picture
 from airtouch.gap.answer.shrink import Shrink

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -52,6 +52,10 @@ class Library:
     second_share: np.ndarray
     distance_scatter: np.ndarray
     pair_scatter: float
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """Other processes read the shipped library from their own package: it is 30 MB of a study that is sent."""
+        return (shipped, ()) if self is shipped() else super().__reduce_ex__(protocol)
 
     def coordinates(self, features: np.ndarray) -> np.ndarray:
         """Coordinates (n, Q) of features (n, features)."""

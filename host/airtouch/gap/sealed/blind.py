@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import measure
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
@@ -61,7 +61,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     answers: dict[str, Any] = {}
     for number, drawn in enumerate(draw(flights, levels, rng)):
         name = f"flight_{number:04d}"
-        progress(name)
+        progress(f"{name}, of {flights}")
         log, effects = _flight(vehicle, drawn, levels, seed, number, rng)
         write(log, out / f"{name}.csv.gz", force=True)
         answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
@@ -152,12 +152,12 @@ def strengths(study: Study, seed: int, kinds: Sequence[str] | None = None, progr
     vehicle = study.vehicle
     without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 8, seed)]
     found = {}
-    for name, kind in KINDS.items():
-        if kinds is None or name in kinds:
-            progress(f"severities of {name}")
-            low = weakest(kind, study, SCENARIO, without, seed, stripped)
-            if low is not None:
-                found[name] = severities(low, kind.highest)
+    asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
+    for number, (name, kind) in enumerate(asked.items(), 1):
+        progress(f"severities of {name}, effect {number} of {len(asked)}")
+        low = weakest(kind, study, SCENARIO, without, seed, stripped)
+        if low is not None:
+            found[name] = severities(low, kind.highest)
     return found
 
 

@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import measure
 from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.sealed import blind, blind_score

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
-from airtouch.gap import measure
+import airtouch.gap.measure as measure
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import judge

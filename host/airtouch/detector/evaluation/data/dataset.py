@@ -3,13 +3,15 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
 
 MANIFEST = "manifest.csv"
+MOST_MPS = 100.0  #: m/s, above any commanded speed
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  #: what counts as a log in a folder without one
 
 
@@ -94,6 +96,20 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
     return list(members.values())
 
 
+def with_flown_speed(file: FlightFile, log: FlightLog) -> FlightFile:
+    """The flight with the speed in its log's metadata, where its condition holds none.
+
+    `collect` and `simulate` write it as `speed_mps`, and `speed` of the `condition`.
+    """
+    if file.condition.speed_mps is not None:
+        return file
+    drawn = log.meta.get("condition")
+    for speed in (log.meta.get("speed_mps"), drawn.get("speed") if isinstance(drawn, Mapping) else None):
+        if isinstance(speed, (int, float)) and 0 < speed < MOST_MPS:
+            return replace(file, condition=replace(file.condition, speed_mps=float(speed)))
+    return file
+
+
 def not_taken(paths: Iterable[str | Path]) -> Counter[str]:
     """Reason -> number of the flights in folders that `collect` does not take because of the folder's manifest."""
     reasons: Counter[str] = Counter()
@@ -141,7 +157,7 @@ def _condition(row: dict[str, str | None], place: str) -> Condition:
             raise AirTouchError(f"{place}: {name} is {value!r}, a number is needed") from None
 
     speed = number("speed_mps")
-    if speed is not None and not 0 < speed < 100:
+    if speed is not None and not 0 < speed < MOST_MPS:
         raise AirTouchError(f"{place}: speed_mps is {speed:g}, it must be above 0 and below 100")
     return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"),
                      speed, text("day"))
