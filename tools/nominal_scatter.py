@@ -36,11 +36,15 @@ from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter
 from airtouch.gap.signatures.scatter_estimates import measured
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.batch import flights as simulated
 from airtouch.vehicle import Vehicle
 
 MOST = 5  #: baseline flights of one, at most; no source: round number, for time
 LEAST = 4  #: flights of a group; no source: three baseline flights for each
 SIMULATED = 4  #: groups of simulated flights; no source: round number
+#: scenarios that draw each flight's rotors and battery, one group each of so many flights; no source: of the shipped
+#: ones those least alike
+OWN_TRIM, OWN_TRIM_FLIGHTS = ("paper-low", "paper-9cm", "paper-mixed", "steps"), 6
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
 #: a log's name, and a function that reads it
 Log = tuple[str, Callable[[], FlightLog]]
@@ -73,6 +77,11 @@ def groups(folder: Path) -> Iterator[Group]:
         simulated_logs: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log))
                                      for i, log in enumerate(logs)]
         yield scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs
+    for scene in OWN_TRIM:
+        every = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
+        logs = [blind.stripped(log) for log in every if isinstance(log, FlightLog)]
+        yield scatter_estimates.OWN_TRIM, scene, scene, vehicle, [(f"{scene} {i}", partial(nothing_done, log))
+                                                                  for i, log in enumerate(logs)]
 
 
 def nothing_done(log: FlightLog) -> FlightLog:

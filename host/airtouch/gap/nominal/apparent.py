@@ -14,6 +14,7 @@ from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Judged
+from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
@@ -35,7 +36,7 @@ def nominal_scatter(study: Study, flights: Sequence[Flight], without: Sequence[s
     It is measured in FLIGHTS of them, each held against the study of all.
     """
     return scatter_of(shared(partial(_apparent_in, study, without), evenly_chosen(flights)),
-                      any(is_recorded(f) for f in flights), study.vehicle.name)
+                      any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
 
 
 def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:

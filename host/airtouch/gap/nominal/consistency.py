@@ -49,6 +49,16 @@ def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -
     return [f for f, out in zip(flights, unlike, strict=True) if not out], notes
 
 
+def of_one_trim(vehicle: Vehicle, flights: Sequence[Flight]) -> bool:
+    """Whether the trims of two flights or more scatter no more than those of simulated flights drawn with one trim.
+
+    The robust standard deviation of each channel is then FAR_SIMULATED at most. In units of a sixth of that, sets of
+    four and six flights of the scenarios `diagnosis` and `hover` have 0.4 to 2.4 in the channel where it is largest,
+    sets of paper-low, paper-mixed, steps and zigzag, which draw each flight's rotors and battery, 44 to 198.
+    """
+    return bool((deviation(trims(flights, vehicle)) <= FAR_SIMULATED).all())
+
+
 def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
     """A note on each flight whose trim under the calibrated vehicle is odd, with the channel in which it is most so."""
     if len(flights) < FEWEST:
