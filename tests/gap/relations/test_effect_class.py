@@ -82,3 +82,13 @@ def test_a_class_of_one_parameter_of_several_says_so():
 
     assert named("controller_gain rate", "controller_gain").of_one_parameter
     assert not named("mass", "mass").of_one_parameter
+
+
+def test_scatter_is_that_beyond_nominal_flights():
+    """Shifts have length 5: nominal flights scatter by a fifth of it in every direction, the class by 0.3 in one."""
+    rng = np.random.default_rng(6)
+    strength = np.full((4000, 1), 5.0) * np.exp(0.01 * rng.normal(size=(4000, 1)))
+    shift = strength * np.eye(Q)[0]
+    flights = shift + rng.normal(size=(4000, Q)) + 1.5 * rng.normal(size=(4000, 1)) * np.eye(Q)[2]
+    effect_class = learn_class("one", "one", None, strength, shift, flights)
+    assert np.sqrt(effect_class.variances) == pytest.approx([1.5 / 5.0], rel=0.08)

@@ -168,3 +168,40 @@ def test_two_parameters_of_one_effect_have_no_readings():
     one, both = (infer(known, (noise() + x)[None]) for x in (rate, rate + attitude))
     assert list(one.readings) == ["controller_gain"]
     assert len(both.classes) == 2 and not both.readings
+
+
+def test_two_effects_are_no_sum_by_a_share_of_the_smaller_one():
+    interaction = 0.5 * np.eye(Q)[:, 5:6]
+    model = replace(library().model, interaction=interaction)
+    features = FlightFeatures(noise() + 40.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], model)
+    both = features.with_two(*model.classes[:2])
+    smaller = np.linalg.norm(both.fits[1].shift)
+    assert smaller == pytest.approx(10.0, abs=2.0)
+    assert features.coordinates(both.fits)(np.eye(Q)[5])[5] == pytest.approx((1.0 + (0.5 * smaller) ** 2) ** -0.5)
+    assert features.coordinates(both.fits[:1])(np.eye(Q)[5])[5] == pytest.approx(1.0)
+
+
+def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
+    first = library().model.classes[0]
+    shapes = (replace(first, shape=1.0), replace(first, shape=2.0, table=np.tile(np.eye(Q)[50], (1, 3, 1))))
+    of = replace(library(), model=replace(library().model, classes=shapes), nameless_share=np.zeros(2),
+                 second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    values = (noise() + 30.0 * np.eye(Q)[0])[None]
+    alone = infer(library(), values).evidence["mass"]
+    assert infer(of, values).evidence["mass"] == pytest.approx(alone - np.log(2.0))
+
+
+def test_probabilities_are_those_of_half_the_evidence():
+    """Tails are heavier than normal ones; what has the least evidence of an effect is as likely as none."""
+    evidence = {"mass": inference.LEAST_EVIDENCE, "wind": inference.LEAST_EVIDENCE - 4.0}
+    chance = inference.Inference((), evidence, 0.0, 0.0, 1.0).probabilities()
+    assert chance["mass"] == pytest.approx(chance["none"])
+    assert chance["wind"] == pytest.approx(chance["mass"] * np.exp(-2.0))
+
+
+def test_another_name_of_the_likeliest_effect_is_not_added_to_it():
+    classes = (library().model.classes[0], replace(library().model.classes[1], name="thrust_coefficient",
+                                                   effect="thrust_coefficient"))
+    of = replace(library(), model=replace(library().model, classes=classes), nameless_share=np.zeros(2),
+                 second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    assert len(infer(of, (noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1])[None]).classes) == 1

@@ -59,3 +59,20 @@ def test_amounts_and_values_are_the_inverse_of_each_other(name, parameter, value
     size = np.geomspace(0.1, 10.0, 20)[:, None] * np.sign(amount)
     parameters = read_out(Readout((parameter,), size, size), get(name), np.array([amount]))
     assert parameters[parameter][0] == pytest.approx(value, rel=1e-6)
+
+
+@pytest.mark.parametrize("beyond", [0.01, 100.0])
+def test_beyond_the_calibration_the_amount_goes_on_in_proportion_to_the_strength(beyond):
+    """Noisy calibration flights from 1 to 10: the line through the nearest ones would go anywhere."""
+    rng = np.random.default_rng(3)
+    strength = np.exp(rng.uniform(0.0, np.log(10.0), 80))
+    amount = 0.02 * strength * np.exp(0.3 * rng.normal(size=80))
+    (value,), (deviation,) = Readout(("fraction",), strength[:, None], amount[:, None])(np.array([beyond]))
+    assert abs(np.log(value / (0.02 * beyond))) < 1.2
+    assert 0.1 < deviation / value < 0.6
+
+
+def test_one_flight_says_that_amount_and_strength_are_proportional():
+    one, two = np.array([[1.0], [1.02]]), np.array([[0.02], [0.0206]])  # a slope of 1.5 from two flights
+    (value,), _ = Readout(("fraction",), one, two)(np.array([20.0]))
+    assert value == pytest.approx(0.02 * 20.0, rel=0.1)

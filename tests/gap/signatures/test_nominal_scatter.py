@@ -293,3 +293,9 @@ def test_few_baseline_flights_scatter_more_than_they_seem_to():
                                   (4.0, 4.0))
     assert scatter_of(flights, True, "ns-34g").rms["inertia"] == pytest.approx(expected)
     assert expected > standard_deviation(strengths, np.full(3, 0.1), of_class.rms["inertia"][0], (4.0, 4.0))
+
+
+def test_one_flight_of_a_high_rate_hardly_raises_what_its_class_allows():
+    rates = [1.0] * 20 + [400.0]
+    middle, deviation = measured([Apparent({}, {}, r) for r in rates]).rate
+    assert middle == pytest.approx(1.0) and deviation == pytest.approx(0.0, abs=1e-9)
