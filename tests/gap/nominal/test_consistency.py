@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, differences, odd_flights, split_unlike, trims
+from airtouch.gap.flights.flight import ready
+from airtouch.gap.nominal.consistency import (
+    FAR,
+    FAR_SIMULATED,
+    differences,
+    odd_flights,
+    of_one_trim,
+    split_unlike,
+    trims,
+)
+from airtouch.simulation import batch
 from gap_flights import VEHICLE, flight, study
 
 
@@ -41,6 +51,18 @@ def test_a_flight_is_left_out_where_its_trim_is_odd_and_far_off():
 def test_simulated_flights_may_differ_by_a_tenth():
     assert left_out(baseline(0.0, 0.001, -0.001, 0.045), FAR_SIMULATED) == ["lift 0.045"]
     assert not left_out(baseline(0.0, 0.001, -0.001, 0.035), FAR_SIMULATED)
+
+
+@pytest.mark.parametrize(("scene", "one_trim"), [("diagnosis", True), ("hover", True), ("paper-low", False),
+                                                 ("steps", False)])
+def test_scenarios_that_draw_each_flights_rotors_have_trims_of_their_own(scene, one_trim):
+    logs = batch.flights(scene, 4, vehicle=VEHICLE, seed=511, workers=1)
+    assert of_one_trim(VEHICLE, [ready(log, VEHICLE) for log in logs]) == one_trim
+
+
+def test_one_odd_flight_of_many_leaves_the_others_of_one_trim():
+    assert of_one_trim(VEHICLE, baseline(0.0, 0.001, -0.001, 0.002, -0.002, 5.0))
+    assert not of_one_trim(VEHICLE, baseline(0.0, 0.2))
 
 
 def test_the_note_tells_by_how_much_the_lift_is_off():

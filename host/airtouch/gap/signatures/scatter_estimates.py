@@ -22,16 +22,16 @@ OWN_TRIM = "simulated, trim of its own"  #: of those whose rotors and battery ar
 Pair = tuple[float, float]  #: mean and standard deviation
 
 
-def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "", one_trim: bool = True,
-               ) -> Scatter:
+def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "",
+               one_trim: bool | None = None) -> Scatter:
     """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
     recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
     that was measured on the vehicle of this name leaves no room for other vehicles'. one_trim: whether the baseline's
-    trims are alike, which tells the classes of simulated flights apart. One flight or none says nothing: the scatter is
-    then the widest of any class.
+    trims are alike, which tells the classes of simulated flights apart; None: nobody knows. One flight or none says
+    nothing: the scatter is then the widest of any class.
     """
     classes = _possible_classes(recorded, vehicle, one_trim)
     n = len(baseline)
@@ -78,9 +78,9 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
     return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
 
 
-def _possible_classes(recorded: bool, vehicle: str, one_trim: bool) -> dict[str, Scatter]:
+def _possible_classes(recorded: bool, vehicle: str, one_trim: bool | None) -> dict[str, Scatter]:
     """The classes of the table that the flights of a vehicle may be of; see `scatter_of`."""
-    not_theirs = {SIMULATED, OWN_TRIM} if recorded else {OWN_TRIM if one_trim else SIMULATED}
+    not_theirs = {SIMULATED, OWN_TRIM} if recorded else {True: {OWN_TRIM}, False: {SIMULATED}, None: set()}[one_trim]
     classes = {name: c for name, c in table().items() if name not in not_theirs}
     of_vehicle = {name: c for name, c in classes.items() if c.vehicle == vehicle}
     return of_vehicle if vehicle and of_vehicle else classes
