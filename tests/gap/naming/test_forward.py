@@ -14,7 +14,7 @@ def select(monkeypatch):
 
     Returns the state, and the names that were judged in each round.
     """
-    def run(candidates, passing=None, looked_at=()):
+    def run(candidates, passing=None, looked_at=(), left=()):
         def judged(name, so_far=0.0):
             gain, evidence = candidates[name]
             return Judged(name, (), so_far + gain, full=name not in looked_at, evidence=evidence)
@@ -34,7 +34,7 @@ def select(monkeypatch):
         monkeypatch.setattr(module, "round_of", round_of)
         monkeypatch.setattr(module, "_best_of", best_of)
         monkeypatch.setattr(module, "needed_beside", lambda on, held, more: LEAST_GAIN)
-        monkeypatch.setattr(module, "random_by_misfit", lambda on, held, more: False)
+        monkeypatch.setattr(module, "random_by_misfit", lambda on, held, more: more.name in left)
         monkeypatch.setattr(module, "with_shares", lambda on, steps: steps)
         alone = {n: judged(n) for n in candidates}
         search = Search(None, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, FIRST_GAIN),
@@ -72,6 +72,13 @@ def test_what_nominal_flights_have_as_well_is_a_deviation_and_after_three_only_w
     assert names(state) == [("e", False), ("d", False), ("c", False)] and state.deviations == MOST_DEVIATIONS
     state, _ = select({**deviations, "f": (30.0, FIRST_GAIN)})
     assert names(state)[3:] == [("f", True)] and state.named == ["f"]
+
+
+def test_a_random_effect_that_another_leaves_makes_no_room_for_deviations(select):
+    deviations = {n: (400.0 + k, FIRST_GAIN - 0.1) for k, n in enumerate("abcde")}
+    found = {"f": (150.0, 20.0), "noise": (140.0, 20.0)}
+    state, _ = select({**deviations, **found}, left=("noise",))
+    assert names(state) == [("e", False), ("d", False), ("c", False), ("f", True), ("noise", False)]
 
 
 def test_beside_a_deviation_only_those_are_judged_again_that_gained_something(select):
