@@ -47,14 +47,14 @@ class Bar:
     LINE_S = 10.0  #: a log of hours stays short
 
     def __init__(self, total: int | None = None, text: str = "loading; the first time compiles, for a minute",
-                 line_s: float = LINE_S) -> None:
+                 line_s: float | None = None) -> None:
         console = Console(stderr=True)
         self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(),
                                  TimeElapsedColumn(), console=console, transient=True)
         self.task = self.progress.add_task(text, total=total)
         self.timer = threading.Timer(PATIENCE_S, self.progress.start)
         self.timer.daemon = True
-        self.lines = None if console.is_terminal else Steps(time.monotonic(), line_s)
+        self.lines = None if console.is_terminal else Steps(time.monotonic(), line_s or self.LINE_S)
         self._say(text)
 
     def __enter__(self) -> "Bar":
