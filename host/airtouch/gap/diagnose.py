@@ -19,6 +19,7 @@ from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
+from airtouch.gap.naming.related import signs_not_shown
 from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.naming.thresholds import LOOP_SHARE
@@ -79,6 +80,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     judged = flights_to_judge(usable)
     data = _data(study, judged)
     selection, gap_cells = _selected(data, without, say)
+    notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap_cells)
     effects, is_effect = list(result.effects), result.verdict == "effect"

@@ -76,3 +76,13 @@ def test_one_flight_says_that_amount_and_strength_are_proportional():
     one, two = np.array([[1.0], [1.02]]), np.array([[0.02], [0.0206]])  # a slope of 1.5 from two flights
     (value,), _ = Readout(("fraction",), one, two)(np.array([20.0]))
     assert value == pytest.approx(0.02 * 20.0, rel=0.1)
+
+
+def test_a_strength_of_which_both_signs_come_is_read_as_a_size():
+    size = np.geomspace(1.0, 100.0, 40)
+    sign = np.where(np.arange(40) % 2 == 0, 1.0, -1.0)
+    mixed = Readout(("share",), size[:, None], (2.0 * size * sign)[:, None])
+    assert not mixed.shows_sign(np.array([10.0])) and mixed(np.array([10.0]))[0] == pytest.approx([20.0], rel=1e-3)
+    sign = np.where(np.arange(40) == 20, 1.0, -1.0)
+    clear = Readout(("share",), size[:, None], (2.0 * size * sign)[:, None])
+    assert clear.shows_sign(np.array([10.0])) and clear(np.array([10.0]))[0] == pytest.approx([-20.0], rel=1e-3)

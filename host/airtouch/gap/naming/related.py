@@ -46,6 +46,15 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Ma
                      simulated=True, same_models=True, inference=inference)
 
 
+def signs_not_shown(selection: Selection) -> list[str]:
+    """A note on each effect named by the relations of signals whose parameter may have the other sign as well."""
+    if selection.inference is None:
+        return []
+    names = {s.name for s in selection.named}
+    return [f"{name}: the flights do not show the sign of its strength; it may be the other one"
+            for name in selection.inference.without_sign if name in names]
+
+
 def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
     alone = of.name.partition(" ")[2]

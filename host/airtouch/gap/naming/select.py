@@ -24,6 +24,7 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD, SHAKES
 from airtouch.gap.unnamed.generic import generic_gain
+from airtouch.simulation.effects import NAMES
 
 #: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
 #: that fill a flight have 0.09 to 0.10, four motor noises that the replay took for one 0.01 to 0.02
@@ -73,9 +74,12 @@ def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
 
     A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
-    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely.
+    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely. An effect of a user's own that they find
+    likeliest it may name as well: its class was learned from few flights, no stronger than some natural steps.
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
+        return True
+    if inference.likeliest and inference.likeliest not in NAMES:
         return True
     most = inference.evidence.get(inference.likeliest, 0.0)
     return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)

@@ -22,7 +22,7 @@ from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, sp
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
-from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.generic import unnamed_floor
 from airtouch.simulation.effects import Active
@@ -71,7 +71,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         if unlike:
             study, again = calibrated(vehicle, alike, without=without)
             return study, replace(again, notes=(*left_out, *unlike, *again.notes), declared=None)
-        study = _as_simulated(study, flights)
+        study = _as_simulated(study, flights, without)
     return study, Calibration(study.calibration, _quantities(fitted), (*left_out, *odd_flights(study, flights)),
                               None if left_out else declared)
 
@@ -88,14 +88,20 @@ def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, 
     return study, fitted
 
 
-def _as_simulated(study: Study, flights: Sequence[Flight]) -> Study:
+def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str]) -> Study:
     """The study of simulated flights: with the relations of their signals, where a library holds for them.
 
     They all have the same trim. What the power in the lowest bin gives a flight's mean is therefore no part of the
-    offset between flights.
+    offset between flights. without: effects that are no candidates; of the others the library learns those that it
+    lacks.
     """
-    return replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond),
-                   relations=library_for(study.vehicle, [features(f, study.vehicle) for f in flights]))
+    relations = library_for(study.vehicle, [features(f, study.vehicle) for f in flights])
+    names = all_candidates(without)
+    if relations is not None and not relations.effects.issuperset(names):
+        from airtouch.gap.relations.own_effect import completed  # a second of imports, which few need
+
+        relations = completed(relations, study.vehicle, names)
+    return replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond), relations=relations)
 
 
 def _terms_and_priors() -> tuple[list[Term], np.ndarray]:

@@ -42,20 +42,42 @@ def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Lib
     library = replace(library, distance=_nominal_distance(scene, library))
     drawing_of = {(d.name, d.shape): d for d in all_drawings()}
     drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
-    classes, shares = [], []
+    found = []
     for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
         say(f"calibration of {own.name} {own.shape or ''}")
-        shown = _calibration_flights(scene, library, place, drawing)
-        classes.append(replace(own, readout=_readout(drawing, shown)))
-        shares.append((share_of((f.nameless, f.evidence) for f in shown),
-                       share_of((f.second, f.evidence) for f in shown if f.second is not None),
-                       scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
-                               library.nominal_scatter)))
-    nameless, second, distance = np.array(shares).T
-    library = replace(library, nameless_share=nameless, second_share=second, distance_scatter=distance,
-                      model=replace(library.model, classes=tuple(classes)))
+        found.append(calibrate_class(scene, library, place, drawing))
+    library = with_calibrations(library, found)
     say("pairs")
     return replace(library, pair_scatter=_scatter_of_pairs(scene, library, drawings))
+
+
+@dataclass(frozen=True)
+class ClassCalibration:
+    """What is measured of one class; `Library` says what the numbers are."""
+
+    readout: Readout | None
+    nameless_share: float
+    second_share: float
+    distance_scatter: float
+
+
+def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int = CALIBRATION,
+                    ) -> ClassCalibration:
+    """Measure the class at a place of the library by so many flights."""
+    shown = _calibration_flights(scene, library, place, drawing, count)
+    return ClassCalibration(
+        _readout(drawing, shown), share_of((f.nameless, f.evidence) for f in shown),
+        share_of((f.second, f.evidence) for f in shown if f.second is not None),
+        scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]), library.nominal_scatter))
+
+
+def with_calibrations(library: Library, found: Sequence[ClassCalibration]) -> Library:
+    """The library with what was measured of its classes, in their order."""
+    classes = tuple(replace(c, readout=one.readout) for c, one in zip(library.model.classes, found, strict=True))
+    return replace(library, model=replace(library.model, classes=classes),
+                   nameless_share=np.array([one.nameless_share for one in found]),
+                   second_share=np.array([one.second_share for one in found]),
+                   distance_scatter=np.array([one.distance_scatter for one in found]))
 
 
 def _nominal_distance(scene: Scene, library: Library) -> tuple[float, float]:
@@ -98,8 +120,9 @@ class _Fitted:
         return self.hypothesis.evidence > LEAST_EVIDENCE
 
 
-def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Drawing) -> list[CalibrationFlight]:
-    """Flights of a class from the strength that hardly shows to the highest, of them those that show it."""
+def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Drawing, count: int,
+                         ) -> list[CalibrationFlight]:
+    """So many flights of a class from the strength that hardly shows to the highest, of them those that show it."""
     own, high = library.model.classes[place], drawing.kind.highest
     rng = np.random.default_rng([SEED, Stream.CALIBRATION, place])
     first = FIRST_CALIBRATION + OF_CLASS * place
@@ -113,7 +136,7 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
 
     low = min(_weakest_shown(fitted, high), 0.5 * high)
     shown: list[CalibrationFlight] = []
-    for strength in np.exp(rng.uniform(np.log(low), np.log(high), CALIBRATION)):
+    for strength in np.exp(rng.uniform(np.log(low), np.log(high), count)):
         one = fitted(strength)
         if one is not None and one.shows:
             shown.append(_measured(library, drawing, one, with_second=len(shown) < SECONDS))

@@ -57,7 +57,7 @@ class Inference:
     nats that a disturbance without a name gains over none. unexplained: nats that speak against the likeliest effects,
     the gain of a disturbance without a name beside them or the excess of the flight's distance from them, whichever is
     nearer its limit; limit: nats that may speak against effects that are right. readings: parameters of the likeliest
-    effects, of those that the library is calibrated for.
+    effects, of those that the library is calibrated for; without_sign: those of these effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
@@ -66,6 +66,7 @@ class Inference:
     unexplained: float
     limit: float
     readings: Mapping[str, Reading] = field(default_factory=dict)
+    without_sign: tuple[str, ...] = ()
 
     @property
     def likeliest(self) -> str:
@@ -89,7 +90,9 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
                   _distance(flight, best, _by_class(library, library.distance_scatter), library),
                   key=lambda a: a.nats / a.limit)
     return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flight.nameless_evidence(flight.none),
-                     against.nats, against.limit, _readings(best))
+                     against.nats, against.limit, _readings(best),
+                     tuple(f.of.effect for f in best.fits
+                           if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
 
 
 def _by_class(library: Library, numbers: np.ndarray) -> Shares:

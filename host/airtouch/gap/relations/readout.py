@@ -18,6 +18,7 @@ Reading = Mapping[str, tuple[float, float]]
 WIDTH = float(np.log(2.0))  #: standard deviation, in the log strength, of the weights of calibration flights; chosen
 #: flights that say that amount and strength are proportional, for strengths at the ends of the calibration; chosen
 RIDGE = 0.1
+OF_ONE_SIGN = 0.9  #: share of the calibration flights of a strength's sign whose amounts agree in theirs; chosen
 FITTED = 2.0  #: flights that a local regression uses up: intercept and slope
 
 
@@ -33,8 +34,18 @@ class Readout:
     strength: np.ndarray
     amount: np.ndarray
 
+    def shows_sign(self, strength: np.ndarray) -> bool:
+        """Whether a strength (s,) tells the sign of the amount; that of several parameters is not asked."""
+        if self.strength.shape[1] > 1 or self.amount.shape[1] > 1:
+            return True
+        positive = self.amount[self.strength[:, 0] * strength[0] > 0.0, 0] > 0.0
+        return max(positive.mean(), 1.0 - positive.mean()) >= OF_ONE_SIGN
+
     def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,)."""
+        """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,).
+
+        An amount is positive where the strength does not show its sign.
+        """
         if self.strength.shape[1] == 1 and self.amount.shape[1] == 1:
             return self._along(float(strength[0]))
         return self._across(strength)
@@ -48,7 +59,8 @@ class Readout:
         columns = np.column_stack([np.ones_like(distance), distance])
         normal = (columns * weight[:, None]).T @ columns + RIDGE * np.diag([0.0, WIDTH ** 2])
         coefficients = np.linalg.solve(normal, columns.T @ (weight * ratio))
-        amount = float(np.sign(np.median(self.amount[same_sign, 0])) * np.exp(coefficients[0]))
+        sign = np.sign(np.median(self.amount[same_sign, 0])) if self.shows_sign(np.array([strength])) else 1.0
+        amount = float(sign * np.exp(coefficients[0]))
         error = _deviation((ratio - columns @ coefficients)[:, None], weight)
         return np.array([amount]), np.abs(amount) * error
 
