@@ -24,12 +24,13 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD, SHAKES
 from airtouch.gap.unnamed.generic import generic_gain
-from airtouch.simulation.effects import NAMES
+from airtouch.simulation import effects
 
 #: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
 #: that fill a flight have 0.09 to 0.10, four motor noises that the replay took for one 0.01 to 0.02
 #: (host/docs/looks.md, 2026-11-25 11:53)
 WAKE_SHARE = 0.05
+NAMES = frozenset(effects.NAMES)  #: of the package's effects; the others are a user's own
 
 
 def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
@@ -38,17 +39,21 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
 
     The replay names them by forward selection (naming.forward), after an effect that comes and goes where there is one;
     those of `without` are none. Where a library of the signals' relations holds for the flights, its inference names
-    them (`_by_relations`). candidates: the variants of every effect by name; progress: is told every name judged.
+    them (`_by_relations`), but for an effect of a user's own that explains the flights in the replay too: its class was
+    learned from few flights. candidates: the variants of every effect by name; progress: is told every name judged.
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
     least = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     search = Search(on, candidates, alone, least, progress)
     inference = inference_of(data, list(candidates))
-    if inference is not None:
+    if inference is not None and NAMES.issuperset(candidates):
         return _by_relations(search, inference, without)
     passing = passing_effect(on, alone, least, without)
-    return _by_replay(search, forward(search, passing), passing)
+    answer = _by_replay(search, forward(search, passing), passing)
+    if inference is None or answer.explained and answer.named and answer.named[0].name not in NAMES:
+        return answer
+    return _by_relations(search, inference, without)
 
 
 def _by_relations(search: Search, inference: Inference, without: Sequence[str]) -> Selection:
@@ -74,12 +79,9 @@ def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
 
     A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
-    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely. An effect of a user's own that they find
-    likeliest it may name as well: its class was learned from few flights, no stronger than some natural steps.
+    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely.
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
-        return True
-    if inference.likeliest and inference.likeliest not in NAMES:
         return True
     most = inference.evidence.get(inference.likeliest, 0.0)
     return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)

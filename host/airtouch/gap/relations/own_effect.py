@@ -3,7 +3,7 @@
 What an effect does to the signals is so known in closed loop too, where it changes the plant and no force shows it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from airtouch.gap.relations.build import HALVINGS, WEAKEST_SHIFT
 from airtouch.gap.relations.calibration import ClassCalibration, calibrate_class, with_calibrations
 from airtouch.gap.relations.effect_class import learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled
-from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.library import SHARES, Library
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
 from airtouch.simulation.effects import get
@@ -66,7 +66,12 @@ def _with_class(library: Library, scene: Scene, name: str) -> Library:
         replace(library, model=replace(library.model, classes=(*library.model.classes, own))),
         [*known, ClassCalibration(None, 0.0, 0.0, 0.0)])
     found = calibrate_class(scene, uncalibrated, len(known), drawing, CALIBRATION)
-    return with_calibrations(uncalibrated, [*known, found])
+    return with_calibrations(uncalibrated, [*known, _at_least(found, known)])
+
+
+def _at_least(found: ClassCalibration, known: Sequence[ClassCalibration]) -> ClassCalibration:
+    """A calibration with shares no smaller than any known one's: a curve through few flights is less exact."""
+    return ClassCalibration(found.readout, *(max(getattr(one, name) for one in (found, *known)) for name in SHARES))
 
 
 def _weakest(library: Library, scene: Scene, drawing: Drawing) -> float:
