@@ -13,7 +13,7 @@ from airtouch.gap import callable_module
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
-from airtouch.gap.flights.motion import held
+from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.loop.command_spectra import block_spectra, frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.nominal import calibrate
@@ -173,7 +173,7 @@ def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
         return None
     model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(),
                        pwm=flight.pwm)
-    logged = np.array([held(flight.log[c]) for c in RPM]).T[air]
+    logged = np.array([interpolate_missing(flight.log[c]) for c in RPM]).T[air]
     turning = (logged > LEAST_RPM).mean(axis=0) > 0.5  # a counter that is stuck says nothing
     return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
                      np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
