@@ -41,8 +41,8 @@ Where each decision is made; a folder imports only those above it:
   intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
   `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
-- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
-  `on_cluster`.
+- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score` with its `intervals`, `blind_severity`; on a
+  cluster: `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what
   two cores may do at once goes through `second_process`.
 """
