@@ -78,19 +78,8 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     Raises AirTouchError, with the file and the remedy, without motor commands or
     accelerations, when the clock runs backwards, and when there is no flight in it.
     """
-    name, notes = log.source, []
-    if nothing_logged(log):
-        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
-    notes += [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
-    log, unfit = _without_impossible_values(log)
-    if unfit:
-        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
-    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
-        if not log.has(*columns):
-            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
-                                "compares what the motors were told with what the IMU felt")
-    if len(log) < 2:
-        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    name = log.source
+    log, notes = _without_bad_columns(log)
     log, clock, lost = with_lost_rows(at_100_hz(log, name), name)
     if _stamped_at_arrival(log):
         clock = np.zeros_like(clock)
@@ -108,7 +97,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     ground, running = phase == GROUND, pwm.max(axis=1) > 0.0
     usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
-                  touching, tuple(notes), cannot)
+                  touching, notes, cannot)
 
 
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
@@ -118,6 +107,27 @@ def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -
         return flight
     angles = motion.attitude(log, PERIOD_S)
     return replace(flight, log=log, signals=_signals(log, angles, flight.turn, flight.phase, vehicle)[0])
+
+
+def _without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
+    """The log without impossible values and columns that hold few others, and notes on what it lacks.
+
+    Raises AirTouchError where nothing was logged, without motor commands or accelerations, and for a single sample.
+    """
+    name = log.source
+    if nothing_logged(log):
+        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
+    notes = [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
+    log, unfit = _without_impossible_values(log)
+    if unfit:
+        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
+    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
+        if not log.has(*columns):
+            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
+                                "compares what the motors were told with what the IMU felt")
+    if len(log) < 2:
+        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    return log, tuple(notes)
 
 
 def _stamped_at_arrival(log: FlightLog) -> bool:

@@ -68,11 +68,17 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
     table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
              "severities": {k: list(v) for k, v in severities.items()}, "answers": answers}
+    _seal(out, key, table)
+    return key
+
+
+def _seal(out: Path, key: Path, table: Mapping[str, Any]) -> None:
+    """Write the key, and its SHA-256 into the folder of its set."""
     content = (json.dumps(table, indent=1) + "\n").encode()
     write_bytes(content, key, True)
-    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": flights, "calibration_flights": CAL}
+    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": len(table["answers"]),
+              "calibration_flights": CAL}
     write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
-    return key
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
