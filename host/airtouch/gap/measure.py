@@ -63,8 +63,12 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Held:
-    """One flight held against the model: parts of the maps, and what it cannot say."""
+class MeasuredFlight:
+    """One flight held against the model of each study.
+
+    parts: of the map of each study; power (bins, 4): `_command_power`; speeds (2, 4): `rotor_speeds`, 1/min; notes,
+    cannot: of the `Flight`.
+    """
 
     parts: tuple[Part, ...]
     power: np.ndarray
@@ -93,38 +97,48 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
         studies.append(study)
         notes += [n for n in fitted.notes if n not in notes]
-    found: list[Held] = []
-    for one in run(partial(hold, tuple(studies)), flights):
-        if isinstance(one, str):
-            left_out.append(one)
-        else:
-            progress(one.parts[0].name)
-            found.append(one)
-    if not found:
-        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
-                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
-    maps = [assemble(study, [h.parts[i] for h in found], [part_of(study, f) for f in nominal])
+    measured = _measured(studies, flights, run, progress, left_out)
+    maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]
     gap = {"before": overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = overall(maps[1].cells)
-    notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
+    notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap,
         maps[0].flights, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]),
-        speeds_over_flights([h.speeds for h in found]), tuple(notes),
-        cannot_of([h.cannot for h in found]), tuple(left_out))
+        _spectra([m.power for m in measured], [_command_power(f, vehicle) for f in nominal]),
+        speeds_over_flights([m.speeds for m in measured]), tuple(notes),
+        cannot_of([m.cannot for m in measured]), tuple(left_out))
 
 
-def hold(studies: Sequence[Study], log: FlightLog) -> Held | str:
+def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], run: Callable, progress: Callable[[str], None],
+              left_out: list[str]) -> list[MeasuredFlight]:
+    """Each flight that can be used against the model of each study; reasons of the others are added to `left_out`.
+
+    Raises AirTouchError when no flight can be used.
+    """
+    measured: list[MeasuredFlight] = []
+    for one in run(partial(measured_flight, tuple(studies)), flights):
+        if isinstance(one, str):
+            left_out.append(one)
+        else:
+            progress(one.parts[0].name)
+            measured.append(one)
+    if not measured:
+        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
+                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
+    return measured
+
+
+def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight | str:
     """One flight against the model of each study, or the reason why it cannot be used."""
     try:
         flight = ready(log, studies[0].vehicle)
     except AirTouchError as error:
         return str(error)
-    return Held(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
+    return MeasuredFlight(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
                 rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
 
 
