@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.sealed.blind_severity import SEEN
-from airtouch.gap.sealed.intervals import auroc, median, pooled, share
+from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import terms
 
@@ -73,17 +73,15 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
     that is not in the key.
     """
     sheet = sheet_of(key, cases)
-    plain, single, first = sheet.plain, sheet.single, sheet.first
+    plain, single = sheet.plain, sheet.single
     return {
         "flights": len(sheet.truth), "diagnosed": len(plain), "effects": len({e["name"] for e in single.values()}),
-        "top_1": share(first.values()), "top_3": share(sheet.three.values()),
+        "top_1": share(sheet.first.values()), "top_3": share(sheet.three.values()),
         "exact": share(_same(_named(plain.get(n)), [e["name"]]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
-        "unknown": unknown(single, plain, cases),
-        "shrink": shrink(single, plain, first), "parameters": parameters(single, plain, first),
-        "confusion": confusion(sheet.truth, plain), "reliability": reliability(sheet.truth, plain),
-        "misses": misses(sheet),
+        "unknown": unknown(sheet), "shrink": shrink(sheet), "parameters": parameters(sheet),
+        "confusion": confusion(sheet), "reliability": reliability(sheet), "misses": misses(sheet),
     }
 
 
@@ -141,7 +139,7 @@ def misses(sheet: Sheet) -> list[dict[str, Any]]:
             for n, e in sheet.single.items() if not sheet.first[n]]
 
 
-def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> dict[str, float | None]:
+def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> Figure:
     """How many flights a test could tell from nominal ones that is told effect and strength; n: of those known."""
     return share(nats > SEEN for n in flights if (nats := key["answers"][n].get("nats")) is not None)
 
@@ -151,13 +149,14 @@ def top(case: Case | None, name: str, first: int) -> bool:
     return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
 
 
-def unknown(single: Mapping[str, Any], plain: Mapping[str, Case], cases: Sequence[Case]) -> dict[str, Any]:
+def unknown(sheet: Sheet) -> dict[str, Any]:
     """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in.
 
     wrong_name_told_apart, auroc_told_apart: among those flights whose data tell the effect from the names that it was
     given.
     """
-    out = {_name(c): c for c in cases if c.get("without") and _name(c) in single}
+    single, plain = sheet.single, sheet.plain
+    out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n]["level"] == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
@@ -182,20 +181,20 @@ def told_apart(case: Case | None, true: str, named: Iterable[str]) -> bool:
     return not others or true not in gained or gained[true] - sum(others) >= FIRST_GAIN
 
 
-def shrink(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapping[str, bool]) -> dict[str, Any]:
+def shrink(sheet: Sheet) -> dict[str, Any]:
     """Share of the gap over the floor that goes, over all flights rightly named: with the effect, with a wrong one."""
-    named = [plain[n] for n in single if first[n] and plain[n]["verdict"] == "effect"]
+    named = [sheet.plain[n] for n in sheet.single if sheet.first[n] and sheet.plain[n]["verdict"] == "effect"]
     right = [(c["gap"]["before"], c["gap"]["after"]) for c in named if c["gap"]["before"] > LEAST_GAP]
     wrong = [(c["control"]["before"], c["control"]["after"]) for c in named
              if c.get("control") and c["control"]["before"] > LEAST_GAP]
     return {"right": pooled(right), "wrong": pooled(wrong)}
 
 
-def parameters(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapping[str, bool]) -> dict[str, Any]:
+def parameters(sheet: Sheet) -> dict[str, Any]:
     """Parameters of flights rightly named: relative error of each effect's vector, and whether 90 % intervals hold."""
     errors, held = defaultdict(list), defaultdict(list)
-    for n, e in single.items():
-        found = next((f for f in plain[n]["effects"] if f["name"] == e["name"]), None) if first[n] else None
+    for n, e in sheet.single.items():
+        found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e["name"]), None) if sheet.first[n] else None
         if found is None:
             continue
         neutral = terms(e["name"])[0].values
@@ -212,22 +211,21 @@ def parameters(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapp
                           for k, v in sorted(errors.items())}}
 
 
-def confusion(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case]) -> dict[str, dict[str, int]]:
+def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
     """How often a flight of each effect (or `none`) got each answer first; pairs are not in it."""
     out: dict[str, Counter] = defaultdict(Counter)
-    for n, e in truth.items():
-        if len(e) < 2 and n in plain:
-            out[e[0]["name"] if e else "none"][plain[n]["ranking"][0]["name"]] += 1
+    for n, e in sheet.truth.items():
+        if len(e) < 2 and n in sheet.plain:
+            out[e[0]["name"] if e else "none"][sheet.plain[n]["ranking"][0]["name"]] += 1
     return {k: dict(v) for k, v in sorted(out.items())}
 
 
-def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], bins: int = 8,
-                ) -> list[dict[str, float | None]]:
+def reliability(sheet: Sheet, bins: int = 8) -> list[Figure]:
     """For bins of the first answer's probability: its mean, how often the answer was right, and n."""
     rows = []
-    for n, e in truth.items():
-        if n in plain and len(e) < 2:
-            best = plain[n]["ranking"][0]
+    for n, e in sheet.truth.items():
+        if n in sheet.plain and len(e) < 2:
+            best = sheet.plain[n]["ranking"][0]
             rows.append((best["probability"], interchangeable(e[0]["name"] if e else "none", best["name"])))
     place = [min(int(p * bins), bins - 1) for p, _ in rows]
     return [{"probability": float(np.mean([r[0] for r in group])), **share(r[1] for r in group)}
