@@ -15,8 +15,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.sealed.blind import interchangeable
-from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs import read
 
 #: the manifest's name of an effect -> the registry's, where they differ

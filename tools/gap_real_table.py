@@ -10,8 +10,8 @@ import numpy as np
 
 import crazypad_figures as pad
 import gap_lift
-from airtouch.gap.sealed.blind import interchangeable
-from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.signatures.alike import interchangeable
 
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 

@@ -20,7 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
 from airtouch.gap.diagnose import diagnose
 from airtouch.gap.sealed.blind import VEHICLE, stripped
-from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, effects

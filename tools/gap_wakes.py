@@ -35,7 +35,7 @@ from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.naming.passing_effect import news
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.passing import gates, overhead
-from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signals.channels import residual
 from airtouch.logs import read
 

@@ -19,7 +19,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.sealed.intervals import wilson
 
 ROOT = Path(__file__).parents[1]  #: of the checkout
 BUILD = ROOT / "build" / "mutate"  #: where mutated copies lie

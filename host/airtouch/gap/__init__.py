@@ -5,7 +5,8 @@
 
 Where each decision is made; a folder imports only those above it:
 
-- `flights`, a log made ready: `flight`, `motion` with its `filters`; how hard it is flown: `hardness`.
+- `flights`, a log made ready: `flight`, on a regular `clock`, without moments of `contact`; `motion` with its
+  `filters`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
   `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
@@ -30,16 +31,18 @@ Where each decision is made; a folder imports only those above it:
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
   that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the
-  effects: `related`; `selection` holds what was found, with its probabilities; `contradiction` by the flights.
+  effects: `related`; `selection` holds what was found, with its probabilities; `contradiction` by the flights;
+  `recorded`: when recorded flights may name an effect.
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
-- `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
+- `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; `rotor_speeds`; without a diagnosis:
+  `measure`.
 - `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
   intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
   `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
-- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
-  `on_cluster`.
+- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score` with its `intervals`, `blind_severity`; on a
+  cluster: `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what
   two cores may do at once goes through `second_process`.
 """

@@ -1,37 +1,35 @@
 """Where, which, how far: the whole diagnosis of some flights."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.answer import advice as advices
-from airtouch.gap.answer import pictures as picture
+from airtouch.gap.answer.advice import advice as advice_text
+from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.pictures import of as pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranked
 from airtouch.gap.answer.shrink import Cells, cells_of, shrink_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
+from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.related import signs_not_shown
 from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
-from airtouch.gap.naming.thresholds import LOOP_SHARE
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
-from airtouch.gap.passing.gates import TOLD
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
 from airtouch.logs.flight_log import FlightLog
@@ -41,9 +39,22 @@ MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; cho
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
-#: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
-#: seconds; chosen
-STANDS_OUT = 1.1
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is diagnosed: flights made ready, held against the study of a vehicle.
+
+    usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
+    without a baseline.
+    """
+
+    vehicle: Vehicle
+    usable: Sequence[Flight]
+    nominal: Sequence[Flight]
+    judged: Sequence[Flight]
+    study: Study
+    calibration: calibrate.Calibration | None
 
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
@@ -74,32 +85,15 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     held = before.held if before is not None and before.held is not None else _calibrated(vehicle, nominal, without)
     study, calibration = held
     if partner:
-        study = with_overhead(study, usable[0], seconds)
-        notes.append(f"the other vehicle was overhead for {sum(end - begin for begin, end in seconds):.1f} s" if seconds
-                     else "the other vehicle was never overhead")
-    judged = flights_to_judge(usable)
-    data = _data(study, judged)
+        study, note = _with_partner(study, usable[0], seconds)
+        notes.append(note)
+    case = Case(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
+    data = _data(study, case.judged)
     selection, gap_cells = _selected(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap_cells)
-    effects, is_effect = list(result.effects), result.verdict == "effect"
-    terms = [candidates.term_of(e) for e in effects]
-    whole_map = gap_map(study, usable, nominal, terms)
-    headline = summary.headline(whole_map.cells, bool(terms))
-    cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + where(whole_map)))
-    steps = advices.steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
-                          vehicle.name)
-    return replace(
-        result, where=cells, map=whole_map, headline=headline,
-        arms=arms(vehicle, nominal, calibration, judged, selection, result) if is_effect else {},
-        unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
-        next=steps, advice=advices.advice(steps),
-        notes=_notes(study, calibration, usable, nominal, judged, notes),
-        cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
-        vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        calibration=calibration.parameters if calibration else {},
-        pictures=picture.of(study, usable, nominal, terms, headline, cells) if pictures else None, held=held)
+    return replace(_explained(result, case, selection, pictures), notes=_notes(case, notes), held=held)
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -109,6 +103,13 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     """
     data = _data(study, flights) if data is None else data
     return replace(_answer(data, *_selected(data, tuple(without))), flights=tuple(f.name for f in flights))
+
+
+def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
+    """The study told in which seconds another vehicle is overhead, and a note on how many these are."""
+    long = sum(end - begin for begin, end in seconds)
+    note = f"the other vehicle was overhead for {long:.1f} s" if seconds else "the other vehicle was never overhead"
+    return with_overhead(study, flight, seconds), note
 
 
 def _answer(data: Data, selection: Selection, gap_cells: Cells) -> Diagnosis:
@@ -125,6 +126,30 @@ def _answer(data: Data, selection: Selection, gap_cells: Cells) -> Diagnosis:
         advice="")
 
 
+def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
+    """The answer with what it is held against: the map and its largest cells, arms, what stays open, what to fly next.
+
+    pictures: whether to keep the curves that a report shows.
+    """
+    study, usable, nominal = case.study, case.usable, case.nominal
+    effects, is_effect = list(result.effects), result.verdict == "effect"
+    terms = [candidates.term_of(e) for e in effects]
+    whole_map = gap_map(study, usable, nominal, terms)
+    headline = summary.headline(whole_map.cells, bool(terms))
+    cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + where(whole_map)))
+    steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
+                       case.vehicle.name)
+    return replace(
+        result, where=cells, map=whole_map, headline=headline,
+        arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
+        unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
+        next=steps, advice=advice_text(steps),
+        cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
+        calibration=case.calibration.parameters if case.calibration else {},
+        pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
+
+
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],
                 ) -> tuple[Study, calibrate.Calibration | None]:
     """The study of the vehicle, calibrated on nominal flights if there are any; and the calibration."""
@@ -133,15 +158,14 @@ def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[s
     return calibrate.calibrated(vehicle, nominal, without=without)
 
 
-def _notes(study: Study, calibration: calibrate.Calibration | None, usable: Sequence[Flight],
-           nominal: Sequence[Flight], judged: Sequence[Flight], of_logs: Sequence[str]) -> tuple[str, ...]:
+def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
     """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
-    notes = [note for f in usable for note in f.notes] + [*of_logs]
-    notes += list(calibration.notes) if calibration else [NO_BASELINE]
-    notes += differences(study, nominal)
-    notes += measure.flown_unlike(study, usable)
-    if len(judged) < len(usable):
-        notes.append(f"candidates were judged on {len(judged)} of {len(usable)} flights, evenly chosen")
+    notes = [note for f in case.usable for note in f.notes] + [*of_logs]
+    notes += list(case.calibration.notes) if case.calibration else [NO_BASELINE]
+    notes += differences(case.study, case.nominal)
+    notes += measure.flown_unlike(case.study, case.usable)
+    if len(case.judged) < len(case.usable):
+        notes.append(f"candidates were judged on {len(case.judged)} of {len(case.usable)} flights, evenly chosen")
     return tuple(dict.fromkeys(notes))
 
 
@@ -165,35 +189,16 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
               ) -> tuple[Selection, Cells]:
     """What is chosen among the candidates, and the cells in which the gap is measured.
 
-    In recorded flights an effect of the loop must take away as much of the gap as the loop model may be wrong by: the
-    gains of two days differ a little, and that is not what a gap comes from. So must one that comes and goes, where a
-    gap stands out that it could take away: nominal flights meet gusts, which is not what their gap comes from either.
+    In recorded flights some effects must close a part of the gap to be named: see `naming.recorded`.
     """
     selection = select(data, candidates.all_candidates(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
-    of_loop = _of_the_loop(data, selection)
-    passing = _comes_and_goes(selection) and selection.named[0].key != TOLD  # seconds that are known are no gust's
-    if data.study.recorded and (of_loop or passing):
+    if recorded.must_close_the_gap(data, selection):
         gap = shrink_of(data, selection.parts, selection.chosen, cells)
-        if gap.share.value < LOOP_SHARE and (of_loop or gap.before > STANDS_OUT):
-            selection = replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+        if recorded.closes_too_little(data, selection, gap.before, gap.share.value):
+            selection = recorded.without_names(selection)
             cells = cells_of(data, selection.parts, None)
     return selection, cells
-
-
-def _comes_and_goes(selection: Selection) -> bool:
-    """Whether one effect is named, and it comes and goes."""
-    chosen = selection.chosen
-    return chosen is not None and len(selection.named) == 1 and all(t.gate for t in chosen.terms)
-
-
-def _of_the_loop(data: Data, selection: Selection) -> bool:
-    """Whether one effect is named, and it is one of the control loop."""
-    law, chosen = data.study.controller, selection.chosen
-    if law is None or chosen is None or len(selection.named) != 1:
-        return False
-    terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
-    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
 
 
 callable_module(__name__)

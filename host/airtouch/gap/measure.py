@@ -11,9 +11,8 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
 from airtouch.gap.evidence.data import Study
-from airtouch.gap.flights.flight import GROUND, Flight, ready
+from airtouch.gap.flights.flight import Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
-from airtouch.gap.flights.motion import held
 from airtouch.gap.loop.command_spectra import block_spectra, frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.nominal import calibrate
@@ -23,11 +22,9 @@ from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, in_words, overall, part_of, where
-from airtouch.logs.flight_log import RPM, FlightLog
-from airtouch.simulation import replay
+from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
+from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
-
-LEAST_RPM = 500.0  #: of a rotor in flight; chosen, far below any hover
 
 
 @dataclass(frozen=True)
@@ -66,8 +63,12 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Held:
-    """One flight held against the model: parts of the maps, and what it cannot say."""
+class MeasuredFlight:
+    """One flight held against the model of each study.
+
+    parts: of the map of each study; power (bins, 4): `_command_power`; speeds (2, 4): `rotor_speeds`, 1/min; notes,
+    cannot: of the `Flight`.
+    """
 
     parts: tuple[Part, ...]
     power: np.ndarray
@@ -96,39 +97,49 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
         studies.append(study)
         notes += [n for n in fitted.notes if n not in notes]
-    found: list[Held] = []
-    for one in run(partial(hold, tuple(studies)), flights):
-        if isinstance(one, str):
-            left_out.append(one)
-        else:
-            progress(one.parts[0].name)
-            found.append(one)
-    if not found:
-        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
-                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
-    maps = [assemble(study, [h.parts[i] for h in found], [part_of(study, f) for f in nominal])
+    measured = _measured(studies, flights, run, progress, left_out)
+    maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]
     gap = {"before": overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = overall(maps[1].cells)
-    notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
+    notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap,
         maps[0].flights, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]),
-        _rotors([h.speeds for h in found]), tuple(notes),
-        cannot_of([h.cannot for h in found]), tuple(left_out))
+        _spectra([m.power for m in measured], [_command_power(f, vehicle) for f in nominal]),
+        speeds_over_flights([m.speeds for m in measured]), tuple(notes),
+        cannot_of([m.cannot for m in measured]), tuple(left_out))
 
 
-def hold(studies: Sequence[Study], log: FlightLog) -> Held | str:
+def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], run: Callable, progress: Callable[[str], None],
+              left_out: list[str]) -> list[MeasuredFlight]:
+    """Each flight that can be used against the model of each study; reasons of the others are added to `left_out`.
+
+    Raises AirTouchError when no flight can be used.
+    """
+    measured: list[MeasuredFlight] = []
+    for one in run(partial(measured_flight, tuple(studies)), flights):
+        if isinstance(one, str):
+            left_out.append(one)
+        else:
+            progress(one.parts[0].name)
+            measured.append(one)
+    if not measured:
+        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
+                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
+    return measured
+
+
+def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight | str:
     """One flight against the model of each study, or the reason why it cannot be used."""
     try:
         flight = ready(log, studies[0].vehicle)
     except AirTouchError as error:
         return str(error)
-    return Held(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
-                _rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
+    return MeasuredFlight(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
+                rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
 
 
 def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> Iterator[Flight]:
@@ -164,36 +175,6 @@ def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
-
-
-def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
-    """Median speed of each rotor in the air as logged and as modelled, (2, 4) 1/min; None without rpm."""
-    air = (flight.phase != GROUND) & flight.usable
-    if not flight.log.has(*RPM) or not air.any():
-        return None
-    model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(),
-                       pwm=flight.pwm)
-    logged = np.array([held(flight.log[c]) for c in RPM]).T[air]
-    turning = (logged > LEAST_RPM).mean(axis=0) > 0.5  # a counter that is stuck says nothing
-    return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
-                     np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
-
-
-def _rotors(speeds: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
-    """Mean logged and modelled speed of each rotor, 1/min, and their ratio with its range over the flights.
-
-    speeds: (2, 4) of each flight, see `_rotor_speeds`. A rotor that no flight logs is left out.
-    """
-    out = []
-    for rotor in range(4):
-        pairs = np.array([s[:, rotor] for s in speeds if s is not None and np.isfinite(s[0, rotor])])
-        if len(pairs):
-            ratio = pairs[:, 0] / np.maximum(pairs[:, 1], 1.0)
-            logged, modelled = pairs.mean(axis=0)
-            out.append({"rotor": rotor + 1, "logged": float(logged), "modelled": float(modelled),
-                        "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
-                        "flights": len(pairs)})
-    return tuple(out)
 
 
 def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from airtouch.gap.answer.named_effects import converged, with_reading
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.flights.flight import less
+from airtouch.gap.flights.flight import without_columns
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import VEHICLE, fly
 
@@ -52,7 +52,7 @@ def test_a_parameter_without_a_reading_stays():
 def test_a_fit_goes_on_until_it_stands_still(study):
     """A battery's strength, charge and capacity lie along a bent valley; from its bottom nothing more is gained."""
     true = {"strength": 1.3, "charge": 0.7, "capacity": 1.0}
-    data = Data(study, [less(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
+    data = Data(study, [without_columns(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
     blocks, term = whole_of(data), terms("battery_sag")[0].refined()
     start = fit(data, blocks, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
     result = converged(data, blocks, start)

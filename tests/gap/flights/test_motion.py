@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.flights.motion import GRAVITY, MARKER_M, attitude, held, rotor_heights, standing_z
+from airtouch.gap.flights.motion import GRAVITY, MARKER_M, attitude, interpolate_missing, rotor_heights, standing_z
 from airtouch.logs.flight_log import FlightLog
 
 PERIOD_S = 0.01
@@ -16,11 +16,11 @@ def log_of(**columns):
 
 def test_holes_are_filled_by_straight_lines():
     table = np.array([[np.nan, 1.0], [1.0, np.nan], [np.nan, 3.0], [3.0, np.inf]])
-    np.testing.assert_allclose(held(table), [[1.0, 1.0], [1.0, 2.0], [2.0, 3.0], [3.0, 3.0]])
-    np.testing.assert_allclose(held(np.array([np.nan, 2.0, np.nan, 4.0])), [2.0, 2.0, 3.0, 4.0])
-    assert (held(np.full((3, 2), np.nan)) == 0.0).all()
+    np.testing.assert_allclose(interpolate_missing(table), [[1.0, 1.0], [1.0, 2.0], [2.0, 3.0], [3.0, 3.0]])
+    np.testing.assert_allclose(interpolate_missing(np.array([np.nan, 2.0, np.nan, 4.0])), [2.0, 2.0, 3.0, 4.0])
+    assert (interpolate_missing(np.full((3, 2), np.nan)) == 0.0).all()
     original = np.array([1.0, np.nan])
-    held(original)
+    interpolate_missing(original)
     assert np.isnan(original[1]), "the log itself stays as it is"
 
 

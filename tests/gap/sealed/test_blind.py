@@ -18,8 +18,8 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
-from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity
-from airtouch.gap.sealed.blind_severity import severities
+from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity, intervals
+from airtouch.gap.sealed.blind_severity import three_severities
 from airtouch.gap.signatures.random_draws import KINDS
 
 ROOT = Path(__file__).parents[3]
@@ -32,7 +32,7 @@ def blind_check(tmp_path_factory):
     """A set of 10 flights, diagnosed and scored."""
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
-    patch.setattr(blind, "strengths", lambda *_: CLEAR)
+    patch.setattr(blind, "severities_of", lambda *_: CLEAR)
     calibrated, study_in = [], blind_run.study_in
     patch.setattr(blind_run, "study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
     figures = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
@@ -119,7 +119,7 @@ def test_the_search_for_strengths_says_where_it_is(monkeypatch):
     monkeypatch.setattr(blind, "nominal", lambda *_: [])
     monkeypatch.setattr(blind, "weakest", lambda *_: None)
     steps = []
-    assert blind.strengths(SimpleNamespace(vehicle=None), 0, ["wind", "mass"], steps.append) == {}
+    assert blind.severities_of(SimpleNamespace(vehicle=None), 0, ["wind", "mass"], steps.append) == {}
     assert [s.partition(",")[2] for s in steps] == [" effect 1 of 2", " effect 2 of 2"]
     assert {s.partition(",")[0] for s in steps} == {"severities of wind", "severities of mass"}
 
@@ -181,14 +181,14 @@ def test_command_writes_figures(blind_check, tmp_path):
 
 
 def test_wilson_and_auroc_in_closed_form():
-    half = blind_score.wilson(5, 10)
+    half = intervals.wilson(5, 10)
     z2 = 1.959964 ** 2
     assert half["low"] == pytest.approx(0.5 - np.sqrt(z2 * (z2 + 10)) / (2 * (10 + z2)))
     assert half["high"] == pytest.approx(1.0 - half["low"])
-    assert blind_score.wilson(0, 10)["low"] == pytest.approx(0.0, abs=1e-12)
-    assert blind_score.wilson(0, 10)["high"] == pytest.approx(z2 / (10 + z2))
-    assert blind_score.auroc([2, 3], [1, 1]) == 1.0 and blind_score.auroc([1], [1]) == 0.5
-    assert blind_score.auroc([0.0, 2.0], [1.0]) == 0.5
+    assert intervals.wilson(0, 10)["low"] == pytest.approx(0.0, abs=1e-12)
+    assert intervals.wilson(0, 10)["high"] == pytest.approx(z2 / (10 + z2))
+    assert intervals.auroc([2, 3], [1, 1]) == 1.0 and intervals.auroc([1], [1]) == 0.5
+    assert intervals.auroc([0.0, 2.0], [1.0]) == 0.5
 
 
 def answer(name, verdict, ranking, effects=(), withheld=(), before=2.0, after=1.1):
@@ -260,8 +260,8 @@ def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
 
 
 def test_severities_are_in_equal_ratios_and_strengths_within_bounds():
-    assert severities(0.1, 1.0) == pytest.approx((0.1, 0.2, 0.4))
-    assert severities(0.1, 0.2) == pytest.approx((0.1, np.sqrt(0.02), 0.2))
+    assert three_severities(0.1, 1.0) == pytest.approx((0.1, 0.2, 0.4))
+    assert three_severities(0.1, 0.2) == pytest.approx((0.1, np.sqrt(0.02), 0.2))
     for kind in KINDS.values():
         rng = np.random.default_rng(0)
         active = kind.active(kind.highest, rng)

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import held
+from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import COLUMN, residual
@@ -54,7 +54,8 @@ def over_floor(study: Study, flight: Flight, active: Sequence[Active], cell: Cel
     begin, c = starts(flight, AIR), COLUMN[cell.channel]
     if not len(begin):
         return np.zeros(0)
-    gap = held(residual(flight, study.vehicle, (*study.calibration, *active), study.controller)[:, c:c + 1])
+    left = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
+    gap = interpolate_missing(left[:, c:c + 1])
     f = frequencies(AIR)
     band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
     power = (np.abs(blocks(gap, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
@@ -116,5 +117,5 @@ def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
     if log.has("vx_mps", "vy_mps"):
         out["speed"] = np.hypot(s[:, at.VELOCITY], s[:, at.VELOCITY + 1])
     if log.has("vbat_V"):
-        out["battery voltage"] = held(log["vbat_V"])
+        out["battery voltage"] = interpolate_missing(log["vbat_V"])
     return out

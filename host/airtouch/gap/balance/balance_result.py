@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 import airtouch.gap.measure as measure
-from airtouch.gap.answer import advice as advices
-from airtouch.gap.answer import pictures as picture
+from airtouch.gap.answer.advice import advice as advice_text
+from airtouch.gap.answer.advice import steps as next_steps
+from airtouch.gap.answer.pictures import of as pictures_of
 from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, hypotheses, pattern, reference
 from airtouch.gap.flights.flight import Flight
@@ -55,7 +56,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     cells = _cells(seen, base, vehicle, hypothesis, weight, len(flights))
     alike = _alike(effects, total, first, probability)
     headline = summary.headline(cells, bool(effects))
-    steps = advices.steps(verdict, effects, alike, headline, flights, True, vehicle.name)
+    steps = next_steps(verdict, effects, alike, headline, flights, True, vehicle.name)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
         indistinguishable=alike, where=cells,
@@ -63,11 +64,11 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
              "after": shrink[first].after if verdict == "effect" else shrink[first].before},
         shrink=shrink[first].share if verdict == "effect" else None,
         control=_control(total, first, shrink) if verdict == "effect" else {},
-        advice=advices.advice(steps), notes=_notes(voltage, notes),
+        advice=advice_text(steps), notes=_notes(voltage, notes),
         cannot=measure.cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        pictures=picture.of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)
+        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)
 
 
 def probabilities(logs: np.ndarray, candidates: Sequence[Hypothesis]) -> dict[str, float]:

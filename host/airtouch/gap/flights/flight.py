@@ -8,31 +8,27 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights import motion
+from airtouch.gap.flights.clock import PERIOD_S, at_100_hz, with_lost_rows
+from airtouch.gap.flights.contact import jolts, knocks, near_ground, within
 from airtouch.gap.workspace import Workspace
-from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
-from airtouch.logs.resample import resample
 from airtouch.logs.segments import KINDS, PLATFORM_STEP_M, segments
-from airtouch.robust import deviation
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.body.rotation import as_matrix
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-PERIOD_S = 0.01
 GROUND = KINDS.index("ground")
-LEAST_AIR_S = 3.0  #: less time in the air than this is not diagnosed
-LARGEST = 1e5  #: no column holds more
-LEAST_GOOD = 0.5  #: part of a column's values that must be there
-SETTLED_S = 1.0  #: s after the motors have stopped in which the vehicle may still bounce
-KNOCK = 7.0  #: standard deviations (of the median kind) on the ground from which a sample is a knock
-CONTACT_S = 0.3  #: s, excluded around the moments at which the vehicle touches the ground
-JOLT = 40.0  #: standard deviations in flight above which it hit something (steps of a set-point reach 35)
-MOST_JOLTED = 0.1  #: share of a flight; more is no accident
-TOUCH_M, TOUCH_S = 0.006, 0.05  #: height above standing below which legs may touch in flight; how long that rings
+LEAST_AIR_S = 3.0  #: seconds in the air that a flight needs to be diagnosed; chosen
+LARGEST = 1e5  #: magnitude above which a value is none, in any column's unit; chosen, beyond what any sensor says
+PWM_RANGE = (-1.0, 66000.0)  #: of a motor command, which has 16 bits: 0 to 65535; its margins are chosen
+LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the column is left out; chosen
+#: height above standing, m, below which legs may touch in flight, and seconds before and after it; chosen
+TOUCH_M, TOUCH_S = 0.006, 0.05
+WITHOUT_GRAVITY = 0.5  #: share of gravity below which the median vertical force has gravity subtracted: between 0 and 1
 
 
 @dataclass(frozen=True)
@@ -82,19 +78,9 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     Raises AirTouchError, with the file and the remedy, without motor commands or
     accelerations, when the clock runs backwards, and when there is no flight in it.
     """
-    name, notes = log.source, []
-    if nothing_logged(log):
-        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
-    notes += [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
-    log, unfit = _sane(log)
-    if unfit:
-        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
-    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
-        if not log.has(*columns):
-            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
-                                "compares what the motors were told with what the IMU felt")
-    log = _at_100_hz(log, name)
-    log, clock, lost = _regular(log, name)
+    name = log.source
+    log, notes = _without_bad_columns(log)
+    log, clock, lost = with_lost_rows(at_100_hz(log, name), name)
     if _stamped_at_arrival(log):
         clock = np.zeros_like(clock)
     cannot = _cannot(log)
@@ -102,25 +88,46 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     turn = as_matrix(*angles.T)
     force = _body_force(log, turn, vehicle.gravity_mps2)
     phase = _phases(log)
-    pwm = motion.held(log.stack(PWM))
+    pwm = motion.interpolate_missing(log.stack(PWM))
     if (phase != GROUND).sum() * PERIOD_S < LEAST_AIR_S:
         raise AirTouchError(f"{name}: no flight in it ({(phase != GROUND).sum() * PERIOD_S:.1f} s in the air); "
                             f"at least {LEAST_AIR_S:g} s are needed")
     signals, touching = _signals(log, angles, turn, phase, vehicle)
-    rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
-    usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
-    usable &= ~_jolts(force, rates, phase != GROUND)
+    rates = motion.interpolate_missing(log.stack(GYRO)) if log.has(*GYRO) else None
+    ground, running = phase == GROUND, pwm.max(axis=1) > 0.0
+    usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
-                  touching, tuple(notes), cannot)
+                  touching, notes, cannot)
 
 
-def less(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
+def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
     """The flight as it would be made ready from a log without some columns, which are neither commands nor motion."""
     log = FlightLog({k: v for k, v in flight.log.columns.items() if k not in columns}, flight.log.meta)
     if len(log.columns) == len(flight.log.columns):
         return flight
     angles = motion.attitude(log, PERIOD_S)
     return replace(flight, log=log, signals=_signals(log, angles, flight.turn, flight.phase, vehicle)[0])
+
+
+def _without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
+    """The log without impossible values and columns that hold few others, and notes on what it lacks.
+
+    Raises AirTouchError where nothing was logged, without motor commands or accelerations, and for a single sample.
+    """
+    name = log.source
+    if nothing_logged(log):
+        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
+    notes = [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
+    log, unfit = _without_impossible_values(log)
+    if unfit:
+        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
+    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
+        if not log.has(*columns):
+            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
+                                "compares what the motors were told with what the IMU felt")
+    if len(log) < 2:
+        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    return log, tuple(notes)
 
 
 def _stamped_at_arrival(log: FlightLog) -> bool:
@@ -152,10 +159,10 @@ def _body_force(log: FlightLog, turn: np.ndarray, gravity: float) -> np.ndarray:
 
     Of logs in world axes, some have gravity already subtracted: it is added again.
     """
-    force = motion.held(log.stack(ACC))
+    force = motion.interpolate_missing(log.stack(ACC))
     if log.meta.get("acc_frame") == "world":
         force = np.einsum("nji,nj->ni", turn, force)
-        if np.median(force[:, 2]) < 0.5 * gravity:
+        if np.median(force[:, 2]) < WITHOUT_GRAVITY * gravity:
             force += np.einsum("nji,j->ni", turn, [0.0, 0.0, gravity])
     return force
 
@@ -172,8 +179,8 @@ def _signals(log: FlightLog, angles: np.ndarray, turn: np.ndarray, phase: np.nda
              ) -> tuple[np.ndarray, np.ndarray]:
     """Signals (n, COUNT) for effects, and `Flight.touching`. angles: (n, 3) rad, as the columns of ATTITUDE."""
     known = log.with_columns(dict(zip(ATTITUDE, angles.T, strict=True)))
-    signals = replay.signals_of(FlightLog({k: motion.held(v) for k, v in known.columns.items()}, known.meta),
-                                vehicle, (), PERIOD_S)
+    whole = {name: motion.interpolate_missing(values) for name, values in known.columns.items()}
+    signals = replay.signals_of(FlightLog(whole, known.meta), vehicle, (), PERIOD_S)
     row = prepare(vehicle, ())[0][0]
     standing = row["range_below_rotors"] + row["leg_below_range"]  # height of the rotors
     heights = motion.rotor_heights(log, turn, row["rotor_x"], row["rotor_y"], row["range_below_rotors"],
@@ -185,15 +192,15 @@ def _signals(log: FlightLog, angles: np.ndarray, turn: np.ndarray, phase: np.nda
     signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
     if not log.has("zrange_m"):
         low = (phase != GROUND) & (heights.mean(axis=1) < standing + TOUCH_M)
-        touching = np.convolve(low, np.ones(2 * int(TOUCH_S / PERIOD_S) + 1), "same") > 0.5
+        touching = within(low, TOUCH_S)
     return signals, touching
 
 
-def _sane(log: FlightLog) -> tuple[FlightLog, list[str]]:
+def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
     """The log without values that cannot be and without columns that have few others; their names."""
     columns, unfit = {}, []
     for key, values in log.columns.items():
-        low, high = (-1.0, 66000.0) if key in PWM else (-LARGEST, LARGEST)
+        low, high = PWM_RANGE if key in PWM else (-LARGEST, LARGEST)
         good = (values >= low) & (values <= high)
         if len(good) and good.mean() < LEAST_GOOD:
             unfit += [key] if key not in RANGES else []
@@ -202,92 +209,4 @@ def _sane(log: FlightLog) -> tuple[FlightLog, list[str]]:
     return FlightLog(columns, log.meta), unfit
 
 
-def _at_100_hz(log: FlightLog, name: str) -> FlightLog:
-    if len(log) < 2:
-        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
-    if log.has("t_s"):
-        backwards = np.flatnonzero(np.diff(log["t_s"]) < -0.05)
-        if len(backwards):
-            raise AirTouchError(f"{name}, sample {backwards[0] + 1}: the clock runs backwards by "
-                                f"{-np.diff(log['t_s'])[backwards[0]]:.3f} s; cut the log there")
-        period = true_period(log["t_s"])
-        if period is not None and period < 0.006:
-            return resample(log, 100.0)
-    return log
-
-
-def _regular(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarray]:
-    """The log with lost rows put back as NaN, the clock's wandering and which rows were lost."""
-    n = len(log)
-    if not log.has("t_s"):
-        return log, np.zeros(n), np.zeros(n, bool)
-    time = motion.held(log["t_s"])
-    period = _period(time)
-    place = np.arange(n)
-    for gap in lost_samples(time, period):
-        place[gap.sample:] += gap.lost
-    if place[-1] > 3 * n + 1000:
-        raise AirTouchError(f"{name}: {place[-1] - n} of {place[-1]} samples are missing; check the clock column")
-    known = n - _unsure(time, period)
-    clock = (time - np.polyval(np.polyfit(place[:known], time[:known], 1), place))[:known] if known > 2 else np.zeros(n)
-    lost = np.ones(place[-1] + 1, bool)
-    lost[place] = False
-    columns = {}
-    for key, values in log.columns.items():
-        columns[key] = np.full(len(lost), np.nan)
-        columns[key][place] = values
-    columns["t_s"] = np.arange(len(lost)) * PERIOD_S
-    meta = {**log.meta, "sample_period_s": PERIOD_S}
-    return FlightLog(columns, meta), clock, lost
-
-
-def _unsure(time: np.ndarray, period: float) -> int:
-    """Rows at the end after which too few follow to say whether rows before them were lost or these came late."""
-    steps = np.flatnonzero(np.diff(time[-LEAST_AFTER - 1:]) > 1.5 * period)
-    return min(len(time), LEAST_AFTER) - int(steps[0]) if len(steps) else 0
-
-
-def _knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Samples on the ground at which somebody or something pushed: far off all the others there."""
-    out = np.zeros(len(rest), bool)
-    if rest.any():
-        away = np.abs(force[rest] - np.median(force[rest], axis=0))
-        out[rest] = (away > KNOCK * np.maximum(deviation(force[rest]), 1e-3)).any(axis=1)
-    return out
-
-
-def _jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.ndarray:
-    """Samples (n,) around those at which the vehicle hit something in flight."""
-    out = np.zeros(len(air), bool)
-    turning = np.zeros((len(air), 0)) if rates is None else np.diff(rates, axis=0, prepend=rates[:1])
-    for values in (*force.T, *turning.T):
-        away = np.abs(values - np.median(values[air]))
-        out |= air & (away > JOLT * max(float(deviation(values[air])), 1e-6))
-    wide = int(CONTACT_S / PERIOD_S)
-    out = np.convolve(out, np.ones(2 * wide + 1), "same") > 0.5
-    return out if out[air].mean() < MOST_JOLTED else np.zeros_like(out)
-
-
-def _period(time: np.ndarray) -> float:
-    """The clock's period: the commonest step where most are alike, however many samples were lost."""
-    steps = np.diff(time)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    if usual > 0.0 and np.mean(np.abs(steps - usual) < 0.02 * usual) > 0.7:
-        return float(steps[np.abs(steps - usual) < 0.02 * usual].mean())
-    return true_period(time) or PERIOD_S
-
-
-def _near_contact(phase: np.ndarray, pwm: np.ndarray) -> np.ndarray:
-    """Samples at which legs may touch: motors run on the ground, and around take-off and touch-down."""
-    moving = pwm.max(axis=1) > 0.0
-    rest = (phase == GROUND) & ~moving
-    touching = (phase == GROUND) & moving
-    change = np.diff(((phase == GROUND) | ~moving).astype(np.int8))
-    wide = int(CONTACT_S / PERIOD_S)
-    for k in np.flatnonzero(change):
-        touching[max(k - wide, 0):k + wide] = True
-    since = np.arange(len(moving)) - np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -10 ** 6))
-    touching |= rest & (since < SETTLED_S / PERIOD_S)
-    before = rest & (np.cumsum(moving) == 0)
-    before[np.argmax(moving) - 1 if moving.any() else 0:] = False
-    return touching & ~before
+less = without_columns  # the name by which `gap.relations` imports it

@@ -13,13 +13,18 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 
-STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: one slope each
-PRIOR = (1.0, 1.0)  #: mean and standard deviation of slopes before any flight: errors are a share of what is flown
-STEEPEST = 3.0  #: largest slope
-#: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted
+STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer; chosen
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of bands, each with one slope; chosen
+#: mean and standard deviation of slopes before any flight; the mean is that of errors that are a share of what is
+#: flown, the deviation is chosen
+PRIOR = (1.0, 1.0)
+STEEPEST = 3.0  #: largest slope; chosen
+#: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted; chosen
 CALMER, HARDER = 0.5, 1.5
-ROUNDS = 8  #: Newton steps of the gamma regression
+LEAST_BLOCKS = 4  #: blocks of nominal flights from which a slope is fitted; chosen
+LEAST_DISPERSION = 1e-3  #: variance over the squared mean that powers have at least; chosen
+ROUNDS = 8  #: Newton steps of the gamma regression; chosen
+LARGEST_STEP = 1.0  #: of the regression, in log power and in slope; chosen
 
 
 @dataclass(frozen=True)
@@ -60,14 +65,14 @@ def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
     flat (bins, COUNT): where power does not go with hardness, whatever these flights say.
     """
     slope = np.zeros(power.shape[1:])
-    if len(power) < 4:
+    if len(power) < LEAST_BLOCKS:
         return Slopes(slope, 0.0, 0.0, 0.0)
     band = np.digitize(frequency, BANDS_HZ) - 1
     for c in range(power.shape[2]):
         for b in np.unique(band):
             here = power[:, band == b, c]
             known = np.isfinite(here).any(axis=1) & (np.nan_to_num(here).sum(axis=1) > 0.0)
-            if known.sum() >= 4:
+            if known.sum() >= LEAST_BLOCKS:
                 slope[band == b, c] = _slope(np.nanmean(here[known], axis=1), hardness[known])
     return Slopes(np.where(flat, 0.0, slope), float(hardness.min()), float(hardness.mean()), float(hardness.max()))
 
@@ -80,9 +85,9 @@ def _slope(y: np.ndarray, x: np.ndarray) -> float:
     at = start.copy()
     for _ in range(ROUNDS):
         ratio = y / np.exp(table @ at)
-        dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), 1e-3)
+        dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), LEAST_DISPERSION)
         information = table.T @ table / dispersion + np.diag([0.0, 1.0 / spread ** 2])
         push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (at[1] - middle) / spread ** 2])
         step = np.linalg.solve(information, push)
-        at = at + np.clip(step, -1.0, 1.0)
+        at = at + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
     return float(np.clip(at[1], 0.0, STEEPEST))

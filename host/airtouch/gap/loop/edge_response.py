@@ -76,17 +76,17 @@ def edges_of(flight: Flight) -> list[Edge]:
 def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int) -> np.ndarray:
     """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
     window = slice(at - BEFORE, at + AFTER)
-    thrust = vehicle.thrust(motion.held(log.stack(PWM)[window])).mean(axis=1)
+    thrust = vehicle.thrust(motion.interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
     if log.has(*VELOCITY[:2]):
-        speed = motion.held(log.stack(VELOCITY[:2])[window])
+        speed = motion.interpolate_missing(log.stack(VELOCITY[:2])[window])
         heading = speed[:BEFORE].mean(axis=0)
         speed = speed @ (heading / max(float(np.hypot(*heading)), 1e-6))
     else:
         speed = np.zeros(BEFORE + AFTER)
     if log.has(POSITION[2]):
-        height = motion.held(log[POSITION[2]][window])
+        height = motion.interpolate_missing(log[POSITION[2]][window])
     elif log.has("zrange_m"):
-        height = motion.held(log["zrange_m"][window])
+        height = motion.interpolate_missing(log["zrange_m"][window])
         step = np.diff(height, prepend=height[0])
         step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
         height = np.cumsum(step)
@@ -186,7 +186,7 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
     high, low = max(edge.height_before_m, edge.height_after_m), min(edge.height_before_m, edge.height_after_m)
     speed = USUAL_MPS
     if flight.log.has(*VELOCITY[:2]):
-        v = motion.held(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
+        v = motion.interpolate_missing(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else USUAL_S
     speed = float(np.clip(speed, 0.1, 0.9))

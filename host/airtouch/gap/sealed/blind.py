@@ -20,9 +20,9 @@ import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
+from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
 from airtouch.gap.signatures.alike import interchangeable
-from airtouch.gap.signatures.random_draws import KINDS, Kind
+from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
@@ -32,18 +32,19 @@ from airtouch.vehicle import Vehicle, load
 SCENARIO, VEHICLE = "diagnosis", "crazyflie-2.1-flow"
 CAL = 6  #: flights free of effects; chosen
 SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects; chosen
-PAIR_LEVELS = (1, 2)  #: severities of the effects of a pair: not the weakest; chosen
+PAIR_SEVERITIES = (1, 2)  #: places among the severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
 Say = Callable[[str], None]
+Severities = Mapping[str, Sequence[float]]  #: of each kind of effect, its three strengths in rising order
 
 
 def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, force: bool = False,
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
 
-    kinds: of `drawn.KINDS` to draw from, all of them by default. Raises AirTouchError when
+    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError when
     there is a set or a key already and `force` is not given.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
@@ -56,22 +57,28 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         write(log, out / f"cal_{i}.csv.gz", force=True)
     progress("calibration")
     study = study_of(vehicle, cal)
-    levels = strengths(study, seed, kinds, progress)
+    severities = severities_of(study, seed, kinds, progress)
     rng = np.random.default_rng([seed, 1])
     answers: dict[str, Any] = {}
-    for number, drawn in enumerate(draw(flights, levels, rng)):
+    for number, drawn in enumerate(draw(flights, severities, rng)):
         name = f"flight_{number:04d}"
         progress(f"{name}, of {flights}")
-        log, effects = _flight(vehicle, drawn, levels, seed, number, rng)
+        log, effects = _flight(vehicle, drawn, severities, seed, number, rng)
         write(log, out / f"{name}.csv.gz", force=True)
         answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
     table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
-             "severities": {k: list(v) for k, v in levels.items()}, "answers": answers}
+             "severities": {k: list(v) for k, v in severities.items()}, "answers": answers}
+    _seal(out, key, table)
+    return key
+
+
+def _seal(out: Path, key: Path, table: Mapping[str, Any]) -> None:
+    """Write the key, and its SHA-256 into the folder of its set."""
     content = (json.dumps(table, indent=1) + "\n").encode()
     write_bytes(content, key, True)
-    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": flights, "calibration_flights": CAL}
+    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": len(table["answers"]),
+              "calibration_flights": CAL}
     write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
-    return key
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
@@ -146,9 +153,9 @@ def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightL
     return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
 
 
-def strengths(study: Study, seed: int, kinds: Sequence[str] | None = None, progress: Say = lambda _: None,
-              ) -> dict[str, tuple[float, ...]]:
-    """Three severities of each kind of effect that such flights show at all."""
+def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, progress: Say = lambda _: None,
+                  ) -> dict[str, tuple[float, ...]]:
+    """Three severities of each kind of effect that such flights show at all, in the unit of the kind's strength."""
     vehicle = study.vehicle
     without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 8, seed)]
     found = {}
@@ -157,7 +164,7 @@ def strengths(study: Study, seed: int, kinds: Sequence[str] | None = None, progr
         progress(f"severities of {name}, effect {number} of {len(asked)}")
         low = weakest(kind, study, SCENARIO, without, seed, stripped)
         if low is not None:
-            found[name] = severities(low, kind.highest)
+            found[name] = three_severities(low, kind.highest)
     return found
 
 
@@ -166,11 +173,11 @@ def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
     return calibrate.calibrated(vehicle, list(measure.usable(cal, vehicle, [])))[0]
 
 
-def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Generator) -> list[list[tuple[str, int]]]:
-    """For each flight its kinds of effect with their severities, in random order."""
+def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[list[tuple[str, int]]]:
+    """For each flight its kinds of effect, each with the place of its severity (0 to 2), in random order."""
     singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
-    names = list(levels)
-    every = [(n, level) for level in range(3) for n in names]
+    names = list(severities)
+    every = [(n, place) for place in range(3) for n in names]
     cases: list[list[tuple[str, int]]] = []
     while len(cases) < singles:  # every kind at every severity equally often
         cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
@@ -179,23 +186,19 @@ def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Gener
             a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))
             if KINDS[a].effect != KINDS[b].effect and not interchangeable(KINDS[a].effect, KINDS[b].effect):
                 break
-        cases.append([(n, int(rng.choice(PAIR_LEVELS))) for n in (a, b)])
+        cases.append([(n, int(rng.choice(PAIR_SEVERITIES))) for n in (a, b)])
     cases += [[] for _ in range(none)]
     return [cases[i] for i in rng.permutation(len(cases))]
 
 
-def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: Mapping[str, Sequence[float]], seed: int,
+def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Severities, seed: int,
             number: int, rng: np.random.Generator) -> tuple[FlightLog, list[dict[str, Any]]]:
     """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
     for attempt in range(TRIES):
-        active: list[Active] = [KINDS[k].active(levels[k][level] * WEAKER ** attempt, rng) for k, level in drawn]
+        active: list[Active] = [KINDS[k].active(severities[k][place] * WEAKER ** attempt, rng) for k, place in drawn]
         log = next(iter(flown(SCENARIO, [number + 10_000 * attempt], vehicle=vehicle, effects=active, seed=seed,
                               workers=1)))
         if isinstance(log, FlightLog) and list(measure.usable([stripped(log)], vehicle, [])):
-            return stripped(log), [{"name": a.effect.name, "kind": k, "level": level, "values": dict(a.values)}
-                                   for a, (k, level) in zip(active, drawn, strict=True)]
+            return stripped(log), [{"name": a.effect.name, "kind": k, "level": place, "values": dict(a.values)}
+                                   for a, (k, place) in zip(active, drawn, strict=True)]
     raise AirTouchError(f"{', '.join(k for k, _ in drawn)}: {TRIES} flights crashed; lower its highest strength")
-
-
-__all__ = ["Kind", "draw", "interchangeable", "key_of", "make", "open_key", "score", "strengths", "stripped",
-           "study_of"]

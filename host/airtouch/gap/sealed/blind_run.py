@@ -16,9 +16,8 @@ import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
-from airtouch.gap.sealed import blind, blind_score
+from airtouch.gap.sealed import blind
 from airtouch.gap.signatures.alike import names_alike
-from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order
@@ -28,9 +27,10 @@ Say = Callable[[str], None]
 Mapper = Callable[[Callable, Iterable], Iterable]
 Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
 CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
-Answer = tuple[str, tuple[str, ...], str]
-AHEAD = 4  #: flights sent to each process and not yet back
-DEATHS = 3  #: of local processes, after which the work goes on
+Answer = tuple[str, tuple[str, ...], str]  #: name of a flight, effects left out, the diagnosis as JSON
+AHEAD = 4  #: flights sent to each process and not yet back; chosen
+DEATHS = 3  #: of local processes, after which the work goes on; chosen
+#: of a local process, which `_begin` sets once: a task then carries the name of a file, and not the study
 _study: Study | None = None
 
 
@@ -99,6 +99,7 @@ def _answers(study: Study, files: Sequence[CaseFile], workers: int, spread: Mapp
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
+    """File of the answer to one case."""
     return answers / ".".join([name, *(["without", *without] if without else []), "json"])
 
 
@@ -128,6 +129,3 @@ def _diagnosed(study: Study, case: Case) -> Answer:
     content = {k: diagnosis[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
                                      "gap", "shrink", "control")}
     return name, without, json.dumps(content) + "\n"
-
-
-__all__ = ["KINDS", "answer", "blind_score", "run"]

@@ -3,6 +3,7 @@
 import json
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,33 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.sealed.blind_severity import SEEN
+from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import terms
 
-Case = Mapping[str, Any]
-LEVELS = ("weakest", "2x", "4x")
-DRAWS = 1000
+Case = Mapping[str, Any]  #: a diagnosis as JSON
+SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
+LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The answer sheet: what each flight's key says, beside its diagnosis.
+
+    cases: all diagnoses; plain: by flight, those with no effect left out; truth: by flight, its effects as the key
+    has them; single: the one effect of flights that have one; none: flights free of effects; pairs: names of the two
+    effects of the others. first, three: whether a single effect is first, or among the first three, of the ranking.
+    """
+
+    key: Mapping[str, Any]
+    cases: Sequence[Case]
+    plain: Mapping[str, Case]
+    truth: Mapping[str, Sequence[Any]]
+    single: Mapping[str, Any]
+    none: Sequence[str]
+    pairs: Mapping[str, Sequence[str]]
+    first: Mapping[str, bool]
+    three: Mapping[str, bool]
 
 
 def read_answers(path: Path) -> list[Case]:
@@ -42,62 +64,84 @@ def read_answers(path: Path) -> list[Case]:
 
 
 def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
-    """All figures: see the keys. A flight without a diagnosis counts as wrong."""
+    """All figures of a set, JSON-ready. A flight without a diagnosis counts as wrong.
+
+    flights, diagnosed, effects: numbers of flights, of diagnoses, of effects drawn alone. Of single effects: top_1,
+    top_3, exact (named, and nothing else), by_severity, by_effect, misses. Of flights free of effects: false_alarms
+    (anything but `none`), false_unknown. Of pairs: pairs_exact, pairs_one_right. The others as the functions of these
+    names say: unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis of a flight
+    that is not in the key.
+    """
+    sheet = sheet_of(key, cases)
+    plain, single = sheet.plain, sheet.single
+    return {
+        "flights": len(sheet.truth), "diagnosed": len(plain), "effects": len({e["name"] for e in single.values()}),
+        "top_1": share(sheet.first.values()), "top_3": share(sheet.three.values()),
+        "exact": share(_same(_named(plain.get(n)), [e["name"]]) for n, e in single.items()),
+        "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
+        **of_flights_without_effect(sheet), **of_pairs(sheet),
+        "unknown": unknown(sheet), "shrink": shrink(sheet), "parameters": parameters(sheet),
+        "confusion": confusion(sheet), "reliability": reliability(sheet), "misses": misses(sheet),
+    }
+
+
+def sheet_of(key: Mapping[str, Any], cases: Sequence[Case]) -> Sheet:
+    """The diagnoses beside the key; raises AirTouchError for one of a flight that is not in it."""
     plain = {_name(c): c for c in cases if not c.get("without")}
     truth = {n: a["effects"] for n, a in key["answers"].items()}
     extra = sorted(set(plain) - set(truth))
     if extra:
         raise AirTouchError(f"{extra[0]}: diagnosed, but not a flight of this set")
     single = {n: e[0] for n, e in truth.items() if len(e) == 1}
-    none = [n for n, e in truth.items() if not e]
-    pairs = {n: [x["name"] for x in e] for n, e in truth.items() if len(e) == 2}
-    first = {n: top(plain.get(n), e["name"], 1) for n, e in single.items()}
-    three = {n: top(plain.get(n), e["name"], 3) for n, e in single.items()}
-    alarms = [plain[n]["verdict"] != "none" if n in plain else True for n in none]
-    sets = {n: _named(plain.get(n)) for n in pairs}
-    return {
-        "flights": len(truth), "diagnosed": len(plain), "effects": len({e["name"] for e in single.values()}),
-        "top_1": share(first.values()), "top_3": share(three.values()),
-        "exact": share(_same(_named(plain.get(n)), [e["name"]]) for n, e in single.items()),
-        "by_severity": {LEVELS[i]: {"top_1": share(first[n] for n in group), "top_3": share(three[n] for n in group),
-                                    "none": share(_verdict(plain.get(n)) == "none" for n in group),
-                                    "ideal": ideal(key, group)}
-                        for i in range(3) if (group := [n for n, e in single.items() if e["level"] == i])},
-        "by_effect": {k: {"top_1": share(first[n] for n in group), "top_3": share(three[n] for n in group),
-                          "strengths": key.get("severities", {}).get(k)}
-                      for k in sorted({e["kind"] for e in single.values()})
-                      if (group := [n for n, e in single.items() if e["kind"] == k])},
-        "false_alarms": share(alarms), "false_unknown": share(_verdict(plain.get(n)) == "unknown" for n in none),
-        "pairs_exact": share(_same(sets[n], e) for n, e in pairs.items()),
-        "pairs_one_right": share(any(interchangeable(a, b) for a in sets[n] for b in e) for n, e in pairs.items()),
-        "unknown": unknown(single, plain, cases),
-        "shrink": shrink(single, plain, first), "parameters": parameters(single, plain, first),
-        "confusion": confusion(truth, plain), "reliability": reliability(truth, plain),
-        "misses": [{"flight": n, "true": e["kind"], "level": e["level"],
-                    "answer": [r["name"] for r in plain[n]["ranking"][:3]] if n in plain else []}
-                   for n, e in single.items() if not first[n]],
-    }
+    first, three = ({n: top(plain.get(n), e["name"], rank) for n, e in single.items()} for rank in (1, 3))
+    return Sheet(key, cases, plain, truth, single, [n for n, e in truth.items() if not e],
+                 {n: [x["name"] for x in e] for n, e in truth.items() if len(e) == 2}, first, three)
 
 
-def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> dict[str, float | None]:
+def by_severity(sheet: Sheet) -> dict[str, Any]:
+    """For each severity of single effects: top_1, top_3, how often `none` is said, and `ideal`."""
+    groups = {name: [n for n, e in sheet.single.items() if e["level"] == i] for i, name in enumerate(SEVERITIES)}
+    return {name: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
+                   "none": share(_verdict(sheet.plain.get(n)) == "none" for n in group),
+                   "ideal": ideal(sheet.key, group)}
+            for name, group in groups.items() if group}
+
+
+def by_effect(sheet: Sheet) -> dict[str, Any]:
+    """For each kind of single effect: top_1, top_3, and the three strengths that were drawn."""
+    groups = defaultdict(list)
+    for n, e in sheet.single.items():
+        groups[e["kind"]].append(n)
+    return {kind: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
+                   "strengths": sheet.key.get("severities", {}).get(kind)}
+            for kind, group in sorted(groups.items())}
+
+
+def of_flights_without_effect(sheet: Sheet) -> dict[str, Any]:
+    """false_alarms: flights free of effects that are not called `none`; false_unknown: those called `unknown`."""
+    said = [_verdict(sheet.plain.get(n)) for n in sheet.none]
+    return {"false_alarms": share(verdict != "none" for verdict in said),
+            "false_unknown": share(verdict == "unknown" for verdict in said)}
+
+
+def of_pairs(sheet: Sheet) -> dict[str, Any]:
+    """pairs_exact: flights with two effects of which both are named and nothing else; pairs_one_right: one or both."""
+    named = {n: _named(sheet.plain.get(n)) for n in sheet.pairs}
+    return {"pairs_exact": share(_same(named[n], e) for n, e in sheet.pairs.items()),
+            "pairs_one_right": share(any(interchangeable(a, b) for a in named[n] for b in e)
+                                     for n, e in sheet.pairs.items())}
+
+
+def misses(sheet: Sheet) -> list[dict[str, Any]]:
+    """Flights whose single effect is not first: flight, true kind, its level and the first three answers."""
+    return [{"flight": n, "true": e["kind"], "level": e["level"],
+             "answer": [r["name"] for r in sheet.plain[n]["ranking"][:3]] if n in sheet.plain else []}
+            for n, e in sheet.single.items() if not sheet.first[n]]
+
+
+def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> Figure:
     """How many flights a test could tell from nominal ones that is told effect and strength; n: of those known."""
     return share(nats > SEEN for n in flights if (nats := key["answers"][n].get("nats")) is not None)
-
-
-def share(values: Any) -> dict[str, float | None]:
-    """Share of true values with n and Wilson's 95 % interval."""
-    found = [bool(v) for v in values]
-    return wilson(sum(found), len(found))
-
-
-def wilson(hits: int, n: int, z: float = 1.959964) -> dict[str, float | None]:
-    """Share hits / n with Wilson's score interval; without trials anything is possible."""
-    if not n:
-        return {"value": None, "low": 0.0, "high": 1.0, "hits": 0, "n": 0}
-    p, middle = hits / n, (hits + 0.5 * z * z) / (n + z * z)
-    half = z * np.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / (1.0 + z * z / n)
-    return {"value": p, "low": float(max(middle - half, 0.0)), "high": float(min(middle + half, 1.0)),
-            "hits": int(hits), "n": int(n)}
 
 
 def top(case: Case | None, name: str, first: int) -> bool:
@@ -105,14 +149,16 @@ def top(case: Case | None, name: str, first: int) -> bool:
     return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
 
 
-def unknown(single: Mapping[str, Any], plain: Mapping[str, Case], cases: Sequence[Case]) -> dict[str, Any]:
+def unknown(sheet: Sheet) -> dict[str, Any]:
     """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in.
 
     wrong_name_told_apart, auroc_told_apart: among those flights whose data tell the effect from the names that it was
     given.
     """
-    out = {_name(c): c for c in cases if c.get("without") and _name(c) in single}
-    groups = {"all": list(out), **{LEVELS[i]: [n for n in out if single[n]["level"] == i] for i in range(3)}}
+    single, plain = sheet.single, sheet.plain
+    out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
+    groups = {"all": list(out)}
+    groups |= {name: [n for n in out if single[n]["level"] == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
     apart = {n for n, c in out.items() if told_apart(plain.get(n), single[n]["name"], _named(c))}
     known = {n: _chance(c, "unknown") for n, c in plain.items()}
@@ -135,40 +181,20 @@ def told_apart(case: Case | None, true: str, named: Iterable[str]) -> bool:
     return not others or true not in gained or gained[true] - sum(others) >= FIRST_GAIN
 
 
-def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
-    """Chance that a positive scores higher than a negative, ties counted half."""
-    if not len(positive) or not len(negative):
-        return None
-    a, b = np.asarray(positive)[:, None], np.asarray(negative)[None, :]
-    return float((a > b).mean() + 0.5 * (a == b).mean())
-
-
-def shrink(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapping[str, bool]) -> dict[str, Any]:
+def shrink(sheet: Sheet) -> dict[str, Any]:
     """Share of the gap over the floor that goes, over all flights rightly named: with the effect, with a wrong one."""
-    named = [plain[n] for n in single if first[n] and plain[n]["verdict"] == "effect"]
-    right = [(c["gap"]["before"], c["gap"]["after"]) for c in named if c["gap"]["before"] > 1.05]
+    named = [sheet.plain[n] for n in sheet.single if sheet.first[n] and sheet.plain[n]["verdict"] == "effect"]
+    right = [(c["gap"]["before"], c["gap"]["after"]) for c in named if c["gap"]["before"] > LEAST_GAP]
     wrong = [(c["control"]["before"], c["control"]["after"]) for c in named
-             if c.get("control") and c["control"]["before"] > 1.05]
+             if c.get("control") and c["control"]["before"] > LEAST_GAP]
     return {"right": pooled(right), "wrong": pooled(wrong)}
 
 
-def pooled(pairs: Sequence[tuple[float, float]]) -> dict[str, float | None]:
-    """(before - after) / (before - 1) of sums and its median over flights, 95 % intervals by bootstrap."""
-    if not pairs:
-        return {"value": None, "low": None, "high": None, "median": None, "n": 0}
-    x = np.array(pairs)
-    gone, there = x[:, 0] - x[:, 1], x[:, 0] - 1.0
-    pick = np.random.default_rng(0).integers(0, len(x), (DRAWS, len(x)))
-    low, high = np.percentile(gone[pick].sum(axis=1) / there[pick].sum(axis=1), [2.5, 97.5])
-    return {"value": float(gone.sum() / there.sum()), "low": float(low), "high": float(high),
-            "median": float(np.median(gone / there)), "n": len(x)}
-
-
-def parameters(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapping[str, bool]) -> dict[str, Any]:
+def parameters(sheet: Sheet) -> dict[str, Any]:
     """Parameters of flights rightly named: relative error of each effect's vector, and whether 90 % intervals hold."""
     errors, held = defaultdict(list), defaultdict(list)
-    for n, e in single.items():
-        found = next((f for f in plain[n]["effects"] if f["name"] == e["name"]), None) if first[n] else None
+    for n, e in sheet.single.items():
+        found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e["name"]), None) if sheet.first[n] else None
         if found is None:
             continue
         neutral = terms(e["name"])[0].values
@@ -180,35 +206,26 @@ def parameters(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapp
                                        / size))
         held[e["kind"]] += [q["low"] <= e["values"][k] <= q["high"] for k, q in known.items()]
     every = np.array([x for v in errors.values() for x in v])
-    return {"error": _median(every), "coverage": share(x for v in held.values() for x in v),
+    return {"error": median(every), "coverage": share(x for v in held.values() for x in v),
             "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share(held[k])}
                           for k, v in sorted(errors.items())}}
 
 
-def _median(values: np.ndarray) -> dict[str, float | None]:
-    if not len(values):
-        return {"value": None, "low": None, "high": None, "n": 0}
-    pick = np.random.default_rng(0).integers(0, len(values), (DRAWS, len(values)))
-    low, high = np.percentile(np.median(values[pick], axis=1), [2.5, 97.5])
-    return {"value": float(np.median(values)), "low": float(low), "high": float(high), "n": len(values)}
-
-
-def confusion(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case]) -> dict[str, dict[str, int]]:
+def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
     """How often a flight of each effect (or `none`) got each answer first; pairs are not in it."""
     out: dict[str, Counter] = defaultdict(Counter)
-    for n, e in truth.items():
-        if len(e) < 2 and n in plain:
-            out[e[0]["name"] if e else "none"][plain[n]["ranking"][0]["name"]] += 1
+    for n, e in sheet.truth.items():
+        if len(e) < 2 and n in sheet.plain:
+            out[e[0]["name"] if e else "none"][sheet.plain[n]["ranking"][0]["name"]] += 1
     return {k: dict(v) for k, v in sorted(out.items())}
 
 
-def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], bins: int = 8,
-                ) -> list[dict[str, float | None]]:
+def reliability(sheet: Sheet, bins: int = 8) -> list[Figure]:
     """For bins of the first answer's probability: its mean, how often the answer was right, and n."""
     rows = []
-    for n, e in truth.items():
-        if n in plain and len(e) < 2:
-            best = plain[n]["ranking"][0]
+    for n, e in sheet.truth.items():
+        if n in sheet.plain and len(e) < 2:
+            best = sheet.plain[n]["ranking"][0]
             rows.append((best["probability"], interchangeable(e[0]["name"] if e else "none", best["name"])))
     place = [min(int(p * bins), bins - 1) for p, _ in rows]
     return [{"probability": float(np.mean([r[0] for r in group])), **share(r[1] for r in group)}
@@ -216,15 +233,18 @@ def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], b
 
 
 def _name(case: Case) -> str:
+    """Name of the flight of a diagnosis, without folder and endings."""
     name = Path(case["flights"][0]).name
     return name.split(".")[0]
 
 
 def _verdict(case: Case | None) -> str:
+    """The verdict; empty without a diagnosis."""
     return case["verdict"] if case else ""
 
 
 def _named(case: Case | None) -> list[str]:
+    """Names of the effects that a diagnosis names; empty without one."""
     return [f["name"] for f in case["effects"]] if case else []
 
 
@@ -240,4 +260,5 @@ def _same(named: Sequence[str], true: Sequence[str]) -> bool:
 
 
 def _chance(case: Case, name: str) -> float:
+    """Probability that a diagnosis gives a name; 0 where its ranking has none of that name."""
     return next((r["probability"] for r in case["ranking"] if r["name"] == name), 0.0)

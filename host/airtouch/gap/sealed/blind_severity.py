@@ -98,7 +98,7 @@ def term_of(active: Active) -> Term:
     return replace(first, values=dict(active.values))
 
 
-def severities(low: float, highest: float) -> tuple[float, ...]:
+def three_severities(low: float, highest: float) -> tuple[float, ...]:
     """Three strengths: the weakest that can be detected, twice and four times that, or up to the highest."""
     top = min(FACTORS[2] * low, highest)
     return (low, float(np.sqrt(low * top)), top) if top < FACTORS[2] * low else tuple(f * low for f in FACTORS)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.flights.motion import held
+from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
@@ -129,6 +129,6 @@ def angular_acceleration(flight: Flight) -> np.ndarray:
         out = np.zeros((len(flight), 3))
         if flight.rates is not None:
             out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
-        return held(np.where(flight.bridged[:, None], np.nan, out))
+        return interpolate_missing(np.where(flight.bridged[:, None], np.nan, out))
 
     return flight.workspace.once("turning", (), make)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.flights.motion import held
+from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, squared
@@ -61,13 +61,13 @@ def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
 
     kept: see `residual`.
     """
-    return held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active, kept=kept)))
+    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active, kept=kept)))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:
     """The flight as if some rows, bool (n,), had been lost as well."""
     def bridged(values: np.ndarray) -> np.ndarray:
-        return held(np.where(rows[:, None], np.nan, values))
+        return interpolate_missing(np.where(rows[:, None], np.nan, values))
 
     rates = None if flight.rates is None else bridged(flight.rates)
     return replace(flight, pwm=bridged(flight.pwm), acceleration=bridged(flight.acceleration), rates=rates,

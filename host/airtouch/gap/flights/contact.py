@@ -1,0 +1,66 @@
+"""Moments at which something touches the vehicle: legs on the ground, a hand, a wall. They are no evidence."""
+
+import numpy as np
+
+from airtouch.gap.flights.clock import PERIOD_S
+from airtouch.robust import deviation
+
+CONTACT_S = 0.3  #: seconds excluded before and after take-off, touch-down and a collision; chosen
+SETTLED_S = 1.0  #: seconds after the motors have stopped in which the vehicle may still bounce; chosen
+KNOCK = 7.0  #: robust standard deviations at rest from which a sample is a knock; chosen
+LEAST_AT_REST_MPS2 = 1e-3  #: deviation at rest that an accelerometer has at least; chosen
+#: robust standard deviations in flight above which the vehicle hit something: over the 35 that steps of a set-point
+#: reach; chosen
+JOLT = 40.0
+LEAST_IN_FLIGHT = 1e-6  #: deviation in flight, in the channel's unit, that a channel has at least; chosen
+MOST_JOLTED = 0.1  #: share of a flight that collisions may take; more is no collision; chosen
+
+
+def within(samples: np.ndarray, seconds: float) -> np.ndarray:
+    """Samples (n,), bool, no further than some seconds from one of `samples` (n,), bool."""
+    return np.convolve(samples, np.ones(2 * int(seconds / PERIOD_S) + 1), "same") > 0.5
+
+
+def knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Samples (n,), bool, at rest at which somebody or something pushed: far off all the others there.
+
+    force (n, 3): specific force, m/s^2; rest (n,): on the ground with the motors off.
+    """
+    out = np.zeros(len(rest), bool)
+    if rest.any():
+        away = np.abs(force[rest] - np.median(force[rest], axis=0))
+        out[rest] = (away > KNOCK * np.maximum(deviation(force[rest]), LEAST_AT_REST_MPS2)).any(axis=1)
+    return out
+
+
+def jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.ndarray:
+    """Samples (n,), bool, around those at which the vehicle hit something in flight.
+
+    force (n, 3): specific force, m/s^2; rates (n, 3): rad/s, whose steps are looked at; air (n,): in flight.
+    """
+    out = np.zeros(len(air), bool)
+    turning = np.zeros((len(air), 0)) if rates is None else np.diff(rates, axis=0, prepend=rates[:1])
+    for values in (*force.T, *turning.T):
+        away = np.abs(values - np.median(values[air]))
+        out |= air & (away > JOLT * max(float(deviation(values[air])), LEAST_IN_FLIGHT))
+    out = within(out, CONTACT_S)
+    return out if out[air].mean() < MOST_JOLTED else np.zeros_like(out)
+
+
+def near_ground(ground: np.ndarray, running: np.ndarray) -> np.ndarray:
+    """Samples (n,), bool, at which legs may touch: motors run on the ground, and around take-off and touch-down.
+
+    ground (n,): not in the air; running (n,): a motor is commanded. Rest before the first command is not touched.
+    """
+    rest = ground & ~running
+    touching = ground & running
+    change = np.diff((ground | ~running).astype(np.int8))
+    wide = int(CONTACT_S / PERIOD_S)
+    for k in np.flatnonzero(change):
+        touching[max(k - wide, 0):k + wide] = True
+    sample = np.arange(len(running))
+    since = sample - np.maximum.accumulate(np.where(running, sample, -10 ** 6))  # samples since the last command
+    touching |= rest & (since < SETTLED_S / PERIOD_S)
+    before = rest & (np.cumsum(running) == 0)
+    before[np.argmax(running) - 1 if running.any() else 0:] = False
+    return touching & ~before

@@ -1,0 +1,57 @@
+"""When recorded flights may name an effect: it must close a part of their gap where they differ by it anyway.
+
+Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither is what a gap comes from.
+"""
+
+from dataclasses import replace
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import LOOP
+from airtouch.gap.naming.selection import Selection
+from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.signatures.signature import MEAN
+
+#: share of the gap that the effect named must close: as much as the loop model may be wrong by, `problem.DOUBT`; chosen
+LEAST_CLOSED = 0.25
+#: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
+#: seconds; chosen
+STANDS_OUT = 1.1
+
+
+def must_close_the_gap(data: Data, selection: Selection) -> bool:
+    """Whether these are recorded flights whose named effect lies between any two days: a loop's, or one that passes.
+
+    An effect whose seconds are known from another vehicle's log is no gust.
+    """
+    if not data.study.recorded:
+        return False
+    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != TOLD)
+
+
+def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
+    """Whether such an effect closes too little of the gap to be named.
+
+    gap: before it is in the model, in units of the floor; closed: share of it that the effect takes away. What comes
+    and goes is held to that only where a gap stands out that it could take away.
+    """
+    return closed < LEAST_CLOSED and (changes_the_loop(data, selection) or gap > STANDS_OUT)
+
+
+def without_names(selection: Selection) -> Selection:
+    """The same flights with no effect named; what a model without names gains is that of none."""
+    return replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+
+
+def comes_and_goes(selection: Selection) -> bool:
+    """Whether one effect is named, and it comes and goes."""
+    chosen = selection.chosen
+    return chosen is not None and len(selection.named) == 1 and all(t.gate for t in chosen.terms)
+
+
+def changes_the_loop(data: Data, selection: Selection) -> bool:
+    """Whether one effect is named, and it is one of the control loop."""
+    law, chosen = data.study.controller, selection.chosen
+    if law is None or chosen is None or len(selection.named) != 1:
+        return False
+    terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
+    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))

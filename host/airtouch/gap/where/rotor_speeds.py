@@ -1,0 +1,45 @@
+"""Speeds of the rotors in the air, as logged and as modelled."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Study
+from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.logs.flight_log import RPM
+from airtouch.simulation import replay
+
+LEAST_RPM = 500.0  #: 1/min from which a rotor is logged to turn; chosen, far below any hover
+MOST_TURNING = 0.5  #: share of the samples in the air above which it must be; chosen
+LEAST_MODELLED_RPM = 1.0  #: 1/min by which a logged speed is divided at least; chosen
+
+
+def rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
+    """Median speed of each rotor in the air as logged and as modelled, (2, 4) 1/min; None without rpm."""
+    air = (flight.phase != GROUND) & flight.usable
+    if not flight.log.has(*RPM) or not air.any():
+        return None
+    model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(),
+                       pwm=flight.pwm)
+    logged = np.array([interpolate_missing(flight.log[c]) for c in RPM]).T[air]
+    turning = (logged > LEAST_RPM).mean(axis=0) > MOST_TURNING  # a counter that is stuck says nothing
+    return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
+                     np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
+
+
+def speeds_over_flights(speeds: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
+    """Mean logged and modelled speed of each rotor, 1/min, and their ratio with its range over the flights.
+
+    speeds: (2, 4) of each flight, see `rotor_speeds`. A rotor that no flight logs is left out.
+    """
+    out = []
+    for rotor in range(4):
+        pairs = np.array([s[:, rotor] for s in speeds if s is not None and np.isfinite(s[0, rotor])])
+        if len(pairs):
+            ratio = pairs[:, 0] / np.maximum(pairs[:, 1], LEAST_MODELLED_RPM)
+            logged, modelled = pairs.mean(axis=0)
+            out.append({"rotor": rotor + 1, "logged": float(logged), "modelled": float(modelled),
+                        "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
+                        "flights": len(pairs)})
+    return tuple(out)
