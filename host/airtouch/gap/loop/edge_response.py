@@ -12,6 +12,7 @@ import numpy as np
 
 from airtouch.gap.flights import motion
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
@@ -146,7 +147,6 @@ def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
 
 def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
     """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
-    from airtouch.gap.signatures.candidates import terms
     place = _place(flight)
 
     def make() -> dict[str, np.ndarray]:
@@ -163,7 +163,6 @@ def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> d
 
 def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
     """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
-    from airtouch.gap.signatures.candidates import terms
     total = np.zeros(COUNT)
     for a in active:
         if a.effect.name not in SHOWN:
