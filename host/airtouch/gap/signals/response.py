@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.loop.closed_loop import Change
 from airtouch.gap.loop.disturbed import Disturbed
+from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.spectra import squared
 
