@@ -5,7 +5,7 @@
 
 Where each decision is made; a folder imports only those above it:
 
-- `flights`, a log made ready: `flight`, `motion` with its `filters`; how hard it is flown: `hardness`.
+- `flights`, a log made ready: `flight`, `motion` with its `filters`, `blocks`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
   `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
