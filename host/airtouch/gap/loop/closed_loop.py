@@ -114,10 +114,13 @@ class ClosedLoop:
         """
         if not self.by_firmware:
             return replace(self)
-        roll, pitch = [step_of(c, plant, strengths, f, excess[:, i], share[:, i] * torque_per_command(c, plant, f))
-                       for i, ((plant, c, _), strengths) in enumerate(
-                           zip(self._loops(self._nominal_row)[1:], self.strengths[1:], strict=True))]
-        return replace(self, steps=(roll, pitch))
+
+        def of_axis(i: int) -> Step:
+            loop = self._loops(self._nominal_row)[i]
+            turning = share[:, i - 1] * torque_per_command(loop.firmware, loop.plant, f)
+            return step_of(loop.firmware, loop.plant, self.strengths[i], f, excess[:, i - 1], turning)
+
+        return replace(self, steps=(of_axis(AXES.index("roll")), of_axis(AXES.index("pitch"))))
 
     @cached_property
     def _nominal_row(self) -> PlantRow:
@@ -150,7 +153,7 @@ class ClosedLoop:
             for i, axis in enumerate(AXES) if axis != "thrust"]
 
     def _once_a_loop(self, what: str, loop: AxisLoop, f: np.ndarray, make: Callable[[], Made]) -> Made:
-        """What a loop makes at frequencies f; made once for all plant rows with the same loop."""
+        """A value of a loop at frequencies f, the same for all plant rows with that loop; cached."""
         return self.workspace.once("axis", (what, loop, f.tobytes()), make, LOOPS)
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:

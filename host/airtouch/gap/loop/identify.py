@@ -36,6 +36,10 @@ SEARCH_STEPS = 40  #: updates of noise strengths for each controller that a sear
 SEARCH_BLOCKS = 8.0  #: blocks that the misfit counts for against the prior of the gains in a search; chosen
 #: standard deviations of that prior, nepers around the firmware's gains: rate (climb), angle (height), velocity; chosen
 GAIN_SPREAD = (0.7, 0.4, 0.5)
+#: the first of them with which the two searches begin, in such deviations; chosen
+FIRST_GAINS = (-1.0, 0.5)
+#: of a search's simplex: most trials, and where it ends, in such deviations and in nats; chosen
+SIMPLEX = {"maxfev": 80, "xatol": 0.03, "fatol": 0.02}
 
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
@@ -50,7 +54,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     row = prepare(vehicle, calibration)[0][0]
     documented = [noise_strengths(firmware(row, a), axis_plant(row, a), power[:, i]) for i, a in enumerate(AXES)]
     searched = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
-    weight = 0.5 * len(powers)  # half overlapping blocks hold every sample twice
+    weight = 0.5 * len(powers)  # half overlapping blocks hold each sample twice
     by_firmware = (weight * sum(misfit for _, misfit, _ in documented)
                    < weight * sum(misfit for _, misfit, _ in searched) + FREE_GAINS * len(AXES))
     strengths, _, controllers = zip(*(documented if by_firmware else searched), strict=True)
@@ -115,7 +119,7 @@ def _search(row: PlantRow, axis: str, power: np.ndarray) -> tuple[np.ndarray, fl
     def cost(x: np.ndarray) -> float:
         return SEARCH_BLOCKS * noise_strengths(controller(x), plant, power, SEARCH_STEPS)[1] + 0.5 * float(x @ x)
 
-    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in (-1.0, 0.5)]
-    best = min((minimize(cost, x[0], method="Nelder-Mead", options={
-        "initial_simplex": x, "maxfev": 80, "xatol": 0.03, "fatol": 0.02}) for x in corners), key=lambda r: r.fun)
+    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in FIRST_GAINS]
+    best = min((minimize(cost, x[0], method="Nelder-Mead", options={"initial_simplex": x, **SIMPLEX})
+                for x in corners), key=lambda r: r.fun)
     return noise_strengths(controller(best.x), plant, power)

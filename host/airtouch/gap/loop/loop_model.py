@@ -126,6 +126,11 @@ def fixed_of(c: Controller, f: np.ndarray) -> Fixed:
 @lru_cache(256)
 def _fixed_at(period: float, hold: float, filters: tuple[float, float, float],
               shares: tuple[float, float, float, float], shape: tuple[int, ...], frequencies: bytes) -> Fixed:
+    """`fixed_of` by what it depends on.
+
+    filters: cutoffs (Hz) of the controller, the gyro, the acceleration; shares: of the three integrals (1/s) and of the
+    derivative (s); frequencies: the bytes of an array of that shape, Hz.
+    """
     f = np.frombuffer(frequencies).reshape(shape)
     s = 2j * np.pi * f
     runs = round(hold / period) if filters[0] else 1
@@ -141,6 +146,7 @@ def _fixed_at(period: float, hold: float, filters: tuple[float, float, float],
 
 
 def _open_loop(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
+    """Plant times controller, complex (bins,)."""
     to_rate, *_, whole = loop_parts(c, plant, f)
     return to_rate * whole
 

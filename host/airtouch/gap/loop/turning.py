@@ -23,7 +23,7 @@ from airtouch.gap.loop.noise_spectra import (
 )
 
 KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sample; spacing chosen
-STEP_HZ = (1.5, 14.0)  #: where they are fitted, where a step stands above the noise; chosen
+STEP_HZ = (1.5, 14.0)  #: frequencies at which they are fitted; chosen
 GYRO_FOLDS = tuple(k for k in range(-5, 5) if k)  #: multiples of the log's 100 Hz below half of the IMU's 1 kHz
 UNCUT = 0.95  #: share of a kick from which the command's limits do not cut it: one step of KICKS below 1; chosen
 #: Power of the gains with which the uncut share of a kick falls, from ten pairs of simulated flights each with attitude

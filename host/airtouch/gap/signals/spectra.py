@@ -27,7 +27,7 @@ LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean 
 TRIM_HZ = 0.6
 FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
-LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise, as a data sheet may be cautious; chosen
+LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floor over frequency; chosen
 
 
