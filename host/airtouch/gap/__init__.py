@@ -6,14 +6,15 @@
 Where each decision is made; a folder imports only those above it:
 
 - `flights`, a log made ready: `flight`, on a regular `clock`, without moments of `contact`; `motion` with its
-  `filters`; how hard it is flown: `hardness`.
+  `filters`; its `blocks`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
   `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
   simulated flights with it are drawn.
-- `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
-  commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
-  from which `identify` finds a `closed_loop`; at edges: `edge_response`.
+- `loop`, the closed loop: `axis_plant` and `controller`, their transfer functions `loop_model`, what noise and
+  set-points make of the commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`, what
+  part of a command's torque turns the vehicle: `torque_share`; `command_spectra` of flights, from which `identify`
+  finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
   (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,

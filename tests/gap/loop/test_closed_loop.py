@@ -11,6 +11,7 @@ from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
 from airtouch.gap.loop import command_spectra, controller, edge_response, identify, loop_model, noise_spectra, turning
+from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.naming import judging
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import terms
@@ -77,12 +78,12 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, with_effects = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
     measured = spectrum(effects)
     for i, axis in enumerate(controller.AXES):
-        strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
+        strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), axis_plant(row, axis), nominal[:, i])
         f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
-        expected = command_spectra.through_window(
-            strengths @ noise_spectra.noise_power(controller.firmware(with_effects, axis), with_effects, axis, fine))
-        expected /= command_spectra.through_window(
-            strengths @ noise_spectra.noise_power(controller.firmware(row, axis), row, axis, fine))
+        expected = command_spectra.through_window(strengths @ noise_spectra.noise_power(
+            controller.firmware(with_effects, axis), axis_plant(with_effects, axis), fine))
+        expected /= command_spectra.through_window(strengths @ noise_spectra.noise_power(
+            controller.firmware(row, axis), axis_plant(row, axis), fine))
         error = 10.0 * np.log10(measured[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
@@ -136,8 +137,8 @@ def test_the_controller_of_the_firmware_is_recognised(study):
 def test_a_loop_that_would_not_fly_is_recognised():
     slow = prepare(VEHICLE, activate({"sensor_latency": {"delay": 0.03}}))[0][0]
     row = prepare(VEHICLE, ())[0][0]
-    assert loop_model.excess_phase(controller.firmware(row, "roll"), row, "roll") < 0.0
-    assert loop_model.excess_phase(controller.firmware(slow, "roll"), slow, "roll") > 0.0
+    assert loop_model.excess_phase(controller.firmware(row, "roll"), axis_plant(row, "roll")) < 0.0
+    assert loop_model.excess_phase(controller.firmware(slow, "roll"), axis_plant(slow, "roll")) > 0.0
 
 
 @pytest.mark.parametrize("field", ["gyro_lowpass", "rate_scale", "gravity", "thrust_scale", "rotor_y"])
@@ -172,11 +173,12 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
 
     def spectra_of(axis):
         c = controller.firmware(row, axis)
-        spectra = [noise_spectra.noise_power(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
+        part = axis_plant(row, axis)
+        spectra = [noise_spectra.noise_power(c, part, f), loop_model.excess_phase(c, part)]
         if axis != "thrust":
-            spectra += [turning.turning_per_command(c, row, axis, strengths, f),
-                        loop_model.torque_per_command(row, axis, f)]
-        return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in spectra])
+            spectra += [turning.turning_per_command(c, part, strengths, f),
+                        loop_model.torque_per_command(c, part, f)]
+        return (c, part), np.concatenate([np.ravel(x) for x in spectra])
 
     before, different = {axis: spectra_of(axis) for axis in controller.AXES}, 0
     for number in leaves(plant):

@@ -11,6 +11,7 @@ import airtouch.gap.measure as measure
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
+from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.edge_response import calm
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
@@ -130,7 +131,7 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     law, row = nominal().controller, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
     fine = command_spectra.fine_frequencies()
-    by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, row, "roll", fine))
+    by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, axis_plant(row, "roll"), fine))
     predicted = law.strengths[1][0] * by_sensor[0] / (law.strengths[1] @ by_sensor)
     f = command_spectra.frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):

@@ -5,6 +5,7 @@ import numpy as np
 import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
 from airtouch.gap.loop import controller, loop_model, turning
+from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
@@ -96,9 +97,9 @@ def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     c = controller.Controller(0.01, 6.0, 0.4)
     f = np.geomspace(0.8, 20.0, 12)
     s = 2j * np.pi * f
-    plant, *_, open_loop = loop_model.loop_parts(c, row, "roll", f)
+    plant, *_, open_loop = loop_model.loop_parts(c, axis_plant(row, "roll"), f)
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    expected = turning.turning_per_command(c, row, "roll", strengths, f)
+    expected = turning.turning_per_command(c, axis_plant(row, "roll"), strengths, f)
     np.testing.assert_allclose(expected, -s / open_loop, rtol=1e-9)
 
 
@@ -138,7 +139,8 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     predicted = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        predicted.append(turning.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
+        roll = axis_plant(row, "roll")
+        predicted.append(turning.turning_per_command(controller.firmware(row, "roll"), roll, noise_alone, f)[0])
     band = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
     ratio = (simulated / (predicted[1] / predicted[0]))[band].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)

@@ -12,7 +12,8 @@ from airtouch.gap.evidence.cells import BANDS_HZ, COMMAND_VIEW, REPLAY_VIEW, RES
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY, Change
+from airtouch.gap.loop.closed_loop import COMMAND_ONLY
+from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN

@@ -14,6 +14,7 @@ from numpy.polynomial.polynomial import polyval
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
@@ -125,7 +126,7 @@ def _gyro_share(study: Study) -> np.ndarray:
         return share
     row = prepare(study.vehicle, study.calibration)[0][0]
     for i, axis in enumerate(AXES[1:]):
-        strength, powers = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], row, axis, f)
+        strength, powers = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], axis_plant(row, axis), f)
         share[:, i] = strength[0] * powers[0] / np.maximum(strength @ powers, 1e-300)
     return share
 

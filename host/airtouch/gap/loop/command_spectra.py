@@ -4,25 +4,32 @@ from functools import cache
 
 import numpy as np
 
+from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
 from airtouch.gap.flights.filters import both_ways, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.loop.controller import AXES
 from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
-LENGTH = 128  #: samples of a block
-BAND_HZ = (1.5, 40.0)  #: below it set-points, which no log holds, move the commands
-HIGHPASS_HZ = 0.6
+LENGTH = 128  #: samples of a block, 1.28 s; chosen
+BAND_HZ = (1.5, 40.0)  #: below it set-points, which no log holds, move the commands; chosen
+HIGHPASS_HZ = 0.6  #: below it the commands are filtered out before blocks are cut; chosen
+PADDING = 60  #: samples that the filter mirrors at each end of a flight; chosen
+#: collective, roll, pitch and yaw, N per motor, from the thrust of each motor: motors as the Crazyflie counts them
 MIX = 0.25 * np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], dtype=np.float64)
-EDGE_S = (0.1, 0.4)  #: excluded before and after a change of phase at an edge, take-off or landing
+EDGE_S = (0.1, 0.4)  #: s excluded before and after a change of phase at an edge, take-off or landing; chosen
 PLATFORM = KINDS.index("over platform")
-START_S = (0.8, 0.2)  #: the same around hover's end and beginning: set-points step before the speed shows it
+#: s excluded before and after hover's end and beginning, as set-points step before the speed shows it; chosen
+START_S = (0.8, 0.2)
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
-FINE, REACH = 4, 2  #: points a bin, bins a window's leakage is followed
-FREEDOM = 20.0  #: of the tails of a block's power
-STEPPED = 5.0  #: times the median power of its flight's blocks, above which a set-point stepped in a block
-SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
-SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
+FINE, REACH = 4, 2  #: points a bin; bins that a window's leakage is followed, its main lobe; chosen
+FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
+#: power of a block over the median of its flight's blocks, above which a set-point stepped in it; chosen
+STEPPED = 5.0
+STEPS = 12  #: iterations to the power of highest likelihood; chosen
+SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
+#: nepers of power, standard deviation of the amounts of these shapes: of the level, of the others; chosen
+SPREAD = (0.10, 0.04)
 
 
 @cache
@@ -41,14 +48,14 @@ def fine_frequencies() -> np.ndarray:
 
 def through_window(power: np.ndarray) -> np.ndarray:
     """PSD (..., fine points) as blocks under a Hann window show it, (..., bins)."""
-    kernel = _window()
+    kernel = _leakage()
     count = (power.shape[-1] - 1) // FINE + 1 - 2 * REACH
     place = np.arange(count)[:, None] * FINE + np.arange(len(kernel))
     return power[..., place] @ kernel
 
 
 @cache
-def _window() -> np.ndarray:
+def _leakage() -> np.ndarray:
     """Weights of the points around a bin in its power under a Hann window, (2 REACH FINE + 1,)."""
     x = np.arange(-REACH * FINE, REACH * FINE + 1) / FINE
     kernel = (0.5 * np.sinc(x) + 0.25 * (np.sinc(x - 1.0) + np.sinc(x + 1.0))) ** 2
@@ -56,22 +63,25 @@ def _window() -> np.ndarray:
 
 
 def _constant(values: np.ndarray) -> np.ndarray:
+    """The values, which nobody can write to any more."""
     values.flags.writeable = False
     return values
 
 
 def _all_frequencies() -> np.ndarray:
+    """Frequencies (LENGTH / 2 + 1,) of a block, Hz."""
     return np.fft.rfftfreq(LENGTH, PERIOD_S)
 
 
 def _judged() -> np.ndarray:
+    """Which of them are in BAND_HZ, bool."""
     return (_all_frequencies() >= BAND_HZ[0]) & (_all_frequencies() <= BAND_HZ[1])
 
 
 def highpassed(values: np.ndarray) -> np.ndarray:
     """Values (n,) or (n, c) without what changes slower than HIGHPASS_HZ."""
     low = lowpass(HIGHPASS_HZ * 2.0 * PERIOD_S)
-    return values - both_ways(low, values, min(60, len(values) - 2))
+    return values - both_ways(low, values, min(PADDING, len(values) - 2))
 
 
 def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
@@ -93,15 +103,7 @@ def steady(flight: Flight) -> np.ndarray:
 
 def starts(flight: Flight) -> np.ndarray:
     """First samples of the blocks, half overlapping."""
-    bad = np.cumsum(np.concatenate([[0], ~steady(flight)]))
-    out, k = [], 0
-    while k + LENGTH <= len(flight):
-        if bad[k + LENGTH] == bad[k]:
-            out.append(k)
-            k += LENGTH // 2
-        else:
-            k += 1
-    return np.array(out, int)
+    return half_overlapping(count_within(~steady(flight), LENGTH) == 0, LENGTH)
 
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
@@ -110,12 +112,12 @@ def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndar
 
 
 def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """`block_spectra`, worked out."""
     first = starts(flight)
-    window = np.hanning(LENGTH + 1)[:-1]
-    scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+    window, scale = hann_window(LENGTH)
     logged = commands(flight, vehicle)[:, :len(AXES)]
     cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
-    spectra = np.fft.rfft(cut * window[:, None], axis=1)[:, _judged()] * scale
+    spectra = np.fft.rfft(cut * window, axis=1)[:, _judged()] * scale
     calm = _calm(np.abs(spectra) ** 2)
     return first[calm], spectra[calm]
 
@@ -134,7 +136,7 @@ def typical(power: np.ndarray) -> np.ndarray:
     The mean would follow the few blocks in which a set-point stepped.
     """
     estimate = power.mean(axis=0)
-    for _ in range(12):
+    for _ in range(STEPS):
         e = power / estimate
         estimate = estimate * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
     return estimate

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.axis_plant import PlantRow
 from airtouch.simulation.firmware import battery_compensation, settings
 
 DEGREES = 180.0 / np.pi
+RICCATI_STEPS = 400  #: readings after which the Kalman filter's gains stand still; chosen
 AXES = ("thrust", "roll", "pitch")
 
 
@@ -36,18 +37,18 @@ class Controller:
     hold_s: float = 0.0  #: the estimator's attitude, velocity and height are renewed so often; 0: at every run
     chip_hz: float = 0.0  #: bandwidth of the gyro itself, 0 for all
     range_gains: tuple[float, float] = (0.0, 0.0)  #: of a reading of the down range, to height and (1/s) climb
-    range_s: float = 0.025  #: period of these readings
+    range_s: float = 0.025  #: s, period of these readings; the firmware's own comes from its release
     acc_hz: float = 0.0  #: low-pass of the acceleration that the climb is integrated from, 0 for none
 
 
-def newtons_per_pwm(row: Any) -> float:
+def newtons_per_pwm(row: PlantRow) -> float:
     """Slope of a motor's thrust over its command in hover, N."""
     c0, c1, c2 = (float(c) for c in row["thrust_curve"])
     each = float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"])))
     return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (each - c0), 1e-30)))
 
 
-def newtons_per_command(row: Any) -> float:
+def newtons_per_command(row: PlantRow) -> float:
     """Slope of a motor's thrust over the command that the firmware's battery compensation turns into PWM, N."""
     c0, c1, c2 = (float(c) for c in row["thrust_curve"])
     slope = newtons_per_pwm(row)
@@ -56,18 +57,19 @@ def newtons_per_command(row: Any) -> float:
     return slope * battery_compensation.slope(row["firmware"], row, hover)
 
 
-def firmware(row: Any, axis: str) -> Controller:
+def firmware(row: PlantRow, axis: str) -> Controller:
     """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
     return _firmware(row, axis, newtons_per_command(row))
 
 
-def firmware_of(row: Any) -> list[Controller]:
+def firmware_of(row: PlantRow) -> list[Controller]:
     """`firmware` of each of AXES."""
     slope = newtons_per_command(row)
     return [_firmware(row, axis, slope) for axis in AXES]
 
 
-def _firmware(row: Any, axis: str, slope: float) -> Controller:
+def _firmware(row: PlantRow, axis: str, slope: float) -> Controller:
+    """`firmware` of an axis. slope: `newtons_per_command`, the same for all axes."""
     loops = row["firmware"]["loops"]
     release = row["firmware"]
     periods = release["periods"]
@@ -75,19 +77,24 @@ def _firmware(row: Any, axis: str, slope: float) -> Controller:
     if axis == "thrust":
         climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
         gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
-        return Controller(gain, float(height["p"]), integral=_share(climb["i"], climb["p"]),
-                          angle_integral=_share(height["i"], height["p"]), hold_s=hold,
-                          range_gains=_range_gains(reading, float(release["range"]["std_m"]),
-                                                   float(release["kalman"]["noise_acc_z_mps2"])), range_s=reading,
-                          acc_hz=float(release["filters"]["acc_hz"]))
+        return Controller(
+            gain=gain, angle=float(height["p"]), integral=_share(climb["i"], climb["p"]),
+            angle_integral=_share(height["i"], height["p"]), hold_s=hold,
+            range_gains=_range_gains(reading, float(release["range"]["std_m"]),
+                                     float(release["kalman"]["noise_acc_z_mps2"])),
+            range_s=reading, acc_hz=float(release["filters"]["acc_hz"]))
     i, attitude = AXES.index(axis) - 1, 0.001 * float(periods["attitude_ms"])
     rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
     speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
     gain = 0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope
-    return Controller(gain, float(angle["p"]), float(speed["p"]) / DEGREES, _share(rate["d"], rate["p"]),
-                      _share(rate["i"], rate["p"]), _share(angle["i"], angle["p"]), _share(speed["i"], speed["p"]),
-                      attitude, float(row["gyro_lowpass"]), bool(release["controller"]["derivative_on_error"]),
-                      float(row["controller_ahead"]) % hold < 0.5 * attitude, hold, float(row["gyro_bandwidth"]))
+    return Controller(
+        gain=gain, angle=float(angle["p"]), velocity=float(speed["p"]) / DEGREES,
+        derivative=_share(rate["d"], rate["p"]), integral=_share(rate["i"], rate["p"]),
+        angle_integral=_share(angle["i"], angle["p"]), velocity_integral=_share(speed["i"], speed["p"]),
+        period_s=attitude, lowpass_hz=float(row["gyro_lowpass"]),
+        on_error=bool(release["controller"]["derivative_on_error"]),
+        kicked=float(row["controller_ahead"]) % hold < 0.5 * attitude, hold_s=hold,
+        chip_hz=float(row["gyro_bandwidth"]))
 
 
 @lru_cache(16)
@@ -98,12 +105,13 @@ def _range_gains(period: float, std: float, acceleration: float) -> tuple[float,
     """
     variance, noise = std ** 2, 1000.0 * period * (0.001 * acceleration) ** 2
     ahead, p, gains = np.array([[1.0, period], [0.0, 1.0]]), np.eye(2), np.zeros(2)
-    for _ in range(400):
+    for _ in range(RICCATI_STEPS):
         p = ahead @ p @ ahead.T + np.diag([0.0, noise])
         gains = p[:, 0] / (p[0, 0] + variance)
         p = p - np.outer(gains, p[0])
     return float(gains[0]), float(gains[1])
 
 
-def _share(part: Any, of: Any) -> float:
+def _share(part: float, of: float) -> float:
+    """A gain as a share of another, both as the release's settings have them."""
     return float(part) / float(of)

@@ -6,13 +6,14 @@ what turned the vehicle.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, arm_of, axis_plant
 from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command
-from airtouch.gap.loop.loop_model import arm_of, fixed_of, loop_parts, plant_of, sensed_late
+from airtouch.gap.loop.loop_model import LOWEST_HZ, fixed_of, loop_parts, plant_of, sensed_late
 from airtouch.gap.loop.noise_spectra import kick_of
 from airtouch.simulation.firmware import settings
 
@@ -27,13 +28,13 @@ class Disturbed(NamedTuple):
     commanded: np.ndarray
 
 
-def disturbed(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> Disturbed:
-    """At frequencies f (bins,), Hz. controllers: of AXES; row: plant row of `simulation.flight.prepare`.
+def disturbed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -> Disturbed:
+    """At frequencies f (bins,), Hz. controllers: of AXES.
 
     The yaw loop is the firmware's, at the pace of the roll loop.
     """
-    f = np.maximum(f, 0.05)
-    roll, pitch = (_loop(c, row, axis, f) for c, axis in zip(controllers[1:], AXES[1:], strict=True))
+    f = np.maximum(f, LOWEST_HZ)
+    roll, pitch = (_loop(c, axis_plant(row, axis), f) for c, axis in zip(controllers[1:], AXES[1:], strict=True))
     axes = [_responses(c, f, *loop) for c, loop in zip((controllers[1], controllers[2], controllers[1]),
                                                    (roll, pitch, _yaw(controllers[1], row, f)), strict=True)]
     return Disturbed(*(np.stack(x, axis=1) for x in zip(*axes, strict=True)))
@@ -56,18 +57,18 @@ def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
     The model holds it over a sample of the log, the vehicle over a run of its controller c; and of the torque a mean of
     two samples is compared with a difference of the measured rate.
     """
-    f = np.maximum(f, 0.05)
+    f = np.maximum(f, LOWEST_HZ)
     over_hold = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / fixed_of(c, f).hold
     return over_hold * np.cos(np.pi * f * PERIOD_S) / np.sinc(f * PERIOD_S)
 
 
-def _loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _loop(c: Controller, plant: AxisPlant, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plant, whole controller and logged command of roll or pitch, as `_responses` takes them."""
-    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
-    return plant, whole, rate + kick_of(c, fixed_of(c, f)) * (angle + velocity)
+    to_rate, rate, angle, velocity, whole = loop_parts(c, plant, f)
+    return to_rate, whole, rate + kick_of(c, fixed_of(c, f)) * (angle + velocity)
 
 
-def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _yaw(c: Controller, row: PlantRow, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plant, whole controller and logged command of the firmware's yaw: rate within angle, whose derivative steps.
 
     It steps when the estimator renews the angle.
@@ -75,10 +76,10 @@ def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray
     c: of the roll loop, whose filters and periods it shares. A rotor's torque on yaw is its drag and what speeds it up.
     """
     fixed = fixed_of(c, f)
-    s, loops = fixed.s, row["firmware"]["loops"]
+    s, loops, roll = fixed.s, row["firmware"]["loops"], axis_plant(row, "roll")
     of_rate, of_angle = loops[settings.RATE_YAW], loops[settings.YAW]
     gain = float(of_rate["p"]) * DEGREES * float(row["rate_scale"]) * float(row["rate_gain"]) * newtons_per_command(row)
-    filtered = sensed_late(c, row, f) / fixed.lowpass / fixed.chip
+    filtered = sensed_late(c, roll, f) / fixed.lowpass / fixed.chip
     rate = gain * (1.0 + float(of_rate["i"]) / float(of_rate["p"]) / s) * filtered
 
     def angle(differences: np.ndarray) -> np.ndarray:
@@ -88,5 +89,5 @@ def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray
     speed = np.sqrt(float(row["mass"]) * float(row["gravity"]) / (4.0 * float(row["thrust_per_speed2"])))
     lever = float(row["yaw_torque_over_thrust"]) + s * float(row["rotor_inertia"]) / (
         2.0 * float(row["thrust_per_speed2"]) * speed)
-    plant = plant_of(c, row, "roll", f) * lever / arm_of(row, 0) * float(row["inertia"][0]) / float(row["inertia"][2])
+    plant = plant_of(c, roll, f) * lever / arm_of(row, 0) * float(row["inertia"][0]) / float(row["inertia"][2])
     return plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s), rate + angle(c.kicked * fixed.outer)

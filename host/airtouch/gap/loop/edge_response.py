@@ -12,6 +12,7 @@ import numpy as np
 
 from airtouch.gap.flights import motion
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
@@ -22,8 +23,8 @@ from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-BEFORE, AFTER = 30, 130  #: samples around an edge
-BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust, speed, height
+BEFORE, AFTER = 30, 130  #: samples around an edge; chosen
+BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust, speed, height; chosen
 COUNT = sum(n for _, n in BINS)
 KINDS = ("entry", "exit")
 LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
@@ -32,7 +33,7 @@ LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
 WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
 #: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
 SHRINKAGE = 0.3
-#: speed (m/s) and seconds of a crossing where a log does not show them
+#: speed (m/s) and seconds of a crossing where a log does not show them; chosen
 USUAL_MPS, USUAL_S = 0.3, 2.5
 _MISSION = """
 name = "edge-response"
@@ -146,7 +147,6 @@ def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
 
 def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
     """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
-    from airtouch.gap.signatures.candidates import terms
     place = _place(flight)
 
     def make() -> dict[str, np.ndarray]:
@@ -163,7 +163,6 @@ def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> d
 
 def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
     """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
-    from airtouch.gap.signatures.candidates import terms
     total = np.zeros(COUNT)
     for a in active:
         if a.effect.name not in SHOWN:
@@ -206,7 +205,7 @@ def calm(vehicle: Vehicle) -> Vehicle:
 
 def _simulated_responses(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
            ) -> dict[str, np.ndarray]:
-    """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; made once."""
+    """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; cached."""
     key = (place, tuple((a.effect.name, tuple(a.values.items())) for a in active))
     return floor.workspace.once("flown", key, lambda: _simulate(floor, place, active))
 

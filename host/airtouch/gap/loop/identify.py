@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numba import float64, int64, njit, types
@@ -11,6 +10,7 @@ from scipy.optimize import minimize
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.flights.hardness import hardness_of, slopes_of
+from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, axis_plant
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.loop.command_spectra import (
     LENGTH,
@@ -32,6 +32,14 @@ FEWEST = 6  #: blocks of nominal flights, for a command view; chosen
 FREE_GAINS = 1.5
 FLOOR_SMOOTH = 3.0  #: bins, standard deviation of the Gaussian that smooths the floor over the model's shape; chosen
 STEPS = 300  #: updates of noise strengths; chosen
+SEARCH_STEPS = 40  #: updates of noise strengths for each controller that a search tries; chosen
+SEARCH_BLOCKS = 8.0  #: blocks that the misfit counts for against the prior of the gains in a search; chosen
+#: standard deviations of that prior, nepers around the firmware's gains: rate (climb), angle (height), velocity; chosen
+GAIN_SPREAD = (0.7, 0.4, 0.5)
+#: the first of them with which the two searches begin, in such deviations; chosen
+FIRST_GAINS = (-1.0, 0.5)
+#: of a search's simplex: most trials, and where it ends, in such deviations and in nats; chosen
+SIMPLEX = {"maxfev": 80, "xatol": 0.03, "fatol": 0.02}
 
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
@@ -44,26 +52,28 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     slopes = slopes_of(powers, hardness, frequencies())
     power = typical(powers / slopes.level(hardness))
     row = prepare(vehicle, calibration)[0][0]
-    documented = [noise_strengths(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
+    documented = [noise_strengths(firmware(row, a), axis_plant(row, a), power[:, i]) for i, a in enumerate(AXES)]
     searched = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
-    weight = 0.5 * len(powers)  # half overlapping blocks hold every sample twice
+    weight = 0.5 * len(powers)  # half overlapping blocks hold each sample twice
     by_firmware = (weight * sum(misfit for _, misfit, _ in documented)
                    < weight * sum(misfit for _, misfit, _ in searched) + FREE_GAINS * len(AXES))
     strengths, _, controllers = zip(*(documented if by_firmware else searched), strict=True)
-    loop = ClosedLoop(vehicle, tuple(calibration), controllers, by_firmware, strengths, power, len(powers), slopes,
-                      edge_floor_of(flights, vehicle, calibration))
+    loop = ClosedLoop(
+        vehicle=vehicle, calibration=tuple(calibration), controllers=controllers, by_firmware=by_firmware,
+        strengths=strengths, floor=power, blocks=len(powers), slopes=slopes,
+        edges=edge_floor_of(flights, vehicle, calibration))
     model = loop.nominal_power()
     return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), FLOOR_SMOOTH, axis=0,
                                                                 mode="nearest")))
 
 
-def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarray,
-                    steps: int = STEPS) -> tuple[np.ndarray, float, Controller]:
+def noise_strengths(controller: Controller, plant: AxisPlant, power: np.ndarray, steps: int = STEPS,
+                    ) -> tuple[np.ndarray, float, Controller]:
     """Noise strengths (sources,) of highest Whittle likelihood for a command's power (bins,), and their controller.
 
     Between them the misfit: the negative log likelihood a block, nats, above that of a model that fits every bin.
     """
-    shapes = through_window(noise_power(controller, row, axis, fine_frequencies()))
+    shapes = through_window(noise_power(controller, plant, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     strengths = np.full(len(shapes), 1.0 / len(shapes))
@@ -95,11 +105,11 @@ def _update(strengths, shapes, power, steps):
             strengths[s] = max(strengths[s] * np.sqrt(up / down), 1e-9)
 
 
-def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:
+def _search(row: PlantRow, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:
     """Gains of a cascade fitted to the shape of the spectrum, near those that vehicles of its size have."""
-    known = firmware(row, axis)
+    known, plant = firmware(row, axis), axis_plant(row, axis)
     middle = np.log([known.gain, known.angle, max(known.velocity, 1e-3)])
-    spread = np.array([0.7, 0.4, 0.5])
+    spread = np.array(GAIN_SPREAD)
     free = 2 if axis == "thrust" else 3
 
     def controller(x: np.ndarray) -> Controller:
@@ -107,9 +117,9 @@ def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, 
         return Controller(values[0], values[1], values[2] if free == 3 else 0.0)
 
     def cost(x: np.ndarray) -> float:
-        return 8.0 * noise_strengths(controller(x), row, axis, power, 40)[1] + 0.5 * float(x @ x)
+        return SEARCH_BLOCKS * noise_strengths(controller(x), plant, power, SEARCH_STEPS)[1] + 0.5 * float(x @ x)
 
-    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in (-1.0, 0.5)]
-    best = min((minimize(cost, x[0], method="Nelder-Mead", options={
-        "initial_simplex": x, "maxfev": 80, "xatol": 0.03, "fatol": 0.02}) for x in corners), key=lambda r: r.fun)
-    return noise_strengths(controller(best.x), row, axis, power)
+    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in FIRST_GAINS]
+    best = min((minimize(cost, x[0], method="Nelder-Mead", options={"initial_simplex": x, **SIMPLEX})
+                for x in corners), key=lambda r: r.fun)
+    return noise_strengths(controller(best.x), plant, power)

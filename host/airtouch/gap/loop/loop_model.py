@@ -1,76 +1,50 @@
 """Linear model of the attitude and height loops: their transfer functions.
 
-The controllers are those of `gap.loop.controller`. Commands are in newtons per motor.
+The controllers are those of `gap.loop.controller`, the vehicle is `gap.loop.axis_plant`. Commands are in newtons per
+motor.
 """
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.loop.controller import AXES, Controller, firmware
+from airtouch.gap.loop.axis_plant import AxisPlant
+from airtouch.gap.loop.controller import Controller
 
-OUTER_S = 0.01  #: period of the firmware's position loop and of its estimator's predictions
-IMU_S = 0.001  #: between samples of the IMU
-CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1
-#: what `loop_parts` gives
+LOWEST_HZ = 0.05  #: a frequency below it counts as it, so that integrals stay finite; chosen
+OUTER_S = 0.01  #: s, period of the firmware's position loop and of its estimator's predictions
+IMU_S = 0.001  #: s between samples of the IMU, which the firmware reads at 1 kHz
+CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1: up to below the log's 50 Hz; chosen
+#: what `loop_parts` gives: plant, rate path, angle path, velocity path, whole controller
 Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def of_loop(row: Any, axis: str) -> tuple[float, ...]:
-    """All that a plant row gives the loop of one axis beside its controller: rows alike in this have the same spectra.
-
-    The controller itself, where it is the firmware's, is `firmware(row, axis)`.
-    """
-    lags = [float(row[name]) for name in ("actuator_delay", "motor_rise", "motor_fall", "sensor_delay")]
-    gains = [mean_of_rotors(row["gain"]), *(float(row[name]) for name in (
-        "height_gain", "rate_gain", "attitude_gain", "position_gain", "gravity", "mass"))]
-    if axis == "thrust":
-        return (*lags, *gains)
-    i = AXES.index(axis) - 1
-    return (*lags, *gains[:-1], arm_of(row, i), float(row["inertia"][i]))
-
-
-def arm_of(row: Any, i: int) -> float:
-    """Mean distance of the rotors from the axis of roll (0) or pitch (1), m."""
-    return mean_of_rotors(np.abs(row["rotor_y" if i == 0 else "rotor_x"]))
-
-
-def mean_of_rotors(values: np.ndarray) -> float:
-    """Mean (4,); NumPy's own takes ten times as long."""
-    a, b, c, d = values.tolist()
-    return (a + b + c + d) / 4.0
-
-
-def excess_phase(c: Controller, row: Any, axis: str) -> float:
+def excess_phase(c: Controller, plant: AxisPlant) -> float:
     """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
-    loop = _open_loop(c, row, axis, CROSSING_HZ)
+    loop = _open_loop(c, plant, CROSSING_HZ)
     phase, size = np.unwrap(np.angle(loop)), np.abs(loop)
     phase += -2.0 * np.pi * np.ceil(phase[0] / (2.0 * np.pi))
     last = np.flatnonzero(size > 1.0)
     return float(-np.pi - phase[last[-1]]) if len(last) else -np.pi
 
 
-def torque_per_command(row: Any, axis: str, f: np.ndarray, c: Controller | None = None) -> np.ndarray:
-    """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N. c: the firmware's by default."""
-    f = np.maximum(f, 0.05)
-    return 2j * np.pi * f * plant_of(firmware(row, axis) if c is None else c, row, axis, f)
+def torque_per_command(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
+    """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N; of c its period counts alone."""
+    f = np.maximum(f, LOWEST_HZ)
+    return 2j * np.pi * f * plant_of(c, plant, f)
 
 
-def plant_of(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def plant_of(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Command to measured rate (climb), complex (bins,)."""
     fixed = fixed_of(c, f)
     s = fixed.s
-    motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
-        1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
-    lift = 4.0 * mean_of_rotors(row["gain"])
-    if axis == "thrust":
-        return lift / float(row["mass"]) * motor / s
-    i = AXES.index(axis) - 1
-    return lift * arm_of(row, i) / float(row["inertia"][i]) * motor / s
+    motor = _delayed(plant.actuator_delay_s, 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
+        1.0 / (1.0 + s * plant.motor_rise_s) + 1.0 / (1.0 + s * plant.motor_fall_s))
+    return plant.acceleration * motor / s
 
 
-def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
+def loop_parts(c: Controller, plant: AxisPlant, f: np.ndarray) -> Parts:
     """Transfer functions at frequencies f, Hz, each complex and as long as f: plant, rate path, angle path, velocity
     path and the whole controller.
 
@@ -79,28 +53,44 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
     """
     fixed = fixed_of(c, f)
     s = fixed.s
-    plant = plant_of(c, row, axis, f)
-    late = sensed_late(c, row, f)
+    to_rate = plant_of(c, plant, f)
+    late = sensed_late(c, plant, f)
     renewed = fixed.renewed
-    if axis == "thrust":
-        k = float(row["height_gain"])
+    if plant.axis == "thrust":
+        k = plant.height_gain
         late = late * renewed / fixed.acc
         climb = k * c.gain * fixed.integral * late
         height = climb * c.angle * k * fixed.angle_integral / s
-        return plant, climb, height, 0.0 * s, climb + height
-    k = c.gain * float(row["rate_gain"])
+        return to_rate, climb, height, 0.0 * s, climb + height
+    k = c.gain * plant.rate_gain
     filtered = late / fixed.lowpass / fixed.chip
     rate = k * fixed.whole * filtered
-    angle = k * (fixed.whole if c.on_error else fixed.integral) * c.angle * float(row["attitude_gain"])
+    angle = k * (fixed.whole if c.on_error else fixed.integral) * c.angle * plant.attitude_gain
     angle = angle * fixed.angle_integral
-    velocity = angle * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
-    angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / fixed.s2 * late
-    return plant, rate, angle, velocity, rate + angle + velocity
+    velocity = angle * c.velocity * plant.position_gain * fixed.velocity_integral
+    angle, velocity = angle * filtered * renewed / s, velocity * renewed * plant.gravity_mps2 / fixed.s2 * late
+    return to_rate, rate, angle, velocity, rate + angle + velocity
 
 
-def sensed_late(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+def sensed_late(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """The sensors' delay, complex (bins,)."""
-    return _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
+    return _delayed(plant.sensor_delay_s, IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
+
+
+class AxisLoop(NamedTuple):
+    """The loop of one axis: its plant, the firmware's controller there, and the controller that counts.
+
+    controller: the firmware's or, where that does not explain nominal flights, one fitted to them.
+    """
+
+    plant: AxisPlant
+    firmware: Controller
+    controller: Controller
+
+    @property
+    def by_firmware(self) -> bool:
+        """Whether the controller that counts is the firmware's."""
+        return self.controller == self.firmware
 
 
 class Fixed(NamedTuple):
@@ -136,21 +126,29 @@ def fixed_of(c: Controller, f: np.ndarray) -> Fixed:
 @lru_cache(256)
 def _fixed_at(period: float, hold: float, filters: tuple[float, float, float],
               shares: tuple[float, float, float, float], shape: tuple[int, ...], frequencies: bytes) -> Fixed:
+    """`fixed_of` by what it depends on.
+
+    filters: cutoffs (Hz) of the controller, the gyro, the acceleration; shares: of the three integrals (1/s) and of the
+    derivative (s); frequencies: the bytes of an array of that shape, Hz.
+    """
     f = np.frombuffer(frequencies).reshape(shape)
     s = 2j * np.pi * f
     runs = round(hold / period) if filters[0] else 1
     renewed = sum(np.exp(-s * k * period) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
     lowpass, chip, acc = (butterworth(s, cutoff) for cutoff in filters)
     integral, angle_integral, velocity_integral = (1.0 + share / s for share in shares[:3])
-    return Fixed(s, s ** 2, np.sinc(f * period) * np.exp(-0.5 * s * period),
-                 renewed * np.exp(-0.5 * s * IMU_S) if hold else renewed, integral, angle_integral, velocity_integral,
-                 integral + shares[3] * ((1.0 - np.exp(-s * period)) / period), (1.0 - np.exp(-s * OUTER_S)) / period,
-                 lowpass, chip, acc)
+    return Fixed(
+        s=s, s2=s ** 2, hold=np.sinc(f * period) * np.exp(-0.5 * s * period),
+        renewed=renewed * np.exp(-0.5 * s * IMU_S) if hold else renewed,
+        integral=integral, angle_integral=angle_integral, velocity_integral=velocity_integral,
+        whole=integral + shares[3] * ((1.0 - np.exp(-s * period)) / period),
+        outer=(1.0 - np.exp(-s * OUTER_S)) / period, lowpass=lowpass, chip=chip, acc=acc)
 
 
-def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
-    plant, *_, whole = loop_parts(c, row, axis, f)
-    return plant * whole
+def _open_loop(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
+    """Plant times controller, complex (bins,)."""
+    to_rate, *_, whole = loop_parts(c, plant, f)
+    return to_rate * whole
 
 
 @lru_cache(512)
@@ -170,7 +168,7 @@ def _delayed(delay: float, step: float, shape: tuple[int, ...], frequencies: byt
 def butterworth(s: np.ndarray, cutoff: float) -> np.ndarray | float:
     """By what a second-order low-pass at the IMU's rate divides at s = 2 pi i f; 1 for a cutoff (Hz) that passes all.
 
-    As in `simulation.filters`: bilinear, so that it takes more than its analogue towards half of that rate.
+    As in `simulation.sensors.filters`: bilinear, so that it takes more than its analogue towards half of that rate.
     """
     if cutoff <= 0.0 or cutoff >= 0.49 / IMU_S:
         return 1.0

@@ -1,39 +1,41 @@
 """The motor commands that noise makes: power spectra of the modelled loop, aliases included."""
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.axis_plant import AxisPlant
 from airtouch.gap.loop.controller import Controller
-from airtouch.gap.loop.loop_model import Fixed, Parts, fixed_of, loop_parts
+from airtouch.gap.loop.loop_model import LOWEST_HZ, Fixed, Parts, fixed_of, loop_parts
 
-FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
-FLOW_HZ = 1.5  #: above it the estimated velocity's error falls by its square; errors of optical flow last 0.1 s
+FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's 100 Hz that fall onto a frequency: all of a 500 Hz controller
+#: Hz, above which the estimated velocity's error falls by the frequency's square: errors of optical flow last
+#: 0.1 s, and 1 / (2 pi 0.1 s) is 1.6; chosen.
+FLOW_HZ = 1.5
+WANDER_HZ = 0.3  #: below it errors that grow towards low frequency are flat, far below the commands' band; chosen
 
 
-def noise_power(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def noise_power(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
     Sources, roll and pitch: white rate; with the firmware's controller velocity flat up to FLOW_HZ and falling with
     the frequency's square beyond, with another one white angle and velocity falling with the frequency; velocity and
     angle falling with its square; torque. Thrust: white climb, climb falling with the frequency, its square, force,
     white error of the down range, the same drifting from reading to reading.
-    row: plant row of `simulation.flight.prepare`, effects in it.
     """
-    return with_aliases(_sources(c, row, axis, f), aliases_of(c, row, axis, f))
+    return with_aliases(_sources(c, plant, f), aliases_of(c, plant, f))
 
 
-def aliases_of(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def aliases_of(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Transfer of the first source's noise, folded into the log, to the command, complex (folds, bins)."""
-    if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
+    if plant.axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
         return np.zeros((0, len(f)))
-    beyond_hz = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
+    beyond_hz = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), LOWEST_HZ)
     fixed = fixed_of(c, beyond_hz)
-    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, beyond_hz)
+    to_rate, rate, angle, velocity, whole = loop_parts(c, plant, beyond_hz)
     kick = kick_of(c, fixed)
-    rate_response = plant * -(rate + angle) / (1.0 + plant * whole)
+    rate_response = to_rate * -(rate + angle) / (1.0 + to_rate * whole)
     return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * rate_response
 
 
@@ -49,39 +51,39 @@ def difference(f: np.ndarray) -> np.ndarray:
     return 2j * np.sin(np.pi * f * PERIOD_S) / PERIOD_S
 
 
-def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def _sources(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the logged command for noise of unit power, without aliases."""
-    f = np.maximum(f, 0.05)
-    if axis == "thrust":
-        s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-        plant, climb, _, _, whole = loop_parts(c, row, axis, f)
-        size = 1.0 / (1.0 + plant * whole)
+    f = np.maximum(f, LOWEST_HZ)
+    if plant.axis == "thrust":
+        s, low = 2j * np.pi * f, np.maximum(f, WANDER_HZ)
+        to_climb, climb, _, _, whole = loop_parts(c, plant, f)
+        size = 1.0 / (1.0 + to_climb * whole)
         climbs = np.abs(whole * size) ** 2
         sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
         if c.range_gains[0]:
-            sources += _range_errors(c, row, f, size)
+            sources += _range_errors(c, plant, f, size)
         return np.array(sources)
-    return np.abs(transfers(c, row, f, loop_parts(c, row, axis, f))[0]) ** 2
+    return np.abs(transfers(c, plant, f, loop_parts(c, plant, f))[0]) ** 2
 
 
-def transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
+def transfers(c: Controller, plant: AxisPlant, f: np.ndarray, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
     """Transfers of roll or pitch from noise to logged command and to measured angular acceleration.
 
     Each is complex (sources, bins).
 
     parts: of the loop at f.
     """
-    fixed, low = fixed_of(c, f), np.maximum(f, 0.3)
+    fixed, low = fixed_of(c, f), np.maximum(f, WANDER_HZ)
     s = fixed.s
-    plant, rate, angle, velocity, whole = parts
-    size = 1.0 / (1.0 + plant * whole)
+    to_rate, rate, angle, velocity, whole = parts
+    size = 1.0 / (1.0 + to_rate * whole)
     kick = kick_of(c, fixed)
-    tilt, speed = paths(c, row, fixed)
+    tilt, speed = paths(c, plant, fixed)
     wandering = [speed / (low ** 2 + FLOW_HZ ** 2)] if c.lowpass_hz else [tilt, speed / low]
     outer = [*wandering, speed / low ** 2, tilt / low ** 2]
     direct = np.array([-(rate + angle), *outer, 0.0 * s])
     kicked = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
-    rate_response = plant * direct * size  # rate
+    rate_response = to_rate * direct * size
     rate_response[-1] = size / s
     logged = kicked - (rate + kick * (angle + velocity)) * rate_response
     rate_response = s * rate_response
@@ -89,13 +91,13 @@ def transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.
     return logged, rate_response
 
 
-def paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
+def paths(c: Controller, plant: AxisPlant, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
     """Command (bins,) for an angle and for a velocity of 1 that the controller is asked for."""
-    k = c.gain * float(row["rate_gain"])
-    tilt = k * fixed.integral * c.angle * float(row["attitude_gain"])
+    k = c.gain * plant.rate_gain
+    tilt = k * fixed.integral * c.angle * plant.attitude_gain
     if c.on_error:
         tilt = tilt * fixed.whole / fixed.integral
-    speed = tilt * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
+    speed = tilt * c.velocity * plant.position_gain * fixed.velocity_integral
     return tilt * fixed.angle_integral, speed
 
 
@@ -110,7 +112,7 @@ def kick_of(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | fl
     return (fixed.integral + c.kicked * passed * c.derivative * fixed.outer) / fixed.whole
 
 
-def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+def _range_errors(c: Controller, plant: AxisPlant, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
     """Power (bins,) of the logged command for white errors of the down range, and for drifting ones; aliases in it.
 
     size: of the closed loop over the open one at f.
@@ -118,20 +120,20 @@ def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> l
     white, drifting = np.zeros(len(f)), np.zeros(len(f))
     for k in FOLDS:
         g = f + k / PERIOD_S
-        power = np.abs(_ranged(c, row, g) * (1.0 if k else size)) ** 2
+        power = np.abs(_ranged(c, plant, g) * (1.0 if k else size)) ** 2
         white += power
         drifting += power / (4.0 * np.sin(np.pi * g * c.range_s) ** 2 + (0.6 * np.pi * c.range_s) ** 2)
     return [white, drifting]
 
 
-def _ranged(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+def _ranged(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Command for an error of the down range of 1 m at f (Hz), through the estimator's height and climb.
 
     Between two readings T apart the estimate moves on its own: X = (1 - (1 - K H) F / z)^-1 K.
     """
     s = 2j * np.pi * f
     height, climb = _estimated(*c.range_gains, c.range_s, f.tobytes())
-    k = float(row["height_gain"])
+    k = plant.height_gain
     gain = k * c.gain * (1.0 + c.integral / s)
     return np.sinc(f * c.range_s) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
 

@@ -49,7 +49,7 @@ CHANNEL_WORDS = {
 }
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
-KEPT = 12  #: residuals of one flight that are cached for gates to be put together from
+KEPT = 12  #: residuals of one flight that are cached for gates to be put together from; chosen
 
 
 def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
@@ -73,16 +73,16 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     gated = [a for a in active if a.gate]
     if not gated:
         return _steady(flight, vehicle, active, controller, seed)
-    always, made = [a for a in active if not a.gate], {} if kept is None else kept
+    always, cache = [a for a in active if not a.gate], {} if kept is None else kept
 
     def of(some: Sequence[Active]) -> np.ndarray:
         """Residual of effects that always act; cached."""
         key = tuple((a.effect.name, *a.values.values()) for a in some)
-        if key not in made:
-            if len(made) >= KEPT:
-                made.clear()
-            made[key] = _steady(flight, vehicle, some, controller, seed)
-        return made[key]
+        if key not in cache:
+            if len(cache) >= KEPT:
+                cache.clear()
+            cache[key] = _steady(flight, vehicle, some, controller, seed)
+        return cache[key]
 
     out = of(always).copy()
     for a in gated:
@@ -98,11 +98,11 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
     out = np.full((len(flight), COUNT), np.nan)
     plant = prepare(vehicle, active)[0]
     row = plant[0]
-    seen = flight.signals.copy()
-    seen[:, at.MASS], seen[:, at.HOVER_SPEED] = row["mass"], hover_speed(plant)
-    seen[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
-    seen[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
-    model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=seen, pwm=flight.pwm, seed=seed)
+    signals = flight.signals.copy()
+    signals[:, at.MASS], signals[:, at.HOVER_SPEED] = row["mass"], hover_speed(plant)
+    signals[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
+    signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
+    model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
     force, turning = model.specific_force, model.angular_acceleration
     turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
     rest = flight.phase == 0

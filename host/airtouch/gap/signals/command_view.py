@@ -6,7 +6,7 @@ prior, fitted anew for every flight and axis.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import float64, njit
@@ -16,64 +16,99 @@ from airtouch.gap.loop import edge_response
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, SHAPES, SPREAD, frequencies, shapes
 from airtouch.gap.loop.controller import AXES
+from airtouch.gap.signals.channels import COMMAND
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.workspace import Workspace
+from airtouch.logs.edges import Edge
 from airtouch.simulation.effects import Active
 
-FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
-EDGE_FREEDOM = 6.0  #: degrees of freedom of the tails of responses at edges
-ROUNDS = 4  #: Newton steps to the floor's correction
-WIDE = 6.0  #: factor on the spread where random effects shake the loop in ways that no log holds
-DOUBT = 0.1  #: relative error of the loop model in the logarithm of a change of the spectra by effects
-KEPT = 300  #: hypotheses whose expected power is cached
-SMALL = 1e-3  #: change of a scaled parameter over which the likelihood's slope is taken
-NOTHING = np.zeros(0)
+EDGE_FREEDOM = 6.0  #: degrees of freedom of the Student-like tails of responses at edges; chosen
+ROUNDS = 4  #: Newton steps to the floor's correction; chosen
+#: factor on `SPREAD` where random effects shake the loop in ways that no log holds; chosen
+WIDE = 6.0
+DOUBT = 0.1  #: relative error of the loop model in the logarithm of a change of the spectra by effects; chosen
+KEPT = 300  #: hypotheses whose expected power is cached; chosen
+SMALL = 1e-3  #: change of a scaled parameter over which the likelihood's slope is taken; chosen
+#: channel of each number of a response at an edge: thrust by the thrust command, speed by pitch, height by thrust
+EDGE_CHANNELS = np.repeat([COMMAND.start, COMMAND.start + AXES.index("pitch"), COMMAND.start],
+                          [n for _, n in edge_response.BINS])
+
+
+class Elements(NamedTuple):
+    """Values (n,) of some blocks or edges, complex, one after another, and what belongs to each of them.
+
+    floor: power in nominal flights; channel: its number in `channels.CHANNELS`; frequency: Hz; flight: its number;
+    freedom: degrees of freedom of its Student-like tails.
+    """
+
+    values: np.ndarray
+    floor: np.ndarray
+    channel: np.ndarray
+    frequency: np.ndarray
+    flight: np.ndarray
+    freedom: np.ndarray
 
 
 class CommandView:
-    """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes."""
+    """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes.
+
+    First the spectra of all blocks, flight by flight, then the responses at edges.
+    """
 
     def __init__(self, loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
                  pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
+        """The view of the pieces in the air. loop: of nominal flights; None for no view, which has no element.
+
+        first: of each flight by regime the first samples of the replay's blocks; pieces: number of a flight, regime,
+        and which of these blocks count, bool.
+        """
         self._loop, self.workspace = loop, Workspace()
-        self.spectra: list[np.ndarray] = []
-        self.flights: list[int] = []
-        if loop is not None:
-            for i, regime, chosen in pieces:
-                if regime != AIR or not chosen.any():
-                    continue
-                begin, spectra = loop.levelled_spectra(flights[i])
-                middle = first[i][AIR] + AIR_LENGTH[AIR] // 2
-                nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1) if len(begin) else []
-                chosen_spectra = spectra[chosen[nearest]] if len(begin) else spectra
-                if len(chosen_spectra):
-                    self.spectra.append(chosen_spectra)
-                    self.flights.append(i)
-            self.shapes = shapes()
-            self.spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))
-        self.edges = [] if loop is None or loop.edges is None else [
-            (flights[i], i, e) for i, regime, chosen in pieces if regime == AIR and chosen.any()
-            for e in edge_response.edges_of(flights[i])
-            if chosen[np.argmin(np.abs(first[i][AIR] + AIR_LENGTH[AIR] // 2 - e.sample))]]
+        self.shapes, self.spread = shapes(), np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))
+        in_air = [(i, first[i][AIR] + AIR_LENGTH[AIR] // 2, chosen) for i, regime, chosen in pieces
+                  if loop is not None and regime == AIR and chosen.any()]
+        by_flight = [(i, self._chosen_spectra(flights[i], middle, chosen)) for i, middle, chosen in in_air]
+        #: number of each flight that has blocks, and their spectra (blocks, bins, AXES)
+        self.flights, self.spectra = [i for i, s in by_flight if len(s)], [s for _, s in by_flight if len(s)]
         self.sizes = [np.abs(s) ** 2 for s in self.spectra]
-        flat = [s.ravel() for s in self.spectra]
-        flat += [edge_response.whitened(self._edge_floor, f, e).astype(complex) for f, _, e in self.edges]
-        self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
-        self.floor = self._spread_out(lambda i: self.loop.floor)
-        axis = np.arange(len(AXES)) + FIRST_CHANNEL
-        self.channel = self._spread_out(lambda i: np.broadcast_to(axis, _shape(self.spectra[i])))
-        self.frequency = self._spread_out(lambda i: np.repeat(frequencies()[:, None], len(AXES), axis=1))
-        self.flight = self._spread_out(lambda i: np.full(_shape(self.spectra[i]), self.flights[i]))
-        self.freedom = np.full(len(self.values), FREEDOM)
-        more = len(self.edges) * edge_response.COUNT
-        if more:
-            kind = np.repeat([FIRST_CHANNEL, FIRST_CHANNEL + 2, FIRST_CHANNEL], [n for _, n in edge_response.BINS])
-            self.floor = np.concatenate([self.floor, np.ones(more)])
-            self.channel = np.concatenate([self.channel, np.tile(kind, len(self.edges))])
-            self.frequency = np.concatenate([self.frequency, np.zeros(more)])
-            self.flight = np.concatenate([self.flight, np.repeat([i for _, i, _ in self.edges], edge_response.COUNT)])
-            self.freedom[-more:] = EDGE_FREEDOM
+        self.edges = [(flights[i], i, e) for i, middle, chosen in in_air for e in self._chosen_edges(
+            flights[i], middle, chosen)]
+        self.values, self.floor, self.channel, self.frequency, self.flight, self.freedom = _joined([
+            *(self._of_blocks(i, s) for i, s in zip(self.flights, self.spectra, strict=True)),
+            *(self._of_edge(flight, i, e) for flight, i, e in self.edges)])
+
+    def _chosen_spectra(self, flight: Flight, middle: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Spectra (blocks, bins, AXES) of the blocks of commands whose nearest replay block is chosen.
+
+        middle: middle samples of the replay's blocks.
+        """
+        begin, spectra = self.loop.levelled_spectra(flight)
+        if not len(begin):
+            return spectra
+        nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1)
+        return spectra[chosen[nearest]]
+
+    def _chosen_edges(self, flight: Flight, middle: np.ndarray, chosen: np.ndarray) -> list[Edge]:
+        """Edges of a flight whose nearest replay block is chosen; none where nominal flights cross no edge."""
+        if self.loop.edges is None:
+            return []
+        return [e for e in edge_response.edges_of(flight) if chosen[np.argmin(np.abs(middle - e.sample))]]
+
+    def _of_blocks(self, number: int, spectra: np.ndarray) -> Elements:
+        """The elements of a flight's blocks (blocks, bins, AXES)."""
+        def each(table: np.ndarray) -> np.ndarray:
+            return np.broadcast_to(table, spectra.shape).ravel()
+
+        return Elements(values=spectra.ravel(), floor=each(self.loop.floor),
+                        channel=each(COMMAND.start + np.arange(len(AXES))), frequency=each(frequencies()[:, None]),
+                        flight=np.full(spectra.size, number), freedom=np.full(spectra.size, FREEDOM))
+
+    def _of_edge(self, flight: Flight, number: int, edge: Edge) -> Elements:
+        """The elements of a response at an edge, whose power is 1 and which has no frequency."""
+        count = edge_response.COUNT
+        return Elements(values=edge_response.whitened(self._edge_floor, flight, edge).astype(complex),
+                        floor=np.ones(count), channel=EDGE_CHANNELS, frequency=np.zeros(count),
+                        flight=np.full(count, number), freedom=np.full(count, EDGE_FREEDOM))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -90,11 +125,6 @@ class CommandView:
         assert self.loop.edges is not None
         return self.loop.edges
 
-    def _spread_out(self, table_of: Any) -> np.ndarray:
-        """A table (bins, axes) for each flight, once for each of its blocks, flattened."""
-        made = [np.broadcast_to(table_of(i), s.shape).ravel() for i, s in enumerate(self.spectra)]
-        return np.concatenate(made) if made else NOTHING
-
     def moved(self, active: Sequence[Active]) -> np.ndarray:
         """Values (elements,) less what effects add to the responses at edges."""
         if not self.edges or not any(a.effect.name in edge_response.SHOWN for a in active):
@@ -107,7 +137,10 @@ class CommandView:
         return out
 
     def power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
-        """Expected power (elements,), the floor's own uncertainty found anew, and what that costs."""
+        """Expected power (elements,) with the floor's correction fitted anew, and what that costs, nats.
+
+        wide: the floor is as uncertain as random effects make it (WIDE).
+        """
         if not self.spectra:
             return self.floor, 0.0
         ratio = self.loop.ratio(active)
@@ -115,13 +148,13 @@ class CommandView:
 
     def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
         """`power` where that of the commands is a multiple (bins, AXES) of nominal flights'."""
-        made, cost = [], 0.0
+        powers, cost = [], 0.0
         for s in self.sizes:
-            wrong, price, _, _ = self._shift(s, ratio, wide)
-            cost += price
-            made.append(np.broadcast_to(self.loop.floor * ratio * np.exp(wrong), s.shape).ravel())
-        made.append(np.ones(len(self.edges) * edge_response.COUNT))
-        return np.concatenate(made), cost
+            correction, own_cost, _, _ = self._shift(s, ratio, wide)
+            cost += own_cost
+            powers.append(np.broadcast_to(self.loop.floor * ratio * np.exp(correction), s.shape).ravel())
+        powers.append(np.ones(len(self.edges) * edge_response.COUNT))
+        return np.concatenate(powers), cost
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
         """By how much the logarithm of the expected power rises (bins, axes) from one hypothesis to another."""
@@ -130,8 +163,10 @@ class CommandView:
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood for k parameters, each of which lets the log power
-        `rise`."""
+        """Gradient (k,) and information (k, k) of the likelihood for k parameters.
+
+        rise (k, bins, AXES): of the logarithm of the power by each of them.
+        """
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
         if not rise.any():
@@ -152,8 +187,8 @@ class CommandView:
         """Log likelihood of the spectra where power is expected to be a multiple of the floor, less what that costs."""
         total = 0.0
         for s in self.sizes:
-            wrong, cost, _, _ = self._shift(s, ratio, wide)
-            power = self.loop.floor * ratio * np.exp(wrong)
+            correction, cost, _, _ = self._shift(s, ratio, wide)
+            power = self.loop.floor * ratio * np.exp(correction)
             tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
             total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + cost
         return total
@@ -193,6 +228,8 @@ def _push(over, factor):
     return out
 
 
-def _shape(spectra: np.ndarray) -> tuple[int, int]:
-    """Bins and axes of spectra (blocks, bins, axes)."""
-    return spectra.shape[1], spectra.shape[2]
+def _joined(parts: Sequence[Elements]) -> Elements:
+    """Elements one after another."""
+    empty = Elements(values=np.zeros(0, complex), floor=np.zeros(0), channel=np.zeros(0, int), frequency=np.zeros(0),
+                     flight=np.zeros(0, int), freedom=np.zeros(0))
+    return Elements(*(np.concatenate(arrays) for arrays in zip(empty, *parts, strict=True)))

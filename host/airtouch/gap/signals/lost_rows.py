@@ -15,12 +15,11 @@ from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import Response, TorqueSpectra
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, squared
+from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, blocks, squared
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SHIFTS = 12  #: places along the flight at which the pattern of lost rows is tried
-WIDTH = 1.5  #: bins over which the power is averaged, Gaussian, as that of the floor is
+SHIFTS = 12  #: places along the flight at which the pattern of lost rows is tried; chosen
 
 
 def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active], first: np.ndarray,
@@ -52,7 +51,7 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
             spectrum = response.with_residual(spectrum, quiet[room], torque)
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1
-    return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")
+    return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], SMOOTH, axis=1, mode="nearest")
 
 
 def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], kept: dict | None = None,

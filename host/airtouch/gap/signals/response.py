@@ -17,26 +17,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.loop.closed_loop import Change
 from airtouch.gap.loop.disturbed import Disturbed
+from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.spectra import squared
 
-FIRST_BIN = 2  #: below it lie the means, which the window spreads over two bins: there q is 1
-QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows
-STEPPED = 2.0  #: times the nominal power of the commanded torque, from which a set-point stepped
-CALM = 0.25  #: fraction of a flight's blocks that hold no step
+FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
+QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
+STEPPED = 2.0  #: times the nominal power of the commanded torque, from which a set-point stepped; chosen
+CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
 ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
-FEWEST = 8  #: blocks of nominal flights that a law needs
-SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages over frequency
+FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
+SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages over frequency; chosen
 #: Relative error of the loop model in that change of the transfer function which the command's limits make. It is the
 #: error in pairs of simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each.
 CUT_DOUBT = 0.3
 #: Relative error of the loop model in the commands that answer a torque. It is the error in eight pairs of simulated
 #: flights with and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz).
 ANSWER_DOUBT = 0.2
-SHARE_DOUBT = 0.2  #: difference of `transfer` and the loop model in simulated flights of its own loop
-NOISE = 0.2  #: coherence up to which a transfer is the gyro's noise in both, and not believed
+#: Difference of `transfer` and the loop model in simulated flights of its own loop, by twelve pairs of flights
+#: (looks.md, 2026-11-24).
+SHARE_DOUBT = 0.2
+NOISE = 0.2  #: coherence up to which a transfer is the gyro's noise in both, and not believed; chosen
+TINY = 1e-30  #: least power that is divided by, far below any measured
 
 
 @dataclass(frozen=True)
@@ -124,15 +127,15 @@ class Response:
                       change: Change | None = None) -> np.ndarray:
         """Spectra (blocks, bins, COUNT) of the gap, their torque above the means by the laws; NaN where none is known.
 
-        spectra: measured minus modelled with all effects. quiet (blocks, 3): see there. change: by effects that change
-        the loop.
+        spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
+        change: by effects that change the loop.
         """
         residual = self.steady.residual(torque, change, 0)
-        odd = np.flatnonzero(~quiet.all(axis=1))  # blocks in which a set-point stepped on some axis
-        if len(odd):
+        with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
+        if len(with_step):
             stepped = np.array(np.nan) if self.stepped is None else \
-                self.stepped.residual(torque.of_blocks(odd), change, 1)
-            residual[odd] = np.where(quiet[odd, None], residual[odd], stepped)
+                self.stepped.residual(torque.of_blocks(with_step), change, 1)
+            residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
         out = spectra.copy()
         out[:, FIRST_BIN:, TORQUE] = residual[:, FIRST_BIN:]
         return out
@@ -145,7 +148,7 @@ class Response:
     def doubt(self, quiet: np.ndarray, modelled: np.ndarray, change: Change) -> np.ndarray:
         """Power (blocks, bins, 3) that the residual may have because steps, and what the limits cut of them, differ.
 
-        quiet (blocks, 3): see there; modelled: torque of the commands (blocks, bins, 3).
+        quiet (blocks, 3): whether no set-point stepped; modelled: torque of the commands (blocks, bins, 3).
         """
         law = self.stepped
         if law is None:
@@ -184,29 +187,30 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
         stepped, _ = _law(y, w, ~quiet, loop, floor)
-    return Response(_smooth(nominal), calm, steady, stepped)
+    return Response(nominal=_smooth(nominal), calm=calm, steady=steady, stepped=stepped)
 
 
 def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
          ) -> tuple[Law, np.ndarray]:
-    """Law of the chosen blocks (blocks, 3), and their floor (bins, 3). floor: to which they are weighted, or their own.
+    """Law of the chosen blocks (blocks, 3), and their floor (bins, 3).
 
-    y, w: measured and modelled torque of all blocks.
+    y, w: measured and modelled torque of all blocks. floor: to which the law weights them; None for their own.
     """
     mask, count = chosen[:, None], np.maximum(chosen.sum(axis=0), 1)
     power = (np.abs(w) ** 2 * mask).sum(axis=0) / count
-    share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, 1e-30)
-    coherence = _smooth(np.abs(share) ** 2 * power / np.maximum((np.abs(y) ** 2 * mask).sum(axis=0) / count, 1e-30))
+    share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, TINY)
+    coherence = _smooth(np.abs(share) ** 2 * power / np.maximum((np.abs(y) ** 2 * mask).sum(axis=0) / count, TINY))
     transfer = _smooth(share.real) + 1j * _smooth(share.imag)
     coherent = transfer * np.clip((coherence - NOISE) / NOISE, 0.0, 1.0)
-    own = np.exp(_smooth(np.log(np.maximum((np.abs(y - coherent * w) ** 2 * mask).sum(axis=0) / count, 1e-30))))
+    own = np.exp(_smooth(np.log(np.maximum((np.abs(y - coherent * w) ** 2 * mask).sum(axis=0) / count, TINY))))
     enough = chosen.sum(axis=0) >= FEWEST
     weight = np.ones(own.shape) if floor is None else np.where(enough, np.sqrt(floor / own), np.nan)
     answer = coherent * loop.commanded
     disturbance = loop.measured - answer
     random = np.abs(disturbance) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2
     bounded = coherent / np.maximum(np.abs(coherent), 1.0)
-    return Law(transfer, coherent, bounded, disturbance, random, weight, _smooth(power)), own
+    return Law(transfer=transfer, coherent=coherent, bounded=bounded, disturbance=disturbance, random=random,
+               weight=weight, power=_smooth(power)), own
 
 
 def _quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.ndarray:
@@ -221,7 +225,7 @@ def _quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.nd
 
 def _sizes(modelled: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the nominal one, where a step shows."""
-    return (np.abs(modelled) ** 2 / np.maximum(nominal, 1e-30))[:, QUIET_BINS].mean(axis=1)
+    return (np.abs(modelled) ** 2 / np.maximum(nominal, TINY))[:, QUIET_BINS].mean(axis=1)
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

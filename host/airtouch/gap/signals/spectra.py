@@ -5,24 +5,30 @@ value over the floor's standard deviation is one standard normal number (real an
 imaginary part each) when nothing is wrong.
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
-from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
 
 AIR, REST = "air", "ground"
-LENGTH = {AIR: 256, REST: 24}  #: samples
+LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
-MOST_LOST = 0.1  #: share of lost rows that a block may have
+MOST_LOST = 0.1  #: share of lost rows that a block may have; chosen
 HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
-LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted
-TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
+LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted; chosen
+#: Hz, below which torque and rate hold the trim of a flight, which does not go with how hard it is flown: the lowest
+#: band of `hardness.BANDS_HZ`; chosen.
+TRIM_HZ = 0.6
+FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
+UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
+LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
+SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floor over frequency; chosen
 
 
 def starts(flight: Flight, regime: str) -> np.ndarray:
@@ -30,16 +36,8 @@ def starts(flight: Flight, regime: str) -> np.ndarray:
     length = LENGTH[regime]
     good = flight.on_ground if regime == REST else (flight.phase != GROUND) & ~flight.on_ground
     near = good & (flight.usable | flight.bridged)
-    found, k = [], 0
-    bad = np.cumsum(np.concatenate([[0], ~near]))
-    lost = np.cumsum(np.concatenate([[0], flight.bridged]))
-    while k + length <= len(flight):
-        if bad[k + length] == bad[k] and lost[k + length] - lost[k] <= MOST_LOST * length:
-            found.append(k)
-            k += length // 2
-        else:
-            k += 1
-    return np.array(found, int)
+    may_begin = (count_within(~near, length) == 0) & (count_within(flight.bridged, length) <= MOST_LOST * length)
+    return half_overlapping(may_begin, length)
 
 
 def frequencies(regime: str) -> np.ndarray:
@@ -55,7 +53,7 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     length = LENGTH[regime]
     if not len(first):
         return np.zeros((0, length // 2 + 1, values.shape[1]), complex)
-    window, scale = _window(length)
+    window, scale = hann_window(length)
     cut = values[first[:, None] + np.arange(length)]
     cut *= window
     spectrum = np.fft.rfft(cut, axis=1)
@@ -64,13 +62,6 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     if length % 2 == 0:
         spectrum[:, -1] /= np.sqrt(2.0)
     return spectrum
-
-
-@functools.cache
-def _window(length: int) -> tuple[np.ndarray, float]:
-    """A Hann window (length, 1), and what makes of a spectrum under it one of unit/sqrt(Hz)."""
-    window = np.hanning(length + 1)[:-1]
-    return window[:, None], np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
 
 
 def squared(values: np.ndarray) -> np.ndarray:
@@ -84,13 +75,12 @@ def judged(regime: str) -> np.ndarray:
     In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
     """
     f = frequencies(regime)[:, None]
-    keep = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
+    in_band = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
     if regime == REST:
         force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
-        keep = np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
-    else:
-        keep[:, COLUMN["rate_z"]] = False
-    return keep
+        return np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
+    in_band[:, COLUMN["rate_z"]] = False
+    return in_band
 
 
 @dataclass(frozen=True)
@@ -129,28 +119,39 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
     its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT) that lost rows add in the
     air; it is taken off, as each flight has its own, but for what is left by chance.
     """
-    power, count, slopes = {}, {}, None
-    for regime in (AIR, REST):
-        every = np.concatenate([s[regime] for s in spectra]) if spectra else np.zeros((0, 1, COUNT))
-        sensor = sensor_power(least, regime)
-        count[regime] = len(every)
-        if len(every) >= 4:
-            each = np.abs(every) ** 2
-            if regime == AIR:
-                hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR])
-                                           for f, s in zip(flights, first, strict=True)])
-                trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= 3)
-                slopes = slopes_of(each, hardness, frequencies(AIR), trim)
-                level = slopes.level(hardness)
-                each = np.maximum(each - np.concatenate(bridging), LEAST_LEFT * each) / level
-            mean = np.nan_to_num(np.nanmean(each, axis=0))
-            power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
-        else:
-            power[regime] = 2.0 * sensor
+    powers = {r: np.abs(np.concatenate([s[r] for s in spectra])) ** 2 if spectra else np.zeros((0, 1, COUNT))
+              for r in (AIR, REST)}
+    in_air, slopes = _power_in_air(flights, first, powers[AIR], bridging)
+    power = {AIR: _floor_power(in_air, sensor_power(least, AIR)),
+             REST: _floor_power(powers[REST], sensor_power(least, REST))}
     offset, own = _between(flights, residuals, power[AIR][0])
     clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
     lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
-    return Floor(power, count, offset, float(clock), lost, slopes, 0.5 * sensor_power(least, AIR), own)
+    return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, clock_s=float(clock),
+                 lost=lost, slopes=slopes, least=LEAST_FLOOR * sensor_power(least, AIR), offset_beyond=own)
+
+
+def _power_in_air(flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]], power: np.ndarray,
+                  bridging: Sequence[np.ndarray]) -> tuple[np.ndarray, Slopes | None]:
+    """Power (blocks, bins, COUNT) as if all blocks were flown alike, and its slopes with how hard they are flown.
+
+    power: of all blocks in the air; bridging: what lost rows add to them, taken off. As it is, without slopes, for too
+    few blocks.
+    """
+    if len(power) < FEWEST_BLOCKS:
+        return power, None
+    hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR]) for f, s in zip(flights, first, strict=True)])
+    trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= TORQUE.start)
+    slopes = slopes_of(power, hardness, frequencies(AIR), trim)
+    own = np.maximum(power - np.concatenate(bridging), LEAST_LEFT * power)
+    return own / slopes.level(hardness), slopes
+
+
+def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
+    """Power (bins, COUNT) of the floor from that of nominal blocks (blocks, bins, COUNT) and of the sensors' noise."""
+    if len(power) < FEWEST_BLOCKS:
+        return UNKNOWN_FLOOR * sensor
+    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0))), LEAST_FLOOR * sensor)
 
 
 def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest: np.ndarray,
@@ -163,9 +164,9 @@ def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest:
         return np.zeros(COUNT), np.zeros(COUNT)
     air = [(f.phase != GROUND) & f.usable for f in flights]
     means = np.array([r[a].mean(axis=0) for r, a in zip(residuals, air, strict=True)])
-    seen = np.nan_to_num(means.var(axis=0, ddof=1))
+    variance = np.nan_to_num(means.var(axis=0, ddof=1))
     chance = HANN_POWER * lowest * np.mean([1.0 / max(a.sum() * PERIOD_S, PERIOD_S) for a in air])
-    return np.sqrt(seen), np.sqrt(np.maximum(seen - chance, 0.0))
+    return np.sqrt(variance), np.sqrt(np.maximum(variance - chance, 0.0))
 
 
 def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
@@ -173,12 +174,12 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
     f = frequencies(regime)
     white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
     shape = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2
-    white[:, 3:6] = shape[:, None] * 2.0 * PERIOD_S * (least[3:6] / PERIOD_S) ** 2
+    white[:, TORQUE] = shape[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
     return white
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:
     """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged."""
     out = power.copy()
-    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), 1.5, axis=0, mode="nearest"))
+    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), SMOOTH, axis=0, mode="nearest"))
     return out

@@ -1,0 +1,35 @@
+"""Blocks of a flight, half overlapping, and the Hann window under which their spectra are taken."""
+
+import functools
+
+import numpy as np
+
+from airtouch.gap.flights.flight import PERIOD_S
+
+
+def half_overlapping(may_begin: np.ndarray, length: int) -> np.ndarray:
+    """First samples (blocks,) of blocks of a length, each as early as it may begin half a block after the last.
+
+    may_begin: bool, whether a block may begin there, for each sample that has a block's length behind it.
+    """
+    first, k = [], 0
+    while k < len(may_begin):
+        if may_begin[k]:
+            first.append(k)
+            k += length // 2
+        else:
+            k += 1
+    return np.array(first, int)
+
+
+def count_within(marked: np.ndarray, length: int) -> np.ndarray:
+    """Number of marked samples, bool (n,), in each block of a length that the samples hold, by its first sample."""
+    total = np.cumsum(np.concatenate([[0], marked]))
+    return total[length:] - total[:-length]
+
+
+@functools.cache
+def hann_window(length: int) -> tuple[np.ndarray, float]:
+    """A Hann window (length, 1), and what makes of a spectrum under it one of unit/sqrt(Hz)."""
+    window = np.hanning(length + 1)[:-1]
+    return window[:, None], np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())

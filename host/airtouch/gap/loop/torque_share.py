@@ -1,0 +1,89 @@
+"""The torque-share decision: what part of the torque of logged commands turns the vehicle, with and without effects.
+
+A log at 100 Hz holds one command in five of a 500 Hz loop, so of the torque that the motors make of logged commands
+only a share, by frequency and axis, is in the rotation. For roll and pitch `axis_torque` has that share from the loop
+model, level and where a set-point stepped; `change_of` compares the shares with and without effects. Yaw has no model:
+its share is 1.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from airtouch.gap.loop.axis_plant import AxisPlant
+from airtouch.gap.loop.disturbed import logged_over_flown
+from airtouch.gap.loop.loop_model import AxisLoop, torque_per_command
+from airtouch.gap.loop.turning import NO_STEP, Step, step_under, turning_beside_command, turnings_per_command
+
+SMOOTH = 2.0  #: bins, standard deviation of the Gaussian over frequency: a block's Hann window and `response.SMOOTH`
+#: largest ratio that effects may make of a share; beyond, the loop model is not trusted; chosen
+MOST_CHANGE = 5.0
+
+
+class Change(NamedTuple):
+    """How effects change the torque of a command and the rotation that it causes, effects over without.
+
+    motors, complex (bins, 1): ratio of torque to command. share, complex (2, bins, 3): ratio of the share of the
+    commanded torque that turns the vehicle, level and stepped; before: that share in the loop model without effects.
+    cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
+    logged (bins, 1): `disturbed.logged_over_flown`. unexplained (2, bins, 3): power of the torque that the commands do
+    not explain, without and with effects, (rad/s^2)^2/Hz.
+    """
+
+    motors: np.ndarray
+    share: np.ndarray
+    before: np.ndarray
+    cut: np.ndarray
+    logged: np.ndarray
+    unexplained: np.ndarray
+
+
+class AxisTorque(NamedTuple):
+    """What becomes of the torque of a command about roll or pitch, at some frequencies.
+
+    motors, complex (bins,): torque that the motors make of a command, rad/s^2 per N. shares, complex (3, bins): share
+    of it that turns the vehicle: level, stepped, and stepped if the limits of the command cut as much as in nominal
+    flights. unexplained (bins,): power of the torque that the commands do not explain, (rad/s^2)^2/Hz; 1 for a
+    controller that is not the firmware's.
+    """
+
+    motors: np.ndarray
+    shares: np.ndarray
+    unexplained: np.ndarray
+
+
+def axis_torque(loop: AxisLoop, nominal: AxisPlant, strengths: np.ndarray, nominal_step: Step, f: np.ndarray,
+                ) -> AxisTorque:
+    """The torque of a command at frequencies f (bins,), Hz, in the loop of one axis.
+
+    nominal: plant of the axis without effects, strengths (sources,): of the noise there, nominal_step: of the
+    set-points there.
+    """
+    motors = torque_per_command(loop.firmware, loop.plant, f)
+    step = step_under(nominal_step, loop.controller, nominal, loop.plant)
+    level, stepped, stepped_as_nominal = turnings_per_command(
+        loop.controller, loop.plant, strengths, f, SMOOTH, (NO_STEP, step, nominal_step))
+    unexplained = (turning_beside_command(loop.controller, loop.plant, strengths, f, SMOOTH) if loop.by_firmware
+                   else np.ones(len(f)))
+    return AxisTorque(motors, np.stack([level, stepped, stepped_as_nominal]) / motors, unexplained)
+
+
+def change_of(loop: AxisLoop, before: Sequence[AxisTorque], after: Sequence[AxisTorque], f: np.ndarray) -> Change:
+    """Change from the torques of roll and pitch without effects to those with them, at frequencies f (bins,), Hz.
+
+    loop: of roll without effects. A controller no faster than the log folds nothing: there the motors alone count.
+    """
+    share_before, share_after = _with_yaw([x.shares for x in before]), _with_yaw([x.shares for x in after])
+    share = share_after / share_before if loop.by_firmware else np.ones_like(share_before)
+    share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
+    _, stepped, stepped_as_nominal = share
+    return Change(
+        motors=(after[0].motors / before[0].motors)[:, None], share=share[:2], before=share_before[:2],
+        cut=np.abs(stepped - stepped_as_nominal), logged=logged_over_flown(loop.firmware, f)[:, None],
+        unexplained=np.stack([_with_yaw([x.unexplained for x in torques]) for torques in (before, after)]))
+
+
+def _with_yaw(roll_and_pitch: Sequence[np.ndarray]) -> np.ndarray:
+    """Values (..., bins, 3) of roll, pitch and yaw from those of roll and pitch, (..., bins) each; 1 in yaw."""
+    return np.stack([*roll_and_pitch, np.ones_like(roll_and_pitch[0])], axis=-1)
