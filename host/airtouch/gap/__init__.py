@@ -37,7 +37,8 @@ Where each decision is made; a folder imports only those above it:
 - `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
   intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
   `advice`; `words`, `pictures`.
-- `balance`, flights without a gyro: `hover_balance`, `balance_result`.
+- `balance`, flights without a gyro: the `hover_pattern` of a flight, `hover_hypotheses` drawn from `priors`, their
+  evidence by `hover_balance`; `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what
