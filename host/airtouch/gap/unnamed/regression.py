@@ -57,17 +57,21 @@ class HalfResiduals:
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:
-        """Power of residuals over the expected power, freedom, tail and group of the values that are known."""
+        """Powers of the residuals (elements,) whose values are known."""
         known = self.problem.known
         over = squared(residuals[known]) / self.power[known]
-        return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
+        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.groups[known])
+
+    def without_columns(self, fitted: np.ndarray, floor: UnnamedFloor) -> np.ndarray:
+        """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each cell."""
+        residuals = self.values.copy()
+        for cell in self.cells:
+            residuals[cell.own], _ = self.without(cell, fitted[cell.channel], floor)
+        return residuals
 
     def floor_powers(self, floor: UnnamedFloor) -> Powers:
         """`powers` without what nominal flights may have of the columns."""
-        residuals = self.values.copy()
-        for cell in self.cells:
-            residuals[cell.own] = self.without(cell, np.zeros(WIDEST), floor)[0]
-        return self.powers(residuals)
+        return self.powers(self.without_columns(np.zeros((CHANNELS, WIDEST)), floor))
 
 
 def coefficients(half: HalfResiduals, channel: int, floor: UnnamedFloor, among: np.ndarray | None = None) -> np.ndarray:
