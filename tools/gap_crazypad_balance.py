@@ -3,7 +3,7 @@
     python tools/gap_crazypad_balance.py [FOLDER] [--part build|all]
 
 One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, by their labels. The residual
-is how a vehicle differs that was worked on: another set of propellers, for the most part. `Priors.maintenance` is this
+is how a vehicle differs after maintenance: another set of propellers, for the most part. `Priors.maintenance` is this
 scatter in the building conditions. Then
 - a test of the rotor that knows how many rotors were cut, how much of each, and change and scatter of the other
   conditions; it only chooses which rotors. Severity is then measured along the right rotors' change.

@@ -123,7 +123,7 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
     return floors
 
 
-def floor_of(floors: Floors, phase: int) -> tuple[np.ndarray, np.ndarray]:
+def phase_floor(floors: Floors, phase: int) -> tuple[np.ndarray, np.ndarray]:
     """The floor of a phase and its upper end; where no nominal flight has it, that of AIR or of the ground."""
     return floors[phase] if phase in floors else floors[GROUND if phase == GROUND else AIR]
 

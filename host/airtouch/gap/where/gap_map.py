@@ -22,7 +22,7 @@ from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
-from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floor_of, floors_of, spreads_of, table_of
+from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, phase_floor, floors_of, spreads_of, table_of
 from airtouch.gap.where.summary import TINY, significant, sure_ratio
 from airtouch.logs.segments import KINDS
 
@@ -90,7 +90,7 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     no_gyro = not any(p.has_gyro for p in parts)
     cells: list[Cell] = []
     for phase in range(len(KINDS)):
-        tables = _phase_tables(phase, joined, after, alone, floor_of(floors, phase), effects)
+        tables = _phase_tables(phase, joined, after, alone, phase_floor(floors, phase), effects)
         if tables is not None:
             cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
