@@ -22,7 +22,7 @@ from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
-from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, phase_floor, floors_of, spreads_of, table_of
+from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.summary import TINY, significant, sure_ratio
 from airtouch.logs.segments import KINDS
 
