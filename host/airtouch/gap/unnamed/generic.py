@@ -36,8 +36,8 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
                            for channel in range(CHANNELS)])
         for channel in range(CHANNELS):
             linear += linear_gain(held_out, channel, fitted[channel], floor)
-        powers = (half.powers(half.without_columns(fitted, floor)) for half in (trained, held_out))
-        power += power_gain(*powers, floor, data.study.simulated)
+        powers = [half.powers(half.without_columns(fitted, floor)) for half in (trained, held_out)]
+        power += power_gain(powers[0], powers[1], floor, data.study.simulated)
     return linear, power
 
 
