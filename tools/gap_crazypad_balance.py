@@ -209,7 +209,7 @@ def show_family(b: Balances) -> None:
     kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
              "added weight": [h.change for h in candidates if h.name == "mass"],
              "slung load": [h.change for h in candidates if h.name == "slung_load"]}
-    print(f"\nthe diagnosis on {FLIGHTS} drawn flights of each family, which are drawn from its priors")
+    print(f"\nthe diagnosis on {FLIGHTS} flights of each family, drawn from its priors")
     for drone, base in b.bases.items():
         reference = hover_balance.Reference(np.zeros(6), base.variance, np.zeros(2))
         balance_variance, power_variance = base.variance[hover_balance.BALANCE], base.variance[hover_balance.POWER]
