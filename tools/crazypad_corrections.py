@@ -10,33 +10,38 @@ from scipy.optimize import least_squares
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
+from airtouch.gap.balance.hover_pattern import hover_pattern
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_labels import VEHICLE, family, manifest
+
+POWER_NAMES = ("unsteady", "heave")  #: of the powers of a `HoverPattern`, as they are printed
 
 
 def show_corrections(folder: Path) -> None:
     """Print the fit of `hover_balance.ANSWER` to both drones and to each, and the rest of the powers by family."""
     rows = manifest(folder, "build")
     vehicle = vehicles.load(VEHICLE)
-    table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
+    patterns = [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
+    power, corrections = np.array([p.power for p in patterns]), np.array([p.corrections for p in patterns])
     drone = np.array([r["drone"] for r in rows])
-    for k, power_name in enumerate(hover_balance.NAMES[4:6]):
+    for k, power_name in enumerate(POWER_NAMES):
         for names in (sorted(set(drone)), *([d] for d in sorted(set(drone)))):
             masks = [drone == d for d in names]
-            powers, corrections = [table[m, 4 + k] for m in masks], [10.0 ** table[m, 6 + k] for m in masks]
-            factor, before, after = corrections_fit(powers, corrections, float(np.log10(hover_balance.ANSWER[k])))
+            powers, variances = [power[m, k] for m in masks], [10.0 ** corrections[m, k] for m in masks]
+            factor, before, after = corrections_fit(powers, variances, float(np.log10(hover_balance.ANSWER[k])))
             print(f"{power_name}, {' and '.join(names)}: 10^{factor:.2f} for one (m/s)^2; deviation between flights "
                   f"{before.std():.2f}, left {after.std():.2f} ({len(before)} flights)")
     normal = np.array([family(r["condition"]) == "normal" for r in rows])
-    bases = {d: hover_balance.reference(table[normal & (drone == d)]) for d in set(drone)}
-    excess = np.array([bases[d].difference(p)[4:] for d, p in zip(drone, table, strict=True)])
+    bases = {d: hover_balance.reference([patterns[i] for i in np.flatnonzero(normal & (drone == d))])
+             for d in set(drone)}
+    excess = np.array([bases[d].difference(p)[hover_balance.POWER] for d, p in zip(drone, patterns, strict=True)])
     for families in (["rotor damage"], ["added weight", "slung load"]):
         pairs = sorted({(r["condition"], r["drone"]) for r in rows if family(r["condition"]) in families})
         means = np.array([np.mean([a for a, r in zip(excess, rows, strict=True)
                                    if (r["condition"], r["drone"]) == pair], axis=0) for pair in pairs])
         print(f"{' and '.join(families)}, left over the normal flights, {len(pairs)} conditions: " + ", ".join(
-            f"{n} {m:.2f} +- {s:.2f}" for n, m, s in zip(hover_balance.NAMES[4:6], means.mean(axis=0),
+            f"{n} {m:.2f} +- {s:.2f}" for n, m, s in zip(POWER_NAMES, means.mean(axis=0),
                                                          means.std(axis=0, ddof=1), strict=True)))
 
 

@@ -5,7 +5,7 @@
 
 FOLDER holds the flights and their manifest.csv. The label is read after the diagnosis. With
 --json, cases that the file holds already are not diagnosed again. What the diagnosis
-believes beforehand (`hover_balance.Beliefs`) was chosen with these conditions in view;
+takes as known beforehand (`priors.Priors`) was chosen with these conditions in view;
 --leave-one-out chooses it anew for each condition, from a grid, by the others alone.
 --corrections fits how unsteadiness and heave follow the corrections of the estimated velocity
 (`hover_balance.ANSWER`), on the building part: all but every fourth condition.
@@ -24,6 +24,9 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
+from airtouch.gap.balance.hover_hypotheses import hypotheses
+from airtouch.gap.balance.hover_pattern import HoverPattern, hover_pattern
+from airtouch.gap.balance.priors import PRIORS, STEADY, Priors
 from airtouch.gap.diagnose import diagnose
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
@@ -31,10 +34,10 @@ from crazypad_corrections import show_corrections
 from crazypad_figures import balanced, exact_rotors, show
 from crazypad_labels import VEHICLE, family, manifest
 
-SAME: Any = hover_balance.STEADY  #: unsteadiness and heave that do not tell a damage
-#: beliefs to choose from, round numbers below and above those of `hover_balance.BELIEFS`
-GRID = [hover_balance.Beliefs(own=own, worked_on=(*hover_balance.BELIEFS.worked_on[:3], yaw), hung=hung, **manner)
-        for own, yaw, hung, manner in itertools.product(
+SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
+#: priors to choose from, round numbers below and above those of `PRIORS`
+GRID = [Priors(nominal_flights=n, maintenance=(*PRIORS.maintenance[:3], yaw), slung_mass=slung, **power)
+        for n, yaw, slung, power in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
             ({}, {"damaged": SAME}))]
 ROTOR_WEIGHT = 0.3  #: of the share of rotors named exactly beside the balanced accuracy; no source: round number
@@ -68,11 +71,11 @@ def cases(folder: Path, store: Path | None) -> list[dict]:
 
 
 def cross_validated(folder: Path) -> list[dict]:
-    """Cases of all flights, each condition with the beliefs of GRID that do best on the other conditions."""
+    """Cases of all flights, each condition with the priors of GRID that do best on the other conditions."""
     rows = manifest(folder, "all")
     vehicle = vehicles.load(VEHICLE)
-    patterns = [hover_balance.pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
-    tables = [_diagnosed(rows, patterns, vehicle, beliefs) for beliefs in GRID]
+    patterns = [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
+    tables = [_diagnosed(rows, patterns, vehicle, priors) for priors in GRID]
     out = []
     for condition in sorted({r["condition"] for r in rows}):
         others = [[c for c in table if c["condition"] != condition] for table in tables]
@@ -81,24 +84,24 @@ def cross_validated(folder: Path) -> list[dict]:
     return out
 
 
-def _diagnosed(rows: list[dict], patterns: list[np.ndarray], vehicle: vehicles.Vehicle,
-               beliefs: hover_balance.Beliefs) -> list[dict]:
-    """Cases of all flights with these beliefs, by `hover_balance` alone. patterns: (8,) of each flight."""
-    hypotheses, out = hover_balance.hypotheses(vehicle, beliefs), []
+def _diagnosed(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles.Vehicle,
+               priors: Priors) -> list[dict]:
+    """Cases of all flights with these priors, by `hover_balance` alone. patterns: of each flight."""
+    candidates, out = hypotheses(vehicle, priors), []
     for row, pattern in zip(rows, patterns, strict=True):
-        base = np.array([p for r, p in zip(rows, patterns, strict=True) if r["drone"] == row["drone"]
-                         and family(r["condition"]) == "normal" and r["file"] != row["file"]])
-        nominal = hover_balance.reference(base, beliefs)
-        logs, weights = hover_balance.evidence(pattern, nominal, hypotheses, beliefs)
+        base = [p for r, p in zip(rows, patterns, strict=True) if r["drone"] == row["drone"]
+                and family(r["condition"]) == "normal" and r["file"] != row["file"]]
+        nominal = hover_balance.reference(base, priors)
+        logs, weights = hover_balance.evidence(pattern, nominal, candidates, priors)
         likelihoods = np.exp(logs - logs.max())
         total: dict[str, float] = {}
-        for h, p in zip(hypotheses, likelihoods, strict=True):
+        for h, p in zip(candidates, likelihoods, strict=True):
             name = "mass" if h.name == "com_offset" else h.name
             total[name] = total.get(name, 0.0) + p
         first = max(total, key=total.__getitem__)
-        i = max((i for i, h in enumerate(hypotheses) if h.name == first), key=logs.__getitem__)
+        i = max((i for i, h in enumerate(candidates) if h.name == first), key=logs.__getitem__)
         effects = [{"name": n, "parameters": {k: {"value": float(weights[i] @ v)} for k, v in samples.items()}}
-                   for n, samples in hypotheses[i].effects]
+                   for n, samples in candidates[i].effects]
         verdict = first if first in ("none", "unknown") else "effect"
         out.append({**row, "verdict": verdict, "effects": effects})
     return out
@@ -110,7 +113,7 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", type=Path, help="with a manifest.csv (FLIGHTS/crazypad)",
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
     parser.add_argument("--json", type=Path, help="cases already done are read from here, new ones appended")
-    parser.add_argument("--leave-one-out", action="store_true", help="also with beliefs chosen by the others")
+    parser.add_argument("--leave-one-out", action="store_true", help="also with priors chosen by the others")
     parser.add_argument("--corrections", action="store_true", help="only fit the answer to corrections of the estimate")
     options = parser.parse_args()
     if not (options.folder / "manifest.csv").is_file():
@@ -121,7 +124,7 @@ def main() -> None:
     start = time.time()
     show(cases(options.folder, options.json))
     if options.leave_one_out:
-        print("\nBeliefs chosen without the condition judged:")
+        print("\nPriors chosen without the condition judged:")
         show(cross_validated(options.folder))
     print(f"{time.time() - start:.0f} s")
 

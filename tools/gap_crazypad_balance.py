@@ -3,11 +3,11 @@
     python tools/gap_crazypad_balance.py [FOLDER] [--part build|all]
 
 One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, by their labels. The residual
-is how a vehicle differs that was worked on: another set of propellers, for the most part. `Beliefs.worked_on` is this
+is how a vehicle differs after maintenance: another set of propellers, for the most part. `Priors.maintenance` is this
 scatter in the building conditions. Then
 - a test of the rotor that knows how many rotors were cut, how much of each, and change and scatter of the other
   conditions; it only chooses which rotors. Severity is then measured along the right rotors' change.
-- the diagnosis itself on drawn flights whose changes and scatter are what it believes: no test on the same six
+- the diagnosis itself on drawn flights whose changes and scatter are those of its priors: no test on the same six
   numbers is right more often in the mean of the families. Cut rotors are drawn from the conditions of at least 1.5 mm.
 """
 
@@ -27,13 +27,16 @@ import crazypad_figures as figures
 import crazypad_labels as labels
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
+from airtouch.gap.balance.hover_hypotheses import Hypothesis, commanded_change, hypotheses
+from airtouch.gap.balance.hover_pattern import LEAST_POWER, HoverPattern, hover_pattern
+from airtouch.gap.balance.priors import PRIORS, STEADY
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 
 DRAWS = 4000  #: of the scatter, for the expected share of right rotors; no source: round number, good to 0.01
 FLIGHTS = 400  #: drawn of each family; no source: round number, good to 0.03
 SMALL = 2.0  #: times the variance of one set of propellers in each axis: what two sets differ by
-WORKED_ON_MOST = 0.1  #: upper bound of the scatter of vehicles that were worked on; no source: far above what was found
+MOST_MAINTENANCE = 0.1  #: upper bound of the scatter of vehicles after maintenance; no source: far above what was found
 #: the balance's four numbers, as they are printed
 AXES = "lift, roll, pitch, yaw"
 Condition = tuple[str, str]  #: drone and what was done to it
@@ -48,8 +51,7 @@ def change(cut: dict[int, float], slope: float, yaw: float) -> np.ndarray:
     command = np.ones(4)
     for rotor, mm in cut.items():
         command[rotor - 1] += slope * mm
-    mixed = hover_balance.MIX @ command
-    return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0] * (1.0, 1.0, yaw))])
+    return commanded_change(command[None])[0] * (1.0, 1.0, 1.0, yaw)
 
 
 def fitted(means: np.ndarray, cuts: list[dict[int, float]]) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +64,7 @@ def fitted(means: np.ndarray, cuts: list[dict[int, float]]) -> tuple[np.ndarray,
     return solution, residuals(solution)
 
 
-def worked_on(residuals: np.ndarray, nominal: np.ndarray, freedom: float) -> np.ndarray:
+def maintenance(residuals: np.ndarray, nominal: np.ndarray, freedom: float) -> np.ndarray:
     """Scatter (4,) beside the nominal variances (conditions, 4) that makes the residuals (conditions, 4) likeliest.
 
     Roll and pitch have one, as the vehicle is symmetric; the tail is Student's, as the diagnosis takes it.
@@ -73,7 +75,7 @@ def worked_on(residuals: np.ndarray, nominal: np.ndarray, freedom: float) -> np.
             """Minus the log likelihood of a scatter."""
             width = np.sqrt(nominal[:, columns] + extra ** 2)
             return -float((student.logpdf(residuals[:, columns] / width, freedom) - np.log(width)).sum())
-        return float(minimize_scalar(minus_log, bounds=(0.0, WORKED_ON_MOST), method="bounded").x)
+        return float(minimize_scalar(minus_log, bounds=(0.0, MOST_MAINTENANCE), method="bounded").x)
 
     sides = scatter([1, 2])
     return np.array([scatter([0]), sides, sides, scatter([3])])
@@ -88,11 +90,11 @@ class Balances:
     def __init__(self, folder: Path, part: str) -> None:
         rows = labels.manifest(folder, part)
         self.vehicle = vehicles.load(labels.VEHICLE)
-        table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle)
-                          for r in rows])
+        patterns = [hover_pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle) for r in rows]
         drone, normal = [r["drone"] for r in rows], np.array([labels.family(r["condition"]) == "normal" for r in rows])
-        self.bases = {d: hover_balance.reference(table[normal & (np.array(drone) == d)]) for d in sorted(set(drone))}
-        self.difference = np.array([self.bases[d].difference(p) for d, p in zip(drone, table, strict=True)])
+        self.bases = {d: hover_balance.reference([patterns[i] for i in np.flatnonzero(normal & (np.array(drone) == d))])
+                      for d in sorted(set(drone))}
+        self.difference = np.array([self.bases[d].difference(p) for d, p in zip(drone, patterns, strict=True)])
         self.of = [(r["drone"], r["condition"]) for r in rows]
         self.pairs = sorted({p for p in self.of if np.isfinite(labels.cut_mm(p[1]))})
         self.cuts = [labels.millimetres(condition) for _, condition in self.pairs]
@@ -100,21 +102,21 @@ class Balances:
 
     def own(self, pair: Condition) -> np.ndarray:
         """Differences (flights, 4) of one condition."""
-        return self.difference[[p == pair for p in self.of], :4]
+        return self.difference[[p == pair for p in self.of], hover_balance.BALANCE]
 
 
 def show_scatter(b: Balances) -> None:
-    """Print the fit, the rms of its residuals, and the `worked_on` that follows."""
+    """Print the fit, the rms of its residuals, and the `maintenance` scatter that follows."""
     (slope, yaw), residuals = fitted(b.means, b.cuts)
     each = [b.own(p) - b.own(p).mean(axis=0) for p in sorted(set(b.of))]
     within = np.sqrt((np.concatenate(each) ** 2).sum(axis=0) / sum(len(e) - 1 for e in each))
     print(f"{len(b.pairs)} conditions with cut blades: {100 * slope:.1f} % more told to a rotor for each mm, "
           f"yaw {yaw:.2f} of what follows from it")
-    beliefs = hover_balance.BELIEFS
-    nominal = np.array([b.bases[drone].variance[:4] for drone, _ in b.pairs])
+    nominal = np.array([b.bases[drone].variance[hover_balance.BALANCE] for drone, _ in b.pairs])
     for text, values in (("between flights of a condition", within),
                          ("left of the conditions, rms", np.sqrt((residuals ** 2).mean(axis=0))),
-                         ("worked_on that makes these likeliest", worked_on(residuals, nominal, beliefs.freedom))):
+                         ("scatter by maintenance that makes these likeliest",
+                          maintenance(residuals, nominal, PRIORS.freedom))):
         print(f"{text}, {AXES}: " + ", ".join(f"{100 * v:.1f} %" for v in values))
 
 
@@ -200,39 +202,39 @@ def _nearest(balances: np.ndarray, rivals: np.ndarray) -> np.ndarray:
 
 
 def show_family(b: Balances) -> None:
-    """Print how often the diagnosis is right on drawn flights of each family that are as it believes."""
-    generator, beliefs = np.random.default_rng(0), hover_balance.BELIEFS
-    hypotheses = hover_balance.hypotheses(b.vehicle)
+    """Print how often the diagnosis is right on drawn flights of each family that are drawn from its priors."""
+    generator, candidates = np.random.default_rng(0), hypotheses(b.vehicle)
     solution, _ = fitted(b.means, b.cuts)
     cuts = np.array([change(c, *solution) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if labels.large(text)])
     kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
-             "added weight": [h.change for h in hypotheses if h.name == "mass"],
-             "slung load": [h.change for h in hypotheses if h.name == "slung_load"]}
-    print(f"\nthe diagnosis on {FLIGHTS} drawn flights of each family, which are as it believes")
+             "added weight": [h.change for h in candidates if h.name == "mass"],
+             "slung load": [h.change for h in candidates if h.name == "slung_load"]}
+    print(f"\nthe diagnosis on {FLIGHTS} flights of each family, drawn from its priors")
     for drone, base in b.bases.items():
         reference = hover_balance.Reference(np.zeros(6), base.variance, np.zeros(2))
+        balance_variance, power_variance = base.variance[hover_balance.BALANCE], base.variance[hover_balance.POWER]
         right = {}
         for kind, (changes,) in kinds.items():
             names = []
             for _ in range(FLIGHTS):
-                pattern = np.concatenate([changes[generator.integers(len(changes))], np.zeros(2),
-                                          np.full(2, hover_balance.LEAST_POWER)])
-                scatter = beliefs.worked_on if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
-                width = np.sqrt(base.variance[:4] + np.array(scatter) ** 2)
-                pattern[:4] += width * generator.standard_t(beliefs.freedom, 4)
-                manner = beliefs.damaged if kind == "rotor damage" else hover_balance.STEADY
-                pattern[4:6] = [generator.normal(m, np.hypot(s, np.sqrt(v)))
-                                for (m, s), v in zip(manner, base.variance[4:], strict=True)]
-                names.append(_family(hover_balance.evidence(pattern, reference, hypotheses, beliefs)[0], hypotheses))
+                balance = changes[generator.integers(len(changes))]
+                scatter = PRIORS.maintenance if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
+                width = np.sqrt(balance_variance + np.array(scatter) ** 2)
+                balance = balance + width * generator.standard_t(PRIORS.freedom, 4)
+                power_change = PRIORS.damaged if kind == "rotor damage" else STEADY
+                power = [generator.normal(m, np.hypot(s, np.sqrt(v)))
+                         for (m, s), v in zip(power_change, power_variance, strict=True)]
+                pattern = HoverPattern(balance, np.array(power), np.full(2, LEAST_POWER))
+                names.append(_family(hover_balance.evidence(pattern, reference, candidates)[0], candidates))
             right[kind] = np.mean([n == kind for n in names])
         print(f"{drone}: family, balanced {np.mean(list(right.values())):.2f}; "
               + ", ".join(f"{k} {v:.2f}" for k, v in right.items()))
 
 
-def _family(logs: np.ndarray, hypotheses: list[hover_balance.Hypothesis]) -> str:
+def _family(logs: np.ndarray, candidates: list[Hypothesis]) -> str:
     """The likeliest family of a log evidence for each hypothesis."""
     chance: dict[str, float] = {}
-    for h, p in zip(hypotheses, np.exp(logs - logs.max()), strict=True):
+    for h, p in zip(candidates, np.exp(logs - logs.max()), strict=True):
         name = {"none": "normal", **figures.FAMILY_OF}.get(h.name, h.name)
         chance[name] = chance.get(name, 0.0) + float(p)
     return max(chance, key=chance.__getitem__)

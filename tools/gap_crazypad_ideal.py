@@ -3,7 +3,7 @@
     python tools/gap_crazypad_ideal.py [FOLDER] [--part build|all]
 
 Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
-unsteadiness, heave and corrections of `hover_balance`, the voltage, commanded thrust of each rotor, and spectra of
+unsteadiness, heave and corrections of `hover_pattern`, the voltage, commanded thrust of each rotor, and spectra of
 commands and accelerations in seven bands. Four learners (a discriminant on the balance, one on all numbers, a forest,
 the nearest flight) have the labels of (1) all other conditions of both drones, (2) all other flights, those of the
 same condition too, (3) the other drone. The diagnosis has none. That several are tried and the best may be read
@@ -29,11 +29,12 @@ from sklearn.preprocessing import StandardScaler
 import crazypad_figures as pad
 import crazypad_labels as labels
 from airtouch import vehicle as vehicles
-from airtouch.gap.balance import hover_balance
+from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
+from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
 
-#: Hz, limits of the bands: those of `hover_balance` below 2 Hz, octaves above, to half of the sample rate
+#: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
 WINDOW = 256  #: samples of a block of the spectra: 2.56 s, which resolves the lowest band
 BALANCE = slice(0, 4)  #: lift, roll, pitch, yaw, the first numbers of a flight
@@ -78,12 +79,12 @@ class Table:
 
 
 def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
-    """Numbers (k,) of one flight: `hover_balance.pattern`, voltage, thrust of each rotor, log10 of band powers."""
+    """Numbers (k,) of one flight: its `HoverPattern`, voltage, thrust of each rotor, log10 of band powers."""
     weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
     thrust, voltage = vehicle.thrust(flight.pwm) / weight, flight.log["vbat_V"]
     levels, spectra = [], []
-    for first, last in hover_balance.hovers(flight):
-        mixed = thrust[first:last] @ hover_balance.MIX.T
+    for first, last in hovers(flight):
+        mixed = thrust[first:last] @ MIX.T
         level = np.nanmean(voltage[first:last])
         slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=level), 1)[0]
         levels.append([level, slope, *np.log(thrust[first:last].mean(axis=0))])
@@ -91,7 +92,7 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
         f, p = welch(signals, 1.0 / PERIOD_S, nperseg=WINDOW, axis=0)
         spectra.append([np.log10(p[(f >= a) & (f < b)].mean(axis=0))
                         for a, b in zip(BANDS_HZ[:-1], BANDS_HZ[1:], strict=True)])
-    return np.concatenate([hover_balance.pattern(flight, vehicle), np.mean(levels, axis=0),
+    return np.concatenate([hover_pattern(flight, vehicle).array(), np.mean(levels, axis=0),
                            np.mean(spectra, axis=0).ravel()])
 
 

@@ -9,7 +9,7 @@ import short_flights
 from airtouch import logs, vehicle
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
-from airtouch.gap.where.gap_map import significant
+from airtouch.gap.where.summary import significant
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog
 from airtouch.logs.segments import KINDS
 

@@ -27,7 +27,7 @@ Where each decision is made; a folder imports only those above it:
   a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `feature_space`; each effect an
   `effect_class`; how likely a flight is under it, `density`, under several or something without a name, `hypotheses`;
   a `library` holds what `build` learned by `learning` flights and `exposure` to what has no name, and what
-  `calibration` measured with others; `readout` gives a strength in the effect's own units; `inference` names the
+  `calibration` measured with others; classes of a user's effects come from `own_effect`; `readout` gives a strength in the effect's own units; `inference` names the
   effects.
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
@@ -41,7 +41,8 @@ Where each decision is made; a folder imports only those above it:
 - `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
   intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
   `advice`; `words`, `pictures`.
-- `balance`, flights without a gyro: `hover_balance`, `balance_result`.
+- `balance`, flights without a gyro: the `hover_pattern` of a flight, `hover_hypotheses` drawn from `priors`, their
+  evidence by `hover_balance`; `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_run`, `blind_score` with its `intervals`, `blind_severity`; on a
   cluster: `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what

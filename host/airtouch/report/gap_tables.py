@@ -7,7 +7,7 @@ from airtouch.gap.answer.words import digits, quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, interval, ratio, short, significant
+from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, interval, ratio, short
 
 #: (least ratio of gap to floor, background colour, text colour)
 SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),
@@ -61,7 +61,7 @@ def capital(text: str) -> str:
 def shaded(cell: Cell) -> dict[str, str]:
     """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
     times = ratio(cell)
-    sure = significant(cell)
+    sure = summary.significant(cell)
     colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
     title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, "
              f"floor {short(cell.floor)} {cell.unit}, "

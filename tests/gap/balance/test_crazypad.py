@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
-from airtouch.gap.balance.hover_balance import ANSWER, BELIEFS, MIX, Reference, evidence, hypotheses, reference
+from airtouch.gap.balance.hover_balance import ANSWER, POWER, Reference, evidence, reference
+from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses, weight_change
+from airtouch.gap.balance.hover_pattern import HoverPattern
+from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
 from airtouch.gap.diagnose import diagnose
 from airtouch.logs import read
 from airtouch.simulation import replay
@@ -12,17 +15,21 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active, get
 
 FLOWN = vehicle.load("crazyflie-2.1")
-NOMINAL = Reference(np.zeros(6), np.array(BELIEFS.between) ** 2, np.zeros(2))  # both powers are 1 without corrections
+NOMINAL = Reference(np.zeros(6), np.array(PRIORS.nominal) ** 2, np.zeros(2))  # both powers are 1 without corrections
 UNCORRECTED = (-9.0, -9.0)
 
 
-def corrections(thrusts: np.ndarray) -> np.ndarray:
-    """The pattern (8,) of commanded thrusts (4,), each over its nominal one; as steady as nominal flights."""
-    moments = MIX @ thrusts
-    return np.array([np.log(moments[0]), *(moments[1:] / moments[0]), 0.0, 0.0, *UNCORRECTED])
+def pattern(balance, power=(0.0, 0.0), corrections=UNCORRECTED) -> HoverPattern:
+    """A pattern as steady as nominal flights, unless powers are given."""
+    return HoverPattern(np.array(balance), np.array(power), np.array(corrections))
 
 
-def best(pattern: np.ndarray) -> tuple:
+def commanded(thrusts: np.ndarray) -> HoverPattern:
+    """The pattern of commanded thrusts (4,), each over its nominal one."""
+    return pattern(commanded_change(thrusts[None])[0])
+
+
+def best(pattern: HoverPattern) -> tuple:
     explanations = hypotheses(FLOWN)
     logs, weights = evidence(pattern, NOMINAL, explanations)
     i = int(np.argmax(logs))
@@ -33,14 +40,14 @@ def best(pattern: np.ndarray) -> tuple:
 def test_a_rotor_that_needs_more_by_itself_is_weak(rotor):
     thrusts = np.ones(4)
     thrusts[rotor - 1] = 1.0 / (1.0 - 0.2)
-    explanation, weight = best(corrections(thrusts))
+    explanation, weight = best(commanded(thrusts))
     assert [(name, int(v["rotor"][0])) for name, v in explanation.effects] == [("weak_motor", rotor)]
     assert weight @ explanation.effects[0][1]["thrust_loss"] == pytest.approx(0.2, abs=0.03)
 
 
 def test_two_rotors_across_from_each_other():
     thrusts = np.array([1.0, 1.0 / 0.8, 1.0, 1.0 / 0.8])
-    explanation, _ = best(corrections(thrusts))
+    explanation, _ = best(commanded(thrusts))
     assert [int(v["rotor"][0]) for _, v in explanation.effects] == [2, 4]
 
 
@@ -49,29 +56,43 @@ def test_a_weight_in_front_keeps_yaw():
     half = FLOWN.arm_m / np.sqrt(2.0)
     front = share * forward / half  # the front pair carries the weight's moment
     thrusts = 1.0 + share + np.array([front, -front, -front, front])
-    explanation, weight = best(corrections(thrusts))
+    explanation, weight = best(commanded(thrusts))
     assert [name for name, _ in explanation.effects] == ["mass", "com_offset"]
     assert weight @ explanation.effects[0][1]["fraction"] == pytest.approx(share, abs=0.03)
     assert weight @ explanation.effects[1][1]["x"] == pytest.approx(share / (1.0 + share) * forward, abs=0.0006)
 
 
 def test_nominal_is_none_and_nonsense_is_unknown():
-    explanation, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0, *UNCORRECTED]))
+    explanation, _ = best(pattern([0.0, 0.003, -0.003, 0.002]))
     assert explanation.name == "none"
-    explanation, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3, *UNCORRECTED]))
+    explanation, _ = best(pattern([-0.3, 0.3, -0.3, 0.3], power=(0.4, 0.3)))
     assert explanation.name == "unknown"
 
 
 def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
     own, corrected = np.array([-5.8, -2.3]), np.log10([[1e-6, 1e-6], [1e-4, 3e-5], [2e-4, 3e-4], [1e-7, 1e-3]])
     powers = np.log10(10.0 ** own + ANSWER * 10.0 ** corrected)
-    table = np.column_stack([np.zeros((4, 4)), powers, corrected])
+    table = [pattern(np.zeros(4), *of) for of in zip(powers, corrected, strict=True)]
     base = reference(table[:3])
     np.testing.assert_allclose(base.own_power, own, atol=1e-9)
     np.testing.assert_allclose(base.difference(table[3]), np.zeros(6), atol=1e-9)
-    without_velocity = np.column_stack([np.zeros((4, 4)), powers, np.full((4, 2), -9.0)])
-    np.testing.assert_allclose(reference(without_velocity[:3]).difference(without_velocity[3])[4:],
+    without_velocity = [pattern(np.zeros(4), power) for power in powers]
+    np.testing.assert_allclose(reference(without_velocity[:3]).difference(without_velocity[3])[POWER],
                                powers[3] - powers[:3].mean(axis=0), atol=1e-3)
+
+
+def test_prior_probabilities_add_up_to_one_over_names_and_over_hypotheses():
+    explanations = hypotheses(FLOWN)
+    assert sum(PRIOR_PROBABILITY.values()) == pytest.approx(1.0) == sum(h.prior for h in explanations)
+    rotors = [tuple(int(v["rotor"][0]) for _, v in h.effects) for h in explanations if h.name == "weak_motor"]
+    assert sorted(rotors) == [(1,), (1, 2), (1, 3), (1, 4), (2,), (2, 3), (2, 4), (3,), (3, 4), (4,)]
+
+
+def test_a_weight_over_a_rotor_asks_that_pair_of_sides_for_more():
+    """A tenth of the mass halfway between the two front rotors: they carry it, the others as before."""
+    half = FLOWN.arm_m / np.sqrt(2.0)
+    change = weight_change(np.array([0.1]), np.array([half]), np.array([0.0]), half)[0]
+    np.testing.assert_allclose(change, commanded_change(np.array([[1.2, 1.0, 1.0, 1.2]]))[0], atol=1e-12)
 
 
 def test_a_thread_tied_off_centre_turns_the_vehicle():

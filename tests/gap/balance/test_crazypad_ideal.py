@@ -36,7 +36,7 @@ def test_slope_and_scatter_are_found_again():
     means = np.array([balance.change(c, 0.03, 1.2) for c in cuts]) + scatter * generator.standard_t(4, (400, 4))
     coefficients, residuals = balance.fitted(means, cuts)
     assert coefficients == pytest.approx([0.03, 1.2], rel=0.1)
-    assert balance.worked_on(residuals, np.full((400, 4), 1e-8), 4.0) == pytest.approx(scatter, rel=0.2)
+    assert balance.maintenance(residuals, np.full((400, 4), 1e-8), 4.0) == pytest.approx(scatter, rel=0.2)
 
 
 @pytest.mark.parametrize("learner", ideal.LEARNERS)

@@ -8,6 +8,8 @@ from airtouch.gap.evidence.cells import (
     GROUPS,
     REPLAY_VIEW,
     REST_VIEW,
+    above_means,
+    band_cells,
     cell_numbers,
     cell_words,
     channel_cells,
@@ -70,6 +72,14 @@ def test_nothing_is_laid_out_as_nothing():
     (COMMAND_VIEW, 2, "command_roll", "command_roll at 0.6 to 2 Hz")])
 def test_a_cell_in_words_is_its_channel_and_band(view, band, channel, words):
     assert cell_words(cell_numbers(view, band, [c.name for c in CHANNELS].index(channel))) == words
+
+
+def test_a_band_and_the_bands_above_the_means_are_told_by_the_number():
+    force_z, rate_x = ([c.name for c in CHANNELS].index(name) for name in ("force_z", "rate_x"))
+    for view in (REPLAY_VIEW, REST_VIEW):
+        cells = [cell_numbers(view, band, channel) for band in (0, 1, 5) for channel in (force_z, rate_x)]
+        assert band_cells()[cells].tolist() == [cell_numbers(view, band, 0) for band in (0, 0, 1, 1, 5, 5)]
+        assert above_means()[cells].tolist() == [False, False, True, True, True, True]
 
 
 def test_all_bands_of_a_channel_have_one_number_and_no_other_has_it():

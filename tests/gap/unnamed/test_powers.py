@@ -4,12 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.unnamed import generic, powers
+from airtouch.gap.unnamed.powers import Powers
 from gap_flights import fly
 
 
@@ -17,13 +19,31 @@ def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_be
     rng = np.random.default_rng(1)
     n, groups = 4000, np.repeat([3, 7], 2000)
     power = np.where(groups == 3, 2.5, 0.4) * rng.exponential(size=n)
-    free, level = powers.power_factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, *powers.LOOSE)
+    measured = Powers(power, np.full(n, 1e6), np.full(n, 1e6), groups)
+    free, level = powers.power_factors(measured, *powers.NO_PRIOR)
     np.testing.assert_allclose(free[[3, 7]], np.log([2.5, 0.4]), atol=4.0 / np.sqrt(2000))
-    still, at_rest = powers.power_factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, np.zeros(GROUPS),
-                                      np.full(GROUPS, 1e-6))
+    still, at_rest = powers.power_factors(measured, np.zeros(GROUPS), np.full(GROUPS, 1e-6))
     np.testing.assert_allclose(still[[3, 7]], 0.0, atol=1e-3)
     expected = [0.5 * 2000 * (f - 1.0 - np.log(f)) for f in (2.5, 0.4)]  # Kullback-Leibler, half overlapping blocks
     np.testing.assert_allclose((level - at_rest)[[3, 7]], expected, rtol=0.15)
+
+
+@pytest.mark.parametrize("nu", [3.0, 12.0, 1e6])
+def test_information_is_that_of_a_real_value_under_students_law(nu):
+    """Mean square of the score of log variance, over one half, which a normal value holds."""
+    t = np.linspace(-1.0, 1.0, 400_002)[1:-1]
+    x = t / (1.0 - t ** 2)  # all of the line
+    score = 0.5 * ((nu + 1.0) * x ** 2 / (nu + x ** 2) - 1.0)
+    mean_square = np.sum(score ** 2 * student.pdf(x, nu) * (1.0 + t ** 2) / (1.0 - t ** 2) ** 2) * (t[1] - t[0])
+    assert powers.information(nu) == pytest.approx(2.0 * mean_square, rel=1e-4)
+
+
+@pytest.mark.parametrize(("simulated", "counted"), [(True, [False, True]), (False, [False, False])])
+def test_less_power_counts_above_the_means_of_simulated_flights(simulated, counted):
+    gained, weaker = np.full(GROUPS, 2.0 * powers.CHANCE), np.zeros(GROUPS, bool)
+    above = powers._above_chance(gained, weaker, np.arange(GROUPS), simulated)
+    assert above[[0, COUNT]].tolist() == counted, "the first channel's means, and its band above"
+    assert not powers._above_chance(gained / 4.0, ~weaker, np.arange(GROUPS), simulated).any()
 
 
 def test_what_may_be_there_gains_half_and_costs_log_two_at_most():
@@ -38,17 +58,17 @@ def halves_of(factor, count=150):
     bands = [band * COUNT + axis for band in range(1, 11) for axis in range(3)]
     groups = np.repeat(bands, count)
     certain = np.full(len(groups), 1e6)
-    return [(factor * rng.exponential(size=len(groups)), certain, certain, groups) for _ in range(2)]
+    return [Powers(factor * rng.exponential(size=len(groups)), certain, certain, groups) for _ in range(2)]
 
 
 def test_a_little_more_power_in_every_band_shows_in_the_sensors_sum():
     """A quarter more, of which a band holds two nats: no band alone tells it from chance, thirty together do."""
     factor, middle = 1.25, np.zeros(GROUPS)
     floor = SimpleNamespace(power=np.stack([middle, np.full(GROUPS, 0.05)]))
-    one, two = halves_of(factor)
+    trained, held_out = halves_of(factor)
     expected = 0.5 * 30 * 150 * (factor - 1.0 - np.log(factor)) - np.log(2.0)  # even odds that it is there
-    assert powers.power_gain(one, two, floor, True) == pytest.approx(expected, rel=0.25)
-    assert powers.power_gain(one, two, floor, False) < 0.1 * expected, "in recorded flights no sum is looked at"
+    assert powers.power_gain(trained, held_out, floor, True) == pytest.approx(expected, rel=0.25)
+    assert powers.power_gain(trained, held_out, floor, False) < 0.1 * expected, "recorded: each band alone"
     assert powers.power_gain(*halves_of(1.0), floor, True) < 1.0
 
 

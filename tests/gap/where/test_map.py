@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airtouch.gap.flights.flight import GROUND
+from airtouch.gap.signals.channels import CHANNELS
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.where import gap_map as maps
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
+from airtouch.gap.where.summary import significant
 from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
@@ -75,6 +78,16 @@ def test_a_phase_shorter_than_a_block_keeps_what_is_in_it():
     assert cell(gap_map, "force_z", 4, "take-off").blocks == 1
 
 
+@pytest.mark.parametrize(("phase", "baseline", "no_gyro", "channel", "bands"), [
+    (HOVER, False, False, "force_x", [0, 1, 2, 3, 4, 5]), (HOVER, False, True, "torque_x", [0]),
+    (GROUND, False, True, "torque_x", []), (HOVER, False, False, "rate_x", []), (HOVER, True, False, "rate_x", [0]),
+    (GROUND, False, False, "rate_x", [0]), (HOVER, True, False, "command_roll", [1, 2, 3, 4]),
+    (GROUND, True, False, "command_roll", [])])
+def test_a_cell_is_shown_where_it_means_something(phase, baseline, no_gyro, channel, bands):
+    shown = maps.visible(phase, baseline, no_gyro)[:, [c.name for c in CHANNELS].index(channel)]
+    assert np.flatnonzero(shown).tolist() == bands
+
+
 def test_lost_samples_do_not_count():
     force, lost = np.full((2000, 3), 0.3), np.zeros(2000, bool)
     force[700:720], lost[700:720] = 50.0, True
@@ -106,7 +119,7 @@ def test_without_baseline_the_floor_is_sensor_noise_and_spread():
 def test_no_gap_is_rarely_called_one():
     def nominal(seed):
         return flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
-    hits = [maps.significant(c) for s in range(8) for c in maps.gap_map(
+    hits = [significant(c) for s in range(8) for c in maps.gap_map(
         study(), [nominal(s)], [nominal(50 + s), nominal(70 + s)]).cells if c.regime == "all"]
     assert np.mean(hits) < 0.02
 

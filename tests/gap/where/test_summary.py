@@ -1,7 +1,7 @@
 """The headline: the cell that most of the gap is in, or that the named effects explain."""
 
 from airtouch.gap.answer import advice, words
-from airtouch.gap.result import Found
+from airtouch.gap.result import Cell, Found
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -32,3 +32,12 @@ def test_headline_of_named_effects_is_where_they_take_most():
     assert result.headline is cells[1] and "lift" in words.sentences(result)[0]
     assert ("1 of 2 cells still stand out, mostly in hover in roll torque at 0-0.5 Hz "
             "(18 times the floor, as before)") in words.answer(result)
+
+
+def test_a_cell_without_an_interval_may_stand_out_and_is_not_significant():
+    """As those of flights without a gyro."""
+    known, unknown = cell("force_z", "hover", 0.5), Cell("force_z", (0.0, 0.2), "hover", 0.5, 0.1, "m/s^2")
+    assert summary.stands_out(known) and summary.significant(known)
+    assert summary.stands_out(unknown) and not summary.significant(unknown)
+    inside = cell("force_z", "hover", 0.13)  # its lower end is 0.117, the floor's upper end 0.12
+    assert not summary.stands_out(inside) and not summary.significant(inside)

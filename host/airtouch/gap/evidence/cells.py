@@ -37,6 +37,17 @@ def sensor_cells() -> np.ndarray:
     return cell - cell % VIEW % COUNT % AXES
 
 
+def band_cells() -> np.ndarray:
+    """For each cell (GROUPS,) the number of the first cell of its view and band, all channels together."""
+    cell = np.arange(GROUPS)
+    return cell - cell % VIEW % COUNT
+
+
+def above_means() -> np.ndarray:
+    """Whether each cell (GROUPS,) is in a band above the lowest, which has the means; every cell of the commands is."""
+    return np.arange(GROUPS) % VIEW >= COUNT
+
+
 def cell_words(cell: int) -> str:
     """A cell in words: channel, band, and whether at rest."""
     view, place = divmod(cell, VIEW)

@@ -9,10 +9,11 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
+#: Units and lengths that make columns of order one in flights of some 20 s near the floor; all are chosen.
 LAG_S = 0.05  #: s, unit of the derivatives of thrust
 TIME_S = 20.0  #: s, unit of time
-HEIGHT_M = 0.05  #: of a rotor, at which its ground effect is one unit
-LOW_M = 0.2  #: above the floor, at which a force that fades slowly has half its strength
+HEIGHT_M = 0.05  #: height of a rotor, m, at which its ground effect is one unit; the column is the same below
+LOW_M = 0.2  #: m above the floor, at which a force that fades slowly has half its strength
 BASIS = ("one", "in_air", "thrust", "roll", "pitch", "yaw", "d_thrust", "d_roll", "d_pitch", "d_yaw", "vx", "vy",
          "vz", "speed", "world_x", "world_y", "tilt", "time", "time_thrust", "height",
          "height_roll", "height_pitch", "low", "high")

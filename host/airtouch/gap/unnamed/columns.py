@@ -27,7 +27,7 @@ TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
 LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
 LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
 WIDEST = len(BASIS) + LOOP
-NOTHING = 1e-9  #: variance that a coefficient without scatter is given
+NOTHING = 1e-9  #: variance that a coefficient or a power without scatter is given; chosen
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
 

@@ -31,17 +31,13 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     floor = data.study.unnamed_floor or no_floor()
     linear = power = 0.0
     for train, test in ((0, 1), (1, 0)):
-        halves = [HalfResiduals(data, parts[k], terms[train]) for k in (train, test)]
-        trained, held_out = halves
-        residuals = [half.values.copy() for half in halves]
+        trained, held_out = (HalfResiduals(data, parts[half], terms[train]) for half in (train, test))
+        fitted = np.array([coefficients(trained, channel, floor, answerable(data, terms[train], channel))
+                           for channel in range(CHANNELS)])
         for channel in range(CHANNELS):
-            fitted = coefficients(trained, channel, floor, answerable(data, terms[train], channel))
-            for half, residual in zip(halves, residuals, strict=True):
-                for cell in (c for c in half.cells if c.channel == channel):
-                    residual[cell.own], _ = half.without(cell, fitted, floor)
-            linear += linear_gain(held_out, channel, fitted, floor)
-        of_trained, of_held_out = (half.powers(x) for half, x in zip(halves, residuals, strict=True))
-        power += power_gain(of_trained, of_held_out, floor, data.study.simulated)
+            linear += linear_gain(held_out, channel, fitted[channel], floor)
+        powers = [half.powers(half.without_columns(fitted, floor)) for half in (trained, held_out)]
+        power += power_gain(powers[0], powers[1], floor, data.study.simulated)
     return linear, power
 
 

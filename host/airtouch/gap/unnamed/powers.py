@@ -1,11 +1,11 @@
 """Free powers of the residual in every view, channel and band, fitted to one half of the data, judged on the other."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS
-from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.evidence.cells import GROUPS, above_means, band_cells, channel_cells, sensor_cells
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor
 
@@ -14,13 +14,34 @@ BELIEF = 2.0  #: nominal flights that the scatter of all channels together count
 #: no recorded flight's air, is modelled any better. Chosen.
 LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
 CHANCE = 4.0  #: nats that a band must gain on the half that it is fitted to; chosen, chance gives about one
-UPDATES, LONGEST = 8, 1.5  #: Newton steps towards the power of highest posterior, and the longest of them, nepers
-#: for each group the first of its view and sensor: force, torque, rate; commands, one axis each
-SENSOR = np.arange(GROUPS) // 1000 * 1000 + np.arange(GROUPS) % 1000 % COUNT // 3 * 3
-ABOVE_MEANS = np.arange(GROUPS) % 1000 >= COUNT  #: groups above the lowest band
-LOOSE = (np.zeros(GROUPS), np.full(GROUPS, 1e3))  #: mean and scatter of powers of which nothing is believed
+UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen
+LONGEST = 1.5  #: nepers, the longest of these steps; chosen
+SENSOR = sensor_cells()[channel_cells()]  #: (GROUPS,) number of each cell's view and sensor, all bands together
+ABOVE_MEANS = above_means()
+NO_PRIOR = (np.zeros(GROUPS), np.full(GROUPS, 1e3))  #: mean and scatter (nepers) of a prior that says nothing
 
-Powers = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  #: see `regression.HalfResiduals.powers`
+
+class Powers(NamedTuple):
+    """Residuals of a half, value by value (n,).
+
+    over_expected: power over the expected power; freedom, tail: of the law (`evidence.likelihood.Likelihood`); cell:
+    number of the cell.
+    """
+
+    over_expected: np.ndarray
+    freedom: np.ndarray
+    tail: np.ndarray
+    cell: np.ndarray
+
+
+def information(freedom: np.ndarray) -> np.ndarray:
+    """Fisher information of the log variance that a value under Student's law holds, over that under a normal law.
+
+    nu / (nu + 3), with nu degrees of freedom (n,), is that of a real value (Lange, Little and Taylor 1989, Robust
+    statistical modeling using the t distribution, J. Am. Stat. Assoc. 84, 881). A complex value whose density falls
+    with the power nu + 1 holds nu / (nu + 2), at 12 degrees of freedom 7 % more.
+    """
+    return freedom / (freedom + 3.0)
 
 
 def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
@@ -28,66 +49,72 @@ def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
     return np.logaddexp(gain, 0.0) - np.log(2.0)
 
 
-def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
-                  spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def power_factors(powers: Powers, middle: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log posterior (GROUPS,) there.
 
-    e, nu, tail, groups (n,): see `regression.HalfResiduals.powers`. middle, spread (GROUPS,): of the normal prior of
-    the logarithm. In a group without values it is the prior's.
+    middle, spread (GROUPS,): of the normal prior of the logarithm. In a cell without values the factor is the prior's.
     """
+    e, nu, tail, cell = powers
     out = middle.copy()
-    count = np.bincount(groups, minlength=GROUPS)
+    count = np.bincount(cell, minlength=GROUPS)
     precision = 1.0 / np.maximum(spread ** 2, NOTHING)
-    information = np.bincount(groups, nu / (nu + 3.0), GROUPS)
+    held = np.bincount(cell, information(nu), GROUPS)
     for _ in range(UPDATES):
-        scaled = e * np.exp(-out[groups])
-        push = np.bincount(groups, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
-        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * information + precision),
-                       -LONGEST, LONGEST)
+        scaled = e * np.exp(-out[cell])
+        push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
+        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * held + precision), -LONGEST, LONGEST)
     out[count == 0] = middle[count == 0]
-    scaled = e * np.exp(-out[groups])
-    level = np.bincount(groups, -OVERLAP_WEIGHT * (out[groups] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
+    scaled = e * np.exp(-out[cell])
+    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
-def power_gain(one: Powers, two: Powers, floor: UnnamedFloor, simulated: bool) -> float:
-    """Log likelihood that free powers, fitted to one half, gain on the other (`two`).
+def power_gain(trained: Powers, held_out: Powers, floor: UnnamedFloor, simulated: bool) -> float:
+    """Log likelihood that free powers, fitted to the trained half, gain on the one held out.
 
-    They are those of every cell, or of all the bands of a sensor together, where slightly stronger noise shows.
+    They are those of every cell, or of all the bands of a sensor together, where slightly stronger noise shows. In
+    recorded flights, whose noise differs from day to day, cells alone count, and only those with more power.
     """
     middle, spread = floor.power
     spread = spread if simulated else np.maximum(spread, RECORDED_SCATTER)
-    judged = ABOVE_MEANS if simulated else np.zeros(GROUPS, bool)  # with less power than usual as well
-    trained_before, before = (power_factors(*half, middle, spread)[1] for half in (one, two))
-    pools = [(power_factors(*one, middle, LOOSE[1])[0], np.arange(GROUPS))]
-    if simulated:  # recorded flights' noise differs from day to day
-        pools.append((_of_sensors(one, middle), SENSOR))
-    gains = []
-    for factors, pool in pools:
-        free = spread if pool is SENSOR else LOOSE[1]
-        trained, gained = (np.bincount(pool, x, GROUPS) for x in (
-            power_factors(*one, factors, free)[1] - trained_before, power_factors(*two, factors, spread)[1] - before))
-        above_chance = (trained > CHANCE) & (np.bincount(pool, (factors > middle) | judged, GROUPS) > 0)
-        gains.append(float(gain_at_even_odds(gained[above_chance]).sum()))
-    return max(gains)
+    before = tuple(power_factors(half, middle, spread)[1] for half in (trained, held_out))
+
+    def gain(factors: np.ndarray, trained_spread: np.ndarray, pool: np.ndarray) -> float:
+        """What these factors gain on the half held out; pool (GROUPS,): cells that are judged together."""
+        after = (power_factors(trained, factors, trained_spread)[1], power_factors(held_out, factors, spread)[1])
+        gains = [np.bincount(pool, x - y, GROUPS) for x, y in zip(after, before, strict=True)]
+        return float(gain_at_even_odds(gains[1][_above_chance(gains[0], factors > middle, pool, simulated)]).sum())
+
+    of_cells = gain(power_factors(trained, middle, NO_PRIOR[1])[0], NO_PRIOR[1], np.arange(GROUPS))
+    return max(of_cells, gain(_of_sensors(trained, middle), spread, SENSOR)) if simulated else of_cells
+
+
+def _above_chance(gained: np.ndarray, stronger: np.ndarray, pool: np.ndarray, simulated: bool) -> np.ndarray:
+    """Mask (GROUPS,) of the pools that gain more than CHANCE on the half that they are fitted to.
+
+    gained (GROUPS,): nats, by pool; stronger (GROUPS,): cells with more power than nominal flights have. In simulated
+    flights less power counts as well, above the band of the means.
+    """
+    counts = stronger | ABOVE_MEANS if simulated else stronger
+    return (gained > CHANCE) & (np.bincount(pool, counts, GROUPS) > 0)
 
 
 def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
     """Logarithm (GROUPS,) of the powers' factors where all bands of a sensor but that of the means share one."""
-    e, nu, tail, groups = powers
-    above_means = ABOVE_MEANS[groups]
-    relative = (e * np.exp(-middle[groups]))[above_means]
-    common, _ = power_factors(relative, nu[above_means], tail[above_means], SENSOR[groups][above_means], *LOOSE)
+    e, nu, tail, cell = powers
+    use = ABOVE_MEANS[cell]
+    relative = Powers((e * np.exp(-middle[cell]))[use], nu[use], tail[use], SENSOR[cell][use])
+    common, _ = power_factors(relative, *NO_PRIOR)
     return middle + np.where(ABOVE_MEANS, common[SENSOR], 0.0)
 
 
 def power_floor(flights: Sequence[Powers]) -> np.ndarray:
     """Log power's mean and rms (2, GROUPS) in nominal flights, two or more, beyond what chance alone gives."""
     log_power, chance = np.zeros((len(flights), GROUPS)), np.full((len(flights), GROUPS), np.nan)
-    for i, (e, nu, tail, groups) in enumerate(flights):
-        log_power[i] = power_factors(e, nu, tail, groups, *LOOSE)[0]
-        count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
-        chance[i, count > 0.0] = 1.0 / count[count > 0.0]
+    for i, powers in enumerate(flights):
+        log_power[i] = power_factors(powers, *NO_PRIOR)[0]
+        held = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), GROUPS)
+        chance[i, held > 0.0] = 1.0 / held[held > 0.0]
     known = np.isfinite(chance)
     count = np.maximum(known.sum(axis=0), 1)
     middle = np.where(known, log_power, 0.0).sum(axis=0) / count
@@ -98,7 +125,6 @@ def power_floor(flights: Sequence[Powers]) -> np.ndarray:
 
 
 def _of_band(values: np.ndarray) -> np.ndarray:
-    """For each group the sum of values (GROUPS,) over the channels of its view and band."""
-    cell = np.arange(GROUPS)
-    band = cell - cell % 1000 % COUNT
+    """For each cell the sum of values (GROUPS,) over the channels of its view and band."""
+    band = band_cells()
     return np.bincount(band, values, GROUPS)[band]

@@ -11,7 +11,9 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Cell, UnnamedFloor, cells_of, no_floor
 from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
-ROUNDS = 3  #: iterations of the weights of a fit; chosen
+ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
+CELL_ROUNDS = 2  #: the same of one cell under fitted coefficients; chosen
+RIDGE, LEAST_RIDGE = 1e-9, 1e-12  #: added to a normal matrix, over its diagonal and at least, to invert it; chosen
 MOST_COLUMNS = 4  #: columns of one channel that may be used; chosen
 SURE = 3.0  #: standard deviations by which coefficients must scatter more than by chance; chosen
 CHANCE = 4.0  #: nats that a column must gain on the half that it is fitted to; chosen, chance gives about one
@@ -48,7 +50,7 @@ class HalfResiduals:
         """
         values = self.values[cell.own] - cell.columns[:, :cell.free] @ fitted[:cell.free]
         residual, precision = values, cell.precision(floor)
-        for _ in range(2):
+        for _ in range(CELL_ROUNDS):
             normal, right = self.system(cell, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
             residual = values - cell.columns @ x
@@ -57,17 +59,21 @@ class HalfResiduals:
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:
-        """Power of residuals over the expected power, freedom, tail and group of the values that are known."""
+        """Powers of the residuals (elements,) whose values are known."""
         known = self.problem.known
         over = squared(residuals[known]) / self.power[known]
-        return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
+        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.groups[known])
+
+    def without_columns(self, fitted: np.ndarray, floor: UnnamedFloor) -> np.ndarray:
+        """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each cell."""
+        residuals = self.values.copy()
+        for cell in self.cells:
+            residuals[cell.own], _ = self.without(cell, fitted[cell.channel], floor)
+        return residuals
 
     def floor_powers(self, floor: UnnamedFloor) -> Powers:
         """`powers` without what nominal flights may have of the columns."""
-        residuals = self.values.copy()
-        for cell in self.cells:
-            residuals[cell.own] = self.without(cell, np.zeros(WIDEST), floor)[0]
-        return self.powers(residuals)
+        return self.powers(self.without_columns(np.zeros((CHANNELS, WIDEST)), floor))
 
 
 def coefficients(half: HalfResiduals, channel: int, floor: UnnamedFloor, among: np.ndarray | None = None) -> np.ndarray:
@@ -104,7 +110,7 @@ def _shared_system(half: HalfResiduals, cells: Sequence[Cell], residuals: Sequen
         own = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
         total += normal[:n, :n] - normal[:n] @ own[:, :n]
         right += slope[:n] - normal[:n] @ own[:, n]
-    return total + np.diag(1e-9 * np.diag(total) + 1e-12), right
+    return total + np.diag(RIDGE * np.diag(total) + LEAST_RIDGE), right
 
 
 def _worth_asking(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int]) -> list[int]:
@@ -156,7 +162,7 @@ def _one_by_one(half: HalfResiduals, cell: Cell) -> tuple[np.ndarray, np.ndarray
     estimate, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         index = [k, *range(n, len(right))]
-        precision = np.concatenate([[1e-12], 1.0 / cell.offsets ** 2])
-        inverse = np.linalg.inv(normal[np.ix_(index, index)] + np.diag(precision + 1e-9 * np.diag(normal)[index]))
+        precision = np.concatenate([[LEAST_RIDGE], 1.0 / cell.offsets ** 2])
+        inverse = np.linalg.inv(normal[np.ix_(index, index)] + np.diag(precision + RIDGE * np.diag(normal)[index]))
         estimate[k], variance[k] = (inverse @ right[index])[0], inverse[0, 0]
     return estimate, variance

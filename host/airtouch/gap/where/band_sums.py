@@ -16,13 +16,14 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-#: edges of the map's bands, Hz; the last ends at half the 100 Hz of the flights
+#: edges of the map's bands, Hz: about octaves, chosen; the last ends at half the 100 Hz of the flights
 BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
-CROSSOVER = 0.3  #: half the width of a crossover between two bands, as a fraction of its frequency
-BLOCK = 256  #: samples (2.56 s) that a block has about: a phase is cut into equal blocks of nearly this length
+CROSSOVER = 0.3  #: half the width of a crossover between two bands, as a fraction of its frequency; chosen
+BLOCK = 256  #: samples (2.56 s) that a block has about: a phase is cut into equal blocks of nearly this length; chosen
+NOISE_FREQUENCIES = 2000  #: at which the gain of a band is averaged for the sensors' noise; chosen
 #: names of the thirds of a flight, by its time in the air
 THIRDS = ("first", "second", "last")
-#: regimes beside "all" and the thirds: the quantity, its unit, the two limits between its three bins
+#: regimes beside "all" and the thirds: the quantity, its unit, the two limits between its three bins; chosen
 BINS = (("height", "m", (0.1, 0.3)), ("speed", "m/s", (0.15, 0.5)), ("cell voltage", "V", (3.6, 3.9)))
 
 
@@ -152,10 +153,10 @@ def stretches(flight: Flight) -> list[tuple[int, int]]:
 def sensor_rms(vehicle: Vehicle) -> np.ndarray:
     """Rms (bands, COUNT) that the declared sensor noise alone has in each band; 0 for commands.
 
-    White noise is averaged over 2,000 frequencies up to half the sampling rate; torque is its difference quotient.
+    White noise is averaged over NOISE_FREQUENCIES up to half the sampling rate; torque is its difference quotient.
     """
     row = prepare(vehicle, ())[0][0]
-    f = (np.arange(2000) + 0.5) * 0.00025 / PERIOD_S
+    f = (np.arange(NOISE_FREQUENCIES) + 0.5) * (0.5 / NOISE_FREQUENCIES) / PERIOD_S
     gain = gains(f) ** 2
     white = gain.mean(axis=1)
     differenced = (gain * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2).mean(axis=1) / PERIOD_S ** 2

@@ -17,16 +17,16 @@ from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
-from airtouch.gap.signals.spectra import frequencies
+from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
-from airtouch.gap.where.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
+from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
+from airtouch.gap.where.summary import TINY, significant, sure_ratio
 from airtouch.logs.segments import KINDS
 
-LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause
-TINY = 1e-12  #: denominator at least, in a channel's unit: no rms over a floor of 0 is infinite
+LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
 
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
                "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
@@ -41,6 +41,22 @@ class Part:
     after: Sums | None
     has_gyro: bool
     alone: tuple[Sums, ...] = ()  #: sums with one of the effects in the model each, where there are several
+
+
+@dataclass(frozen=True)
+class PhaseTables:
+    """The tables of one phase, of which its cells are made.
+
+    kind: name of the phase; after: with the named effects in the model; floor, floor_high (regimes, bands, COUNT):
+    floor and its upper end, in the channels' units; best: name of the effect that takes most from each cell, or "".
+    """
+
+    kind: str
+    table: Table
+    after: Table | None
+    floor: np.ndarray
+    floor_high: np.ndarray
+    best: np.ndarray | None
 
 
 def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] = (),
@@ -72,21 +88,12 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
              else [after] if after is not None else [])
     no_gyro = not any(p.has_gyro for p in parts)
-    cells = []
-    for k, kind in enumerate(KINDS):
-        table = table_of(joined, k, seed=k)
-        if table is None:
-            continue
-        table_after = table_of(after, k, seed=k) if after is not None else None
-        level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
-        best = _best([_rms(a, k) for a in alone], effects, table.rms, level) if table_after else None
-        cells += _cells(kind, table, table_after, best, level, top, bool(nominal), no_gyro)
+    cells: list[Cell] = []
+    for phase in range(len(KINDS)):
+        tables = _phase_tables(phase, joined, after, alone, phase_floor(floors, phase), effects)
+        if tables is not None:
+            cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
-
-
-def significant(cell: Cell) -> bool:
-    """Whether the cell's interval lies above the upper end of its floor's."""
-    return sure_ratio(cell) > 1.0
 
 
 def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
@@ -126,14 +133,9 @@ def ratio(cell: Cell) -> float:
     return cell.gap / max(cell.floor, TINY)
 
 
-def sure_ratio(cell: Cell) -> float:
-    """The lower end of the cell's gap over the upper end of its floor."""
-    return (cell.low or 0.0) / max(cell.floor_high or cell.floor, TINY)
-
-
 def overall(cells: Iterable[Cell], key: str = "gap") -> float:
     """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
-    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != "ground"
+    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != KINDS[GROUND]
              and getattr(c, key) is not None and c.floor > 0.0]
     return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
 
@@ -171,7 +173,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     data = Data(study, [flight])
     sensor = sensor_rms(study.vehicle) ** 2
     power = gap.power.copy()
-    for rows, regime in ((gap.phase == GROUND, "ground"), (gap.phase != GROUND, "air")):
+    for rows, regime in ((gap.phase == GROUND, REST), (gap.phase != GROUND, AIR)):
         density = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
         modelled = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
                     for p in (random_effects.power(data, t)[0][regime] for t in random))
@@ -197,40 +199,45 @@ def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
     return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _cells(kind: str, table: Table, table_after: Table | None, best: np.ndarray | None, level: np.ndarray,
-           top: np.ndarray, baseline: bool, no_gyro: bool) -> list[Cell]:
-    """The cells of one phase; level, top: floor and its upper end; best: name of the effect that takes most."""
-    cells = []
-    visible = _visible(kind, baseline, no_gyro)
-    for r, regime in enumerate(REGIMES):
-        if table.seconds[r] < LEAST_SECONDS:
-            continue
-        for b, band in enumerate(BANDS_HZ):
-            for c, channel in enumerate(CHANNELS):
-                if not visible[b, c] or not np.isfinite(table.rms[r, b, c]):
-                    continue
-                cells.append(Cell(
-                    channel.name, band, kind, float(table.rms[r, b, c]), float(level[r, b, c]), channel.unit,
-                    float(table.low[r, b, c]), float(table.high[r, b, c]), regime, int(table.blocks[r]),
-                    int(table.flights[r]), None if table_after is None else float(table_after.rms[r, b, c]),
-                    float(top[r, b, c]), (best[r, b, c] or None) if best is not None else None))
+def _phase_tables(phase: int, before: Sums, after: Sums | None, alone: Sequence[Sums],
+                  floor: tuple[np.ndarray, np.ndarray], effects: Sequence[str]) -> PhaseTables | None:
+    """The tables of a phase, None where no flight has it. alone: with each of the effects by itself in the model."""
+    table = table_of(before, phase, seed=phase)
+    if table is None:
+        return None
+    table_after = table_of(after, phase, seed=phase) if after is not None else None
+    best = _best([_rms(a, phase) for a in alone], effects, table.rms, floor[0]) if table_after else None
+    return PhaseTables(KINDS[phase], table, table_after, *floor, best)
+
+
+def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
+    """The cells of one phase; shown (bands, COUNT): those that mean something in it."""
+    table, after, cells = phase.table, phase.after, []
+    long = table.seconds >= LEAST_SECONDS
+    for r, b, c in np.argwhere(long[:, None, None] & shown & np.isfinite(table.rms)):
+        cells.append(Cell(
+            CHANNELS[c].name, BANDS_HZ[b], phase.kind, float(table.rms[r, b, c]), float(phase.floor[r, b, c]),
+            CHANNELS[c].unit, float(table.low[r, b, c]), float(table.high[r, b, c]), REGIMES[r], int(table.blocks[r]),
+            int(table.flights[r]), None if after is None else float(after.rms[r, b, c]),
+            float(phase.floor_high[r, b, c]), None if phase.best is None else phase.best[r, b, c] or None))
     return cells
 
 
-def _visible(kind: str, baseline: bool, no_gyro: bool) -> np.ndarray:
-    """Mask (bands, COUNT) of the cells that mean something in a phase.
+def visible(phase: int, baseline: bool, no_gyro: bool) -> np.ndarray:
+    """Mask (bands, COUNT) of the cells that mean something in a phase, a place in KINDS.
 
     Rates hold turns that were flown, so in the air they are only held against baseline
     flights; without a gyro torque is known at low frequency only; commands need a law.
     """
-    visible = np.ones((len(BANDS_HZ), COUNT), bool)
-    visible[1:, RATE] = False
-    visible[:, RATE] &= kind == "ground" or baseline
-    visible[0, COMMAND], visible[-1, COMMAND] = False, False
-    if kind == "ground":
-        visible[:, COMMAND] = False
+    at_rest = phase == GROUND
+    out = np.ones((len(BANDS_HZ), COUNT), bool)
+    out[1:, RATE] = False
+    out[:, RATE] &= at_rest or baseline
+    out[0, COMMAND], out[-1, COMMAND] = False, False
+    if at_rest:
+        out[:, COMMAND] = False
     if no_gyro:
-        visible[1:, TORQUE] = False
-    if no_gyro and kind == "ground":
-        visible[:, TORQUE] = False
-    return visible
+        out[1:, TORQUE] = False
+    if no_gyro and at_rest:
+        out[:, TORQUE] = False
+    return out

@@ -13,10 +13,10 @@ from airtouch.gap.result import Cell, Ranked
 from airtouch.logs.segments import KINDS
 
 GROUND = "ground"
-MOST_RANKED = 10  #: candidates of a ranking that are shown
-WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse
+MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
+WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse; chosen
 TINY = 1e-12  #: floor at least, in a channel's unit: no gap over a floor of 0 is infinite
-HALF = 0.5  #: fraction of a cell's energy from which on the named effects close it
+HALF = 0.5  #: fraction of a cell's energy from which on the named effects close it; chosen
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,22 @@ def after(cell: Cell) -> float:
     return (cell.gap if cell.after is None else cell.after) / max(cell.floor, TINY)
 
 
+def sure_ratio(cell: Cell) -> float:
+    """The lower end of the cell's gap over the upper end of its floor; 0 where the gap has no interval."""
+    return over_floor(cell, cell.low or 0.0)
+
+
+def significant(cell: Cell) -> bool:
+    """Whether the gap has an interval, and it lies above that of the floor, which is TINY at least."""
+    return sure_ratio(cell) > 1.0
+
+
 def stands_out(cell: Cell) -> bool:
-    """Whether the gap's interval lies above that of the floor."""
+    """Whether the gap lies above the interval of the floor: by its own interval, or by itself where it has none.
+
+    The cells of flights without a gyro (`gap.balance`) have no interval. They may stand out, so that a headline can
+    name one, and none is `significant`: neither a list of the largest cells nor the colours of a report show them.
+    """
     return (cell.gap if cell.low is None else cell.low) > (cell.floor_high or cell.floor)
 
 

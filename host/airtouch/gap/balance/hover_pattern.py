@@ -1,0 +1,138 @@
+"""What a hover shows without a gyro: the balance of the motors, how unsteady it is, and how the estimate is corrected.
+
+Angular acceleration is not measured then, but its mean is zero in hover. So the mean commanded
+thrusts are the torques that act on the vehicle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.loop.command_spectra import MIX
+from airtouch.logs.flight_log import VELOCITY
+from airtouch.logs.segments import runs
+from airtouch.vehicle import Vehicle
+
+#: thrust at a PWM grows with voltage to this power: 1.2 between the nominal flights of CrazyPAD, 1.0 within one
+#: (host/docs/gap-real.md)
+VOLTAGE_EXPONENT = 1.2
+VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
+SETTLE_S = 0.8  #: s after take-off and before landing that are no hover yet; chosen
+LEAST_S = 4.0  #: s that a hover lasts at least: the spectra need 2.56 s (SPECTRUM_SAMPLES); chosen
+SPECTRUM_SAMPLES = 256  #: of a block of the spectra: bins of 0.4 Hz, three of them in HEAVE_HZ; chosen
+UNSTEADY_HZ = (2.0, 35.0)  #: band of the commands' unsteadiness; chosen
+UNSTEADY_BANDS = 4  #: parts of UNSTEADY_HZ, equal in octaves, whose log power has the same weight; chosen
+HEAVE_HZ = (0.9, 2.0)  #: band of the vertical acceleration's heave; chosen
+LEAST_POWER = -9.0  #: log10 of a power or of a variance; nothing logged is below
+
+
+@dataclass(frozen=True)
+class HoverPattern:
+    """The hovers of one flight in eight numbers; NaN where it has none.
+
+    balance (4,): logarithm of the lift, in units of the weight (at 1 V where the voltage is logged); roll, pitch and
+    yaw over the lift. power (2,): log10 of the power of unsteadiness (1/Hz) and heave (m^2/s^4/Hz).
+    corrections (2,): log10 of the variance by which the estimated velocity is corrected, (m/s)^2, sideways and upwards;
+    LEAST_POWER where the log has no velocity.
+    """
+
+    balance: np.ndarray
+    power: np.ndarray
+    corrections: np.ndarray
+
+    @property
+    def known(self) -> bool:
+        """Whether the flight has a hover in which all eight numbers are known."""
+        return bool(np.isfinite(self.array()).all())
+
+    def array(self) -> np.ndarray:
+        """The eight numbers, (8,)."""
+        return np.concatenate([self.balance, self.power, self.corrections])
+
+
+NO_HOVER = HoverPattern(np.full(4, np.nan), np.full(2, np.nan), np.full(2, np.nan))
+
+
+def mean_pattern(patterns: Sequence[HoverPattern]) -> HoverPattern:
+    """Mean of the patterns of flights that have a hover; at least one has."""
+    balance, power, corrections = (np.nanmean(np.array(values), axis=0) for values in (
+        [p.balance for p in patterns], [p.power for p in patterns], [p.corrections for p in patterns]))
+    return HoverPattern(balance, power, corrections)
+
+
+class _Stretch(NamedTuple):
+    """One hover: mean of the mixed thrust (4,), log10 powers, variance of the corrections along x, y and z (3,)."""
+
+    samples: int
+    mixed: np.ndarray
+    unsteadiness: float
+    heave: float
+    corrections: np.ndarray
+
+
+def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) -> HoverPattern:
+    """The pattern of a flight, its hovers weighted by their length.
+
+    at_one_volt: take the lift at 1 V, for flights that log the voltage; else at the voltage flown.
+    """
+    mixed, corrections = _mixed_thrust(flight, vehicle, at_one_volt), _corrections(flight)
+    stretches = [_stretch(mixed[first:last], flight.acceleration[first:last, 2], corrections[first:last - 1])
+                 for first, last in hovers(flight)]
+    if not stretches:
+        return NO_HOVER
+    samples = [s.samples for s in stretches]
+    mean = np.average([s.mixed for s in stretches], axis=0, weights=samples)
+    power = [np.average([s.unsteadiness for s in stretches], weights=samples),
+             np.average([s.heave for s in stretches], weights=samples)]
+    x, y, z = np.average([s.corrections for s in stretches], axis=0, weights=samples)
+    return HoverPattern(np.array([np.log(mean[0]), *(mean[1:] / mean[0])]), np.array(power),
+                        np.log10(np.maximum([x + y, z], 10.0 ** LEAST_POWER)))
+
+
+def hovers(flight: Flight) -> list[tuple[int, int]]:
+    """Stretches in the air without take-off and landing: first sample, and the one after the last."""
+    air = (flight.phase != GROUND) & ~flight.on_ground
+    trim = int(SETTLE_S / PERIOD_S)
+    trimmed = [(a + trim, b - trim) for a, b in runs(air)]
+    return [(a, b) for a, b in trimmed if (b - a) * PERIOD_S >= LEAST_S]
+
+
+def _mixed_thrust(flight: Flight, vehicle: Vehicle, at_one_volt: bool) -> np.ndarray:
+    """Commanded lift, roll, pitch and yaw (n, 4) in units of the weight."""
+    weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
+    thrust = vehicle.thrust(flight.pwm) / weight
+    if at_one_volt and flight.log.has("vbat_V"):
+        voltage = np.nan_to_num(flight.log["vbat_V"], nan=float(np.nanmedian(flight.log["vbat_V"])))
+        smooth = gaussian_filter1d(voltage, VOLTAGE_SAMPLES, mode="nearest")
+        thrust = thrust * smooth[:, None] ** VOLTAGE_EXPONENT
+    return thrust @ MIX.T
+
+
+def _stretch(mixed: np.ndarray, upwards: np.ndarray, corrections: np.ndarray) -> _Stretch:
+    """One hover, from mixed thrust (n, 4), vertical acceleration (n,) and corrections of the velocity (n - 1, 3)."""
+    from scipy.signal import welch  # slow to import, and seldom needed
+
+    f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES, axis=0)
+    f, of_heave = welch(upwards, 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES)
+    heave = float(np.log10(of_heave[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
+    return _Stretch(len(mixed), mixed.mean(axis=0), _unsteadiness(f, of_commands), heave, corrections.var(axis=0))
+
+
+def _unsteadiness(f: np.ndarray, power: np.ndarray) -> float:
+    """Mean log10 power of roll, pitch and yaw commands (bins, 3) over the UNSTEADY_BANDS."""
+    edges = np.geomspace(*UNSTEADY_HZ, UNSTEADY_BANDS + 1)
+    pairs = zip(edges[:-1], edges[1:], strict=True)
+    return float(np.array([np.log10(power[(f >= a) & (f < b)].mean(axis=0)) for a, b in pairs]).mean())
+
+
+def _corrections(flight: Flight) -> np.ndarray:
+    """What the estimated velocity changes from row to row beyond the acceleration, m/s (n - 1, 3); else zeros."""
+    if not all(flight.log.has(name) for name in VELOCITY):
+        return np.zeros((len(flight) - 1, 3))
+    velocity = np.column_stack([flight.log[name] for name in VELOCITY])
+    world = np.einsum("nij,nj->ni", flight.turn, flight.acceleration)
+    return np.nan_to_num(np.diff(velocity, axis=0) - 0.5 * PERIOD_S * (world[1:] + world[:-1]))

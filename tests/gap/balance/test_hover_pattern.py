@@ -1,0 +1,62 @@
+"""The eight numbers of a hover against closed forms: commands, voltage and corrections of known size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.balance.balance_result import side_is_sure
+from airtouch.gap.balance.hover_hypotheses import commanded_change
+from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, hovers, mean_pattern
+from airtouch.logs.flight_log import VELOCITY
+from gap_flights import VEHICLE, flight, noise
+
+SECONDS, VOLTAGE_V = 20.0, 3.7
+
+
+def noisy(seconds=SECONDS, **columns):
+    """A hover whose commands and acceleration are white noise around a mean, as spectra of a constant are 0."""
+    hover = flight(seconds, noise(seconds, 0.1, 1))
+    pwm = hover.pwm + np.random.default_rng(2).normal(0.0, 300.0, hover.pwm.shape)
+    return replace(hover, pwm=pwm, log=hover.log.with_columns(columns))
+
+
+def test_a_rotor_with_more_thrust_is_the_change_that_hypotheses_draw():
+    hover, stronger = noisy(), noisy()
+    stronger.pwm[:, 2] = 45000.0
+    thrust = [VEHICLE.thrust(f.pwm).mean(axis=0) for f in (hover, stronger)]
+    difference = hover_pattern(stronger, VEHICLE).balance - hover_pattern(hover, VEHICLE).balance
+    np.testing.assert_allclose(difference, commanded_change((thrust[1] / thrust[0])[None])[0], atol=2e-3)
+    assert np.sign(difference).tolist() == [1.0, 1.0, 1.0, -1.0]
+
+
+def test_the_lift_at_one_volt_is_that_at_the_voltage_flown_times_its_power():
+    hover = noisy(vbat_V=np.full(round(100 * SECONDS), VOLTAGE_V))
+    at_one, as_flown = (hover_pattern(hover, VEHICLE, at_one_volt).balance for at_one_volt in (True, False))
+    np.testing.assert_allclose(at_one - as_flown, [1.2 * np.log(VOLTAGE_V), 0.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_corrections_are_the_steps_of_the_velocity_that_no_acceleration_makes():
+    still = np.zeros((round(100 * SECONDS), 3))
+    velocity = noise(SECONDS, 0.01, 3)
+    hover = replace(noisy(**dict(zip(VELOCITY, velocity.T, strict=True))), acceleration=still)
+    with np.errstate(divide="ignore"):  # heave of no acceleration
+        corrections = hover_pattern(hover, VEHICLE).corrections
+    np.testing.assert_allclose(10.0 ** corrections, [4e-4, 2e-4], rtol=0.15)  # two and one axis, twice the variance
+    assert hover_pattern(noisy(), VEHICLE).corrections.tolist() == [LEAST_POWER, LEAST_POWER], "no velocity"
+
+
+@pytest.mark.parametrize(("seconds", "count"), [(3.9, 0), (4.1, 1)])
+def test_a_hover_lasts_four_seconds_without_take_off_and_landing(seconds, count):
+    hover = noisy(seconds + 2.0 * SETTLE_S)
+    assert len(hovers(hover)) == count and hover_pattern(hover, VEHICLE).known == bool(count)
+
+
+def test_a_flight_without_a_hover_takes_no_part_in_the_mean():
+    one, none = (hover_pattern(noisy(seconds), VEHICLE) for seconds in (SECONDS, 3.0))
+    np.testing.assert_array_equal(mean_pattern([one, none]).array(), one.array())
+
+
+@pytest.mark.parametrize(("right", "sure"), [(0.95, True), (0.85, False), (0.15, False), (0.05, True)])
+def test_a_side_is_sure_from_nine_in_ten_on(right, sure):
+    assert side_is_sure(np.array([1.0, -1.0]), np.array([right, 1.0 - right])) == sure
