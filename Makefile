@@ -30,7 +30,7 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 	$(BIN)/airtouch demo --force
 
 test: setup  ## every test, sanitizers included
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 lint: setup  ## ruff over Python and notebooks, mypy over types, clang-format over C (pyproject.toml, .clang-format); FIX=1 mends what it can
 	$(BIN)/ruff check $(if $(FIX),--fix) .

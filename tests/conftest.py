@@ -17,6 +17,10 @@ sys.dont_write_bytecode = False
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
 
+#: files that take longest, in this order: begun first, so that no worker is left with one of them at the end
+LONGEST = ("test_blind.py", "test_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
+           "test_user_effect.py", "test_adapt.py", "test_crazypad_ideal.py", "test_overhead.py", "test_own_effect.py")
+
 pytest_make_collect_report = skips.pytest_make_collect_report
 pytest_runtest_makereport = skips.pytest_runtest_makereport
 
@@ -28,6 +32,11 @@ def pytest_configure(config):
     """The simulator is compiled once, before several workers would each do so."""
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         importlib.import_module("airtouch.simulation.compiled").compile_all()
+
+
+def pytest_collection_modifyitems(items):
+    """The longest files first; needs `--no-loadscope-reorder`, as xdist has an order of its own."""
+    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
 
 
 def pytest_collection_finish():

@@ -27,8 +27,8 @@ Where each decision is made; a folder imports only those above it:
   a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `feature_space`; each effect an
   `effect_class`; how likely a flight is under it, `density`, under several or something without a name, `hypotheses`;
   a `library` holds what `build` learned by `learning` flights and `exposure` to what has no name, and what
-  `calibration` measured with others; classes of a user's effects come from `own_effect`; `readout` gives a strength in the effect's own units; `inference` names the
-  effects.
+  `calibration` measured with others; classes of a user's effects come from `own_effect`; `readout` gives a strength in
+  the effect's own units; `inference` names the effects.
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
   that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the

@@ -32,11 +32,6 @@ def fly(count, effects=(), seed=0, vehicle=VEHICLE):
 
 
 @pytest.fixture(scope="module")
-def study():
-    return calibrate.calibrated(VEHICLE, fly(4, seed=31))[0]
-
-
-@pytest.fixture(scope="module")
 def study_apart():
     return calibrate.calibrated(VEHICLE, fly(3, APART, seed=31))[0]
 
@@ -138,7 +133,7 @@ def select_from(study, flights):
     return [s.name for s in selection.steps], {e.name: e.parameters for e in chosen_effects(data, selection)}, data
 
 
-@pytest.mark.parametrize(("amplitude", "seed"), [(0.3, 41), (1.0, 42), (3.0, 43)])
+@pytest.mark.parametrize(("amplitude", "seed"), [(0.3, 41), (3.0, 43)])
 def test_vibration_is_named_and_not_called_noise(study_apart, amplitude, seed):
     effects = [("vibration", {"amplitude": amplitude, "gyro": 0.05}), *APART]
     names, values, _ = select_from(study_apart, fly(1, effects, seed=seed))
@@ -153,7 +148,7 @@ def test_lines_that_lie_upon_each_other_are_vibration_too(study, seed):
     assert names[0] == "vibration" and "imu_noise" not in names
 
 
-@pytest.mark.parametrize(("factor", "seed"), [(1.2, 51), (1.5, 52), (3.0, 53)])
+@pytest.mark.parametrize(("factor", "seed"), [(1.2, 51), (3.0, 53)])
 def test_noise_is_named_and_not_called_vibration(study, factor, seed):
     names, values, _ = select_from(study, fly(1, {"imu_noise": {"factor": factor}}, seed=seed))
     assert names[0] == "imu_noise" and "vibration" not in names
