@@ -207,6 +207,3 @@ def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
         else:
             columns[key] = np.where(good, values, np.nan)
     return FlightLog(columns, log.meta), unfit
-
-
-less = without_columns  # the name by which `gap.relations` imports it

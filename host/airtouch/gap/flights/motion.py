@@ -129,6 +129,3 @@ def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:
     change = np.diff(height, prepend=height[0])
     change[np.abs(change) > STEP_M] = 0.0
     return height[0] + np.cumsum(change)
-
-
-held = interpolate_missing  # the name by which `gap.relations` imports it

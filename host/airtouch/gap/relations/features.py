@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from airtouch.gap.flights.flight import Flight, less
+from airtouch.gap.flights.flight import Flight, without_columns
 from airtouch.gap.relations import coherence, edge_steps, moments
 from airtouch.gap.relations.flight_signals import readable, signals_of
 from airtouch.logs.flight_log import RPM
@@ -29,6 +29,6 @@ def features(flight: Flight, vehicle: Vehicle) -> np.ndarray | None:
     """
     if flight.rates is None or not readable(flight.log):
         return None
-    signals = signals_of(less(flight, vehicle, UNSEEN), vehicle)
+    signals = signals_of(without_columns(flight, vehicle, UNSEEN), vehicle)
     return np.concatenate([coherence.coherence(signals), moments.moments(signals, vehicle),
                            edge_steps.edge_steps(signals)])

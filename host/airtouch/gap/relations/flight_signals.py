@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from airtouch.gap.flights.contact import within
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import held
+from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.gap.signals.channels import FORCE, TORQUE, angular_acceleration, residual
 from airtouch.logs.flight_log import ATTITUDE, GYRO, VELOCITY, FlightLog
@@ -51,24 +52,25 @@ def readable(log: FlightLog) -> bool:
 def signals_of(flight: Flight, vehicle: Vehicle) -> FlightSignals:
     """The signals of a flight whose log is `readable`; vehicle: as declared, not as calibrated."""
     log = flight.log
-    angles, velocity = held(log.stack(ATTITUDE)), flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
+    angles, velocity = interpolate_missing(log.stack(ATTITUDE)), flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
     force = np.nan_to_num(residual(flight, vehicle))
     gravity = flight.turn[:, 2, :] * vehicle.gravity_mps2
     assert flight.rates is not None  # `NEEDED` has the gyro
     rates = 0.5 * (flight.rates + np.roll(flight.rates, -1, axis=0))
-    down = _rate(held(log["zrange_m"])[:, None])
-    down = np.where(np.abs(down) > JUMP_MPS, 0.0, down) - held(log["vz_mps"])[:, None]
+    down = _rate(interpolate_missing(log["zrange_m"])[:, None])
+    down = np.where(np.abs(down) > JUMP_MPS, 0.0, down) - interpolate_missing(log["vz_mps"])[:, None]
     table = np.column_stack([
         vehicle.thrust(flight.pwm) @ MIX.T, angular_acceleration(flight), flight.acceleration[:, 2],
         force[:, FORCE], force[:, TORQUE], _rate(velocity) - (flight.acceleration - gravity), _rate(angles) - rates,
         down])
     if flight.bridged.any():
-        table = held(np.where(flight.bridged[:, None], np.nan, table))
+        table = interpolate_missing(np.where(flight.bridged[:, None], np.nan, table))
     touched = _touched(flight, vehicle)
     good = flight.usable & ~flight.bridged & ~touched
     rest = flight.on_ground & good
-    return FlightSignals(replace(flight, usable=flight.usable & ~touched), table, velocity, angles, held(log["z_m"]),
-                         (flight.phase != GROUND) & good, rest if rest.any() else flight.on_ground)
+    return FlightSignals(replace(flight, usable=flight.usable & ~touched), table, velocity, angles,
+                         interpolate_missing(log["z_m"]), (flight.phase != GROUND) & good,
+                         rest if rest.any() else flight.on_ground)
 
 
 def _rate(values: np.ndarray) -> np.ndarray:
@@ -79,6 +81,5 @@ def _rate(values: np.ndarray) -> np.ndarray:
 def _touched(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Samples (n,) in flight around those at which the legs may touch what is below."""
     standing = float(prepare(vehicle, ())[0][0]["leg_below_range"])
-    low = (flight.phase != GROUND) & (held(flight.log["zrange_m"]) < standing + CONTACT_M)
-    wide = int(CONTACT_S / PERIOD_S)
-    return np.convolve(low, np.ones(2 * wide + 1), "same") > 0.5
+    low = (flight.phase != GROUND) & (interpolate_missing(flight.log["zrange_m"]) < standing + CONTACT_M)
+    return within(low, CONTACT_S)
