@@ -21,9 +21,9 @@ pytestmark = needs("tensorflow")
 
 
 class Shortened(tuple):
-    """(scenario, least share of a length), with the name that a scenario has."""
+    """(scenario, least share of a length), with the name and the table that a scenario has."""
 
-    name = "short"
+    name, table = "short", {}
 
 
 @pytest.fixture

@@ -40,7 +40,8 @@ def test_slope_and_scatter_are_found_again():
 
 
 @pytest.mark.parametrize("learner", ideal.LEARNERS)
-def test_learners_tell_what_is_apart_and_not_what_is_not(learner):
+def test_learners_tell_what_is_apart_and_not_what_is_not(learner, monkeypatch):
+    monkeypatch.setattr(ideal, "TREES", 40)  # so few tell these apart; more are time
     generator = np.random.default_rng(2)
     names = ["normal_flight", "cut_propeller_M3_3mm", "add_weight_W1_near_M3", "weight_on_string_W2_near_M3"]
     rows = [{"drone": "E8", "condition": n} for n in names for _ in range(12)]

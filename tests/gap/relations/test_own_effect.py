@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from airtouch.gap.relations import library, own_effect
+from airtouch.gap.relations import calibration, library, own_effect
 from airtouch.gap.relations.hypotheses import FlightFeatures
 from airtouch.gap.relations.learning import Scene, fly
 from airtouch.simulation import effects
@@ -32,9 +32,12 @@ EFFECT = Effect("no_thrust", "no rotor turns", (Parameter("share", "1", 0.05, 0.
 
 
 @pytest.fixture
-def register(tmp_path):
-    """Registers the effect of a text for one test."""
+def register(tmp_path, monkeypatch):
+    """Registers the effect of a text for one test; half as many flights as else, for time."""
     names = []
+    for name in ("PAIRS", "CALIBRATION", "LEAST_PAIRS"):
+        monkeypatch.setattr(own_effect, name, getattr(own_effect, name) // 2)
+    monkeypatch.setattr(calibration, "LEAST_FLIGHTS", 6)
 
     def of(text):
         file = tmp_path / "own.py"

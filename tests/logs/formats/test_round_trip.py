@@ -70,7 +70,7 @@ def test_write_is_whole_or_not_at_all(tmp_path):
     log = FlightLog({"t_s": np.arange(3.0)}, {"source": "x"})
     for name in ("a.csv", "a.csv.gz"):
         logs.write(log, tmp_path / name)
-        with pytest.raises(AirTouchError, match="--force"):
+        with pytest.raises(AirTouchError, match="force=True"):
             logs.write(log, tmp_path / name)
         logs.write(log, tmp_path / name, force=True)
         np.testing.assert_array_equal(logs.read(tmp_path / name)["t_s"], log["t_s"])
