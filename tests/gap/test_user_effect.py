@@ -8,6 +8,7 @@ import pytest
 
 import airtouch.gap.measure as measure
 from airtouch.gap.diagnose import brief, diagnose
+from airtouch.gap.relations import own_effect
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
 from hovers import STIFF
@@ -15,6 +16,13 @@ from hovers import STIFF
 PAGE = Path(__file__).parents[2] / "host/docs/effects.md"
 NAME = "made_up_magnet"  #: not the page's: who follows it to its end has a magnet in the package
 FORCE_N = 0.02
+
+
+@pytest.fixture(autouse=True)
+def few_flights(monkeypatch):
+    """The replay names these effects: a class of the relations from few flights is enough, for time."""
+    for name, count in (("PAIRS", 6), ("LEAST_PAIRS", 3), ("CALIBRATION", 4)):
+        monkeypatch.setattr(own_effect, name, count)
 
 
 @pytest.fixture
