@@ -94,14 +94,14 @@ def main() -> None:
     parser.add_argument("uri", help="of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850")
     parser.add_argument("height", type=float, help="to land at, m: where it took off")
     parser.add_argument("seconds", type=float, help="that the landing takes, s")
-    given = parser.parse_args()
+    options = parser.parse_args()
     from airtouch.crazyflie.connection.link import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     cflib_or_error()
     sys.stdin.read()
-    done = land(given.uri, given.height, given.seconds)
+    done = land(options.uri, options.height, options.seconds)
     what = "landing" if done else "NO CONTACT, land by hand"
     print(f"airtouch: the flying process is gone; {what}", file=sys.stderr)
 

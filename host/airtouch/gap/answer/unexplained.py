@@ -54,8 +54,8 @@ def over_floor(study: Study, flight: Flight, active: Sequence[Active], cell: Cel
     begin, c = starts(flight, AIR), COLUMN[cell.channel]
     if not len(begin):
         return np.zeros(0)
-    left = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
-    gap = interpolate_missing(left[:, c:c + 1])
+    residuals = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
+    gap = interpolate_missing(residuals[:, c:c + 1])
     f = frequencies(AIR)
     band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
     power = (np.abs(blocks(gap, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)

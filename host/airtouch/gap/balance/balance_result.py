@@ -46,8 +46,8 @@ class Fit:
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
     """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
-    def any_hovers(some: Sequence[Flight]) -> bool:
-        return any(hover_pattern(f, vehicle).known for f in some)
+    def any_hovers(flights_of_one_kind: Sequence[Flight]) -> bool:
+        return any(hover_pattern(f, vehicle).known for f in flights_of_one_kind)
     return all(f.rates is None for f in flights) and any_hovers(nominal) and any_hovers(flights)
 
 

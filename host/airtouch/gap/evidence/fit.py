@@ -63,18 +63,18 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
     for _ in range(TURNS if random and mean else 1):
-        found = gauss_newton(problem, mean, x, random_power, prior, bool(random))
-        x, active = found.x, active_at(mean, found.x)
+        solution = gauss_newton(problem, mean, x, random_power, prior, bool(random))
+        x, active = solution.x, active_at(mean, solution.x)
         command_power, cost = problem.commanded(active, bool(random))
-        random_power = _random_power(problem, random, found.values, active) if random else 0.0
-        level = problem.likelihood(found.values, random_power + command_power) - cost
+        random_power = _random_power(problem, random, solution.values, active) if random else 0.0
+        level = problem.likelihood(solution.values, random_power + command_power) - cost
         if level < last_level + SETTLED:
             break
         last_level = level
     if random:
         command_power, cost = problem.commanded([*active, *(t.active() for t in random)], True)
-    gained = problem.likelihood(found.values, random_power + command_power) - cost
-    return Fit(_with_values(terms, x, random), x, found.covariance, found.offsets, gained)
+    gained = problem.likelihood(solution.values, random_power + command_power) - cost
+    return Fit(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
 
 
 def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> tuple[Term, ...]:

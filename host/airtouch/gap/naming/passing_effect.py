@@ -25,12 +25,12 @@ def passing_effect(on: Trial, singles: Mapping[str, Judged], least: Mapping[str,
     if on.data.study.scatter is None:
         return None
     steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
-    found = [g for g in gated(on.data, without).values()
-             if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
-    if not found:
+    passing = [g for g in gated(on.data, without).values()
+               if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+    if not passing:
         return None
-    told = [g for g in found if g.key == TOLD]
-    return _as_judged(on, max(told or found, key=lambda g: g.gain))
+    overhead = [g for g in passing if g.key == TOLD]
+    return _as_judged(on, max(overhead or passing, key=lambda g: g.gain))
 
 
 def _as_judged(on: Trial, effect: Gated) -> Judged:

@@ -81,7 +81,7 @@ def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.nd
     tables = [_columns(screen, part, (*mean, *other)) for part in parts]
     n = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - n)
-    gain, found, variances = 0.0, [], []
+    gain, fitted, variances = 0.0, [], []
     for train, test in ((0, 1), (1, 0)):
         problem = problem_of(screen.data, parts[train])
         x, variance = _least_squares(problem, tables[train], residuals[train], extra_power[train], bounds)
@@ -90,9 +90,9 @@ def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.nd
         after, cost = without_offsets(problem, residuals[test] + moved, extra_power[test])
         before, paid = screen.before(problem, residuals[test], extra_power[test])
         gain += problem.likelihood(after, extra_power[test]) - cost - before + paid
-        found.append(x[:n])
+        fitted.append(x[:n])
         variances.append(variance[:n])
-    return gain, found, variances
+    return gain, fitted, variances
 
 
 def _columns(screen: Screen, part: Part, terms: Sequence[Term]) -> list[np.ndarray]:

@@ -68,11 +68,11 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     passing = passing_effect(search.on, search.alone, search.least, without)
     if not replay_may_name(passing, inference):
         return answer
-    found = forward(search, passing)
-    first = next(iter(found.named), "")
+    state = forward(search, passing)
+    first = next(iter(state.named), "")
     if first not in (*SHAKES, inference.likeliest):
         return answer
-    return _by_replay(search, found, passing)
+    return _by_replay(search, state, passing)
 
 
 def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
@@ -87,20 +87,20 @@ def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
 
 
-def _by_replay(search: Search, found: State, passing: Judged | None) -> Selection:
-    """The selection of what a forward search found, with what it leaves.
+def _by_replay(search: Search, state: State, passing: Judged | None) -> Selection:
+    """The selection that a forward search ended in, with what it leaves.
 
     passing: the effect that comes and goes of its first step; it is taken back where beside the others it is no more
     than nominal flights have.
     """
     on, study = search.on, search.on.data.study
-    if passing is not None and as_in_nominal_flights(on.data, passing, found.steps):
-        found = forward(search, None)
+    if passing is not None and as_in_nominal_flights(on.data, passing, state.steps):
+        state = forward(search, None)
     before = nameless(on, None)
-    after = nameless(on, found.steps[-1]) if found.steps else before
-    last = found.steps[-1].terms if found.steps else ()
+    after = nameless(on, state.steps[-1]) if state.steps else before
+    last = state.steps[-1].terms if state.steps else ()
     selection = Selection(
-        found.singles, found.steps, before, after, on.parts, found.least, study.nominal,
+        state.singles, state.steps, before, after, on.parts, state.least, study.nominal,
         assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
         nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
         of_times=clock_left(on.data, [t.name for t in last]))

@@ -30,10 +30,10 @@ def _gain_without(on: Trial, steps: Sequence[Judged], dropped: Judged) -> float:
     for train, test in ROUND_TRIP:
         known = _others(last.fits[train].terms, dropped.name)
         start = [t.scaled(t.values) for t in known if t.kind == MEAN]
-        found = fit(on.data, on.parts[train], known, np.concatenate(start) if start else None)
-        gain += gain_of(on, test, found.terms)
+        refit = fit(on.data, on.parts[train], known, np.concatenate(start) if start else None)
+        gain += gain_of(on, test, refit.terms)
     cost_of_dropped = dropped.choice - (steps[place - 1].choice if place else 0.0)
-    return gain - price_of(found.terms) - (last.choice - cost_of_dropped)
+    return gain - price_of(refit.terms) - (last.choice - cost_of_dropped)
 
 
 def _others(terms: Sequence[Term], name: str) -> list[Term]:

@@ -33,6 +33,7 @@ from airtouch.gap.relations.learning import (
     disturbed_flights,
     drawn_flights,
     fly,
+    halved,
     scaled,
 )
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
@@ -132,12 +133,8 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
 
 def _weakest(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing) -> float:
     """The highest strength of a class, halved until it hardly shows."""
-    strength = drawing.kind.highest
-    for _ in range(HALVINGS):
-        if _length_of_shift(scene, whitening, nominal, drawing, strength) <= WEAKEST_SHIFT:
-            break
-        strength /= 2.0
-    return strength
+    return halved(drawing.kind.highest, HALVINGS, lambda strength: _length_of_shift(
+        scene, whitening, nominal, drawing, strength) <= WEAKEST_SHIFT)
 
 
 def _length_of_shift(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from airtouch.gap.relations.feature_space import MIDDLE_TWO_THIRDS
 from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
-from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, scaled
+from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.signatures.alike import interchangeable
@@ -145,13 +145,12 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
 
 def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float) -> float:
     """The highest strength of a class, halved until fewer than half of its flights show it."""
-    strength = highest
-    for _ in range(HALVINGS):
+    def hides(strength: float) -> bool:
+        """Whether fewer than half of the flights at a strength show the class; False where none ends well."""
         ended = [one for one in (fitted(strength) for _ in range(TRIED)) if one is not None]
-        if ended and np.mean([one.shows for one in ended]) < SHOWN:
-            break
-        strength /= 2.0
-    return strength
+        return bool(ended) and float(np.mean([one.shows for one in ended])) < SHOWN
+
+    return halved(highest, HALVINGS, hides)
 
 
 def _measured(library: Library, drawing: Drawing, one: _Fitted, with_second: bool) -> CalibrationFlight:

@@ -90,6 +90,16 @@ def drawings(effect: str) -> list[Drawing]:
     return out
 
 
+def halved(highest: float, most: int, hides: Callable[[float], bool]) -> float:
+    """The highest strength of a class, halved until flights hide it, `most` times at most."""
+    strength = highest
+    for _ in range(most):
+        if hides(strength):
+            break
+        strength /= 2.0
+    return strength
+
+
 def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,
                   ) -> Iterator[tuple[int, Active, np.ndarray]]:
     """Number, effect and features of flights with an effect whose strengths are log-uniform between two."""

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.relations.build import HALVINGS, WEAKEST_SHIFT
 from airtouch.gap.relations.calibration import ClassCalibration, calibrate_class, with_calibrations
 from airtouch.gap.relations.effect_class import learn_class
-from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled
+from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, halved, scaled
 from airtouch.gap.relations.library import SHARES, Library
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
@@ -76,13 +76,12 @@ def _at_least(found: ClassCalibration, known: Sequence[ClassCalibration]) -> Cla
 
 def _weakest(library: Library, scene: Scene, drawing: Drawing) -> float:
     """The highest strength of an effect, halved until it moves the coordinates of a flight by WEAKEST_SHIFT or less."""
-    strength = drawing.kind.highest
-    for _ in range(HALVINGS):
+    def hides(strength: float) -> bool:
+        """Whether a flight at a strength is moved that little; False where it does not end well."""
         pair = _pair(library, scene, drawing, (0, strength))
-        if pair is not None and np.linalg.norm(pair.flight - pair.nominal) <= WEAKEST_SHIFT:
-            break
-        strength /= 2.0
-    return strength
+        return pair is not None and float(np.linalg.norm(pair.flight - pair.nominal)) <= WEAKEST_SHIFT
+
+    return halved(drawing.kind.highest, HALVINGS, hides)
 
 
 def _pair(library: Library, scene: Scene, drawing: Drawing, numbered: tuple[int, float]) -> Pair | None:
