@@ -9,6 +9,8 @@ FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c firmware/app/core/*.c 
   gap8/app/src/gap8_core.c
 FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/core -Igap8/kernels -Igap8/model -Igap8/app/src
 
+unexport PYTHONDONTWRITEBYTECODE  # packages are installed without: what was compiled once is kept
+
 .PHONY: help setup demo test lint tidy docs fuzz fuzz-logs mutate repeat bench firmware emulate gap8 flash clean
 
 help:  ## this list
@@ -23,7 +25,8 @@ setup: .venv/.kernels  ## make .venv with everything in it
 .venv/.kernels: .venv/.packages $(SOURCES)
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@echo "Compiling the simulator: half a minute the first time"
-	@$(BIN)/python -c "from airtouch.simulation import compiled; compiled.compile_all()"
+	@$(BIN)/python -c "import keras, matplotlib.pyplot, sklearn.ensemble" 2> /dev/null & \
+	  $(BIN)/python -c "from airtouch.simulation import compiled; compiled.compile_all()" && wait
 	@touch $@
 
 demo: setup  ## the main job: train, prune, export, detect through the C kernels, report

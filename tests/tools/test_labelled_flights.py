@@ -33,15 +33,15 @@ def run(monkeypatch, *arguments):
 
 
 def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, monkeypatch, capsys):
-    trained = []
-    fit = best.fit
+    trained, start = [], best.fit([made_flight(9)], recipe=SMALL)
+    start.save(tmp_path / "start.npz")
 
-    def spy(flights, **options):
+    def fit(flights, **_):
+        """No training: which flights a model would know is what counts here."""
         trained.append({log.source for log in flights})
-        return fit(flights, **options)
+        return start
 
-    fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
-    monkeypatch.setattr(best, "fit", spy)
+    monkeypatch.setattr(best, "fit", fit)
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
             "--draws", 2, "--seeds", 1, "--steps", SMALL.steps, "--alone-steps", SMALL.steps)
     run(monkeypatch, *call)
@@ -76,10 +76,10 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
 
 def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monkeypatch, capsys):
     """One labelled flight, the other of its day without down range; the scored day is in neither training."""
-    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
+    start = best.fit([made_flight(9)], recipe=SMALL)
+    start.save(tmp_path / "start.npz")
     monkeypatch.setattr(labelled_flights, "simulated",
                         lambda folder, pool: adapt.SimulatedFlights([made_flight(20)], [None]))
-    monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
     taught, begun = [], []
 
     def self_trained(start, teacher, labelled, unlabelled, *rest):
@@ -89,8 +89,8 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
         return teacher
 
     monkeypatch.setattr(adapt, "self_trained", self_trained)
-    trained, fit = [], best.fit
-    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: trained.append(len(flights)) or fit(flights, *a, **o))
+    trained = []
+    monkeypatch.setattr(best, "fit", lambda flights, *_, **__: trained.append(len(flights)) or start)
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
             "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--unlabelled")
     run(monkeypatch, *call, "--twin", tmp_path)

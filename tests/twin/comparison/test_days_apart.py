@@ -34,8 +34,8 @@ def table(monkeypatch, capsys, *arguments):
 @pytest.mark.slow
 def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(fly_course, tmp_path, monkeypatch, capsys):
     shaking = PLAIN | {"motor_noise": {"rms": 0.02, "time": 0.2, "fast": 0.03}}
-    folder = write(tmp_path / "flights", fly_course, ["1", "2", "3"] * 10, {"3": shaking})
-    scores = table(monkeypatch, capsys, folder, "--fewest", 8)
+    folder = write(tmp_path / "flights", fly_course, ["1", "2", "3"] * 8, {"3": shaking})
+    scores = table(monkeypatch, capsys, folder, "--fewest", 6)
     assert set(scores) == {"two random halves", "1 against 2", "1 against 3", "2 against 3"}
     value, low, _ = (float(x) for x in re.findall(r"\d\.\d+", scores["1 against 3"]["hover"]))
     assert value > 0.95

@@ -51,7 +51,7 @@ def test_levers_at_edges_come_back(aim, vehicle, chosen):
     One wrong reading in 40 a second tells little beside the ridge: it comes nearer, no more.
     """
     low = float(np.median([0.8 - c.cruise_m for c in aim.courses]))  # a course is flown at the height that was logged
-    result = edge_fit.refine(aim, vehicle, chosen, values_of(chosen, 1, low), flights=36, fixed=FIXED)
+    result = edge_fit.refine(aim, vehicle, chosen, values_of(chosen, 1, low), flights=30, fixed=FIXED)
     print(result.misfit)
     assert result.misfit[0] > min(result.misfit[1:])
     both = values_of(chosen, 0, low), values_of(chosen, 1, low)

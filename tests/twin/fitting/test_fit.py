@@ -55,7 +55,7 @@ def truth(aim):
 
 @pytest.fixture(scope="module")
 def fit_result(aim, vehicle, chosen):
-    return fit.fit(aim, vehicle, chosen, rounds=7, flights=120, fixed=FIXED, seed=5)
+    return fit.fit(aim, vehicle, chosen, rounds=6, flights=90, fixed=FIXED, seed=5)
 
 
 def test_withheld_levers_are_recovered(fit_result, chosen, truth):
@@ -81,7 +81,7 @@ def test_a_fit_lowers_the_misfit_of_spectra_and_coherency(fit_result):
 
 
 def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, tmp_path):
-    settings = {"flights": 24, "fixed": FIXED, "seed": 2}
+    settings = {"flights": 12, "fixed": FIXED, "seed": 2}
     uninterrupted = fit.fit(aim, vehicle, chosen, rounds=3, **settings)
     fit.fit(aim, vehicle, chosen, rounds=1, state_file=tmp_path / "fit.json", **settings)
     progress_calls = []
@@ -94,16 +94,16 @@ def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, t
 def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
     (tmp_path / "fit.json").write_text("{")
     with pytest.raises(AirTouchError, match="damaged fit"):
-        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=tmp_path / "fit.json")
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=12, state_file=tmp_path / "fit.json")
 
 
 def test_a_fit_of_other_flights_is_refused(aim, vehicle, chosen, tmp_path):
     """One flight more, or another vehicle, is another fit."""
     path = tmp_path / "fit.json"
-    fit.fit(fit.Target(aim.courses[:-1], aim.features[:-1], aim.scatter), vehicle, chosen, rounds=1, flights=48,
+    fit.fit(fit.Target(aim.courses[:-1], aim.features[:-1], aim.scatter), vehicle, chosen, rounds=1, flights=12,
             state_file=path)
     with pytest.raises(AirTouchError, match="other flights"):
-        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=path)
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=12, state_file=path)
     keys = {fit.key(aim, vehicle, chosen), fit.key(aim, replace(vehicle, mass_kg=0.05), chosen),
             fit.key(aim, vehicle, chosen, seed=1), fit.key(aim, vehicle, chosen[1:])}
     assert len(keys) == 4
