@@ -7,9 +7,9 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
+from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.feature_space import Standard
 from airtouch.gap.relations.hypotheses import SIZES, FlightFeatures, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import Library

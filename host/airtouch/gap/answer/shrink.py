@@ -15,6 +15,7 @@ from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import Part
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
@@ -28,7 +29,6 @@ PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
 LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
 LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
-LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least; chosen
 JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
 
 

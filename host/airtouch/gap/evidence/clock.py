@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-LEAST_CLOCK_S = 2e-4  #: s, rms of a clock that nothing disturbs; chosen
 #: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
 CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
@@ -18,7 +18,7 @@ JITTER, LOSS = "time_jitter", "packet_loss"
 
 def jitter(data: Data) -> tuple[float, float]:
     """Rms (s) of the logged times beyond that of nominal flights, and the log likelihood that it gains."""
-    nominal = max(data.study.floor.clock_s, LEAST_CLOCK_S)
+    nominal = max(data.study.floor.clock_s, LEAST_JITTER_S)
     clock = np.concatenate([f.clock_s for f in data.flights])
     measured = max(float(np.std(clock)), 1e-9)
     if measured <= nominal:

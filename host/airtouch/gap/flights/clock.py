@@ -14,6 +14,7 @@ BACKWARDS_S = 0.05  #: step back of the clock that is no jitter: such a log is r
 LONGEST, LONGEST_ROWS = 3, 1000  #: rows with the lost ones at most: so many times those logged, and more; chosen
 ALIKE = 0.02  #: share of the median step by which a step may differ from it and count as alike; chosen
 MOST_ALIKE = 0.7  #: share of the steps from which the mean of those alike is the period; chosen
+LEAST_JITTER_S = 2e-4  #: s, rms of a clock that nothing disturbs: a jitter below it says nothing; chosen
 MISSING = 1.5  #: step, in periods, from which a row is missing: nearer to two periods than to one
 
 

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.random_draws import SHAPED
 

@@ -15,11 +15,11 @@ import numpy as np
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import Fit, fit
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.apparent import nominal_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
 from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, split_unlike
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import all_candidates, terms

@@ -7,9 +7,9 @@ from enum import IntEnum
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import exposure
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.readout import amount_of
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.random_draws import SHAPED, Kind, kinds_of, log_uniform

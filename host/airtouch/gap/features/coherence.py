@@ -5,8 +5,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from airtouch.gap.flights.flight import Flight
-from airtouch.gap.relations.flight_signals import (
+from airtouch.gap.features.feature import LEAST_COHERENCE, LEAST_LOG, Feature
+from airtouch.gap.features.flight_signals import (
     ANGLE_LEFT,
     COMMAND,
     FORCE_LEFT,
@@ -17,6 +17,7 @@ from airtouch.gap.relations.flight_signals import (
     TURN,
     FlightSignals,
 )
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 
 #: edges of the bands; chosen; the last one lies beyond half the log's rate, 50 Hz, which it so includes
@@ -38,20 +39,20 @@ GROUPS: dict[str, dict[str, int]] = {
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Names of what `coherence` gives: group, what of it (power, real, imaginary, alone), signals, band."""
-    out = []
+def table() -> tuple[Feature, ...]:
+    """What `coherence` gives: group, what of it (power, real, imaginary, alone), signals, number of the band."""
+    out: list[Feature] = []
     for group, signals in GROUPS.items():
         bands = range(len(BANDS_HZ) - 1)
-        out += [f"{group} power {a} {k}" for a in signals for k in bands]
-        out += [f"{group} {part} {a}:{b} {k}" for a, b in combinations(signals, 2) for part in ("real", "imaginary")
-                for k in bands]
-        out += [f"{group} alone {a} {k}" for a in signals for k in bands]
+        out += [Feature(f"{group} power {a} {k}", LEAST_LOG) for a in signals for k in bands]
+        out += [Feature(f"{group} {part} {a}:{b} {k}", LEAST_COHERENCE) for a, b in combinations(signals, 2)
+                for part in ("real", "imaginary") for k in bands]
+        out += [Feature(f"{group} alone {a} {k}", LEAST_LOG) for a in signals for k in bands]
     return tuple(out)
 
 
 def coherence(signals: FlightSignals) -> np.ndarray:
-    """Powers and coherences (len(names()),) of a flight in the air.
+    """Powers and coherences (len(table()),) of a flight in the air.
 
     Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the
     logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtouch.gap.features import coherence, flight_features
+from airtouch.gap.features.feature_space import cholesky_factor
+from airtouch.gap.features.flight_signals import COMMAND, LIFT, signals_of
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.relations import coherence, features
-from airtouch.gap.relations.feature_space import cholesky_factor
-from airtouch.gap.relations.flight_signals import COMMAND, LIFT, signals_of
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
 
@@ -24,7 +24,8 @@ def test_coherence_of_a_signal_and_its_noisy_copy(flight):
     signals = signals_of(flight, VEHICLE)
     table = rng.normal(size=signals.table.shape)
     table[:, LIFT.start] = 2.0 * table[:, COMMAND.start] + rng.normal(size=len(table))
-    coherences = dict(zip(coherence.names(), coherence.coherence(replace(signals, table=table)), strict=True))
+    values = coherence.coherence(replace(signals, table=table))
+    coherences = dict(zip((f.name for f in coherence.table()), values, strict=True))
     wide = [k for k, (a, b) in enumerate(zip(coherence.BANDS_HZ, coherence.BANDS_HZ[1:], strict=False)) if b - a > 3.0]
     real = np.mean([coherences[f"climb real command:lift {k}"] for k in wide])
     assert real == pytest.approx(2.0 / np.sqrt(5.0), abs=0.03)
@@ -39,22 +40,23 @@ def test_a_row_lost_by_chance_hardly_moves_the_relations(flight):
     log = flight.log
     rows = np.delete(np.arange(len(log)), len(log) // 2)
     holed = ready(FlightLog({k: v[rows] for k, v in log.columns.items()}, log.meta), VEHICLE)
-    before, after = (features.features(f, VEHICLE) for f in (flight, holed))
-    of_one_signal = np.array([" alone " in n for n in features.names()])
+    before, after = (flight_features.features(f, VEHICLE) for f in (flight, holed))
+    of_one_signal = np.array([" alone " in f.name for f in flight_features.table()])
     assert np.abs(after - before)[of_one_signal].max() < 1.0
 
 
 def test_battery_voltage_and_rotor_speeds_are_not_looked_at(flight):
     """A flight whose log has them has the features of one whose log has not."""
-    columns = {k: v for k, v in flight.log.columns.items() if k not in features.UNSEEN}
+    columns = {k: v for k, v in flight.log.columns.items() if k not in flight_features.UNSEEN}
     without_them = ready(FlightLog(columns, flight.log.meta), VEHICLE)
     assert flight.log.has("vbat_V")
-    assert features.features(flight, VEHICLE) == pytest.approx(features.features(without_them, VEHICLE), nan_ok=True)
+    with_them, without = (flight_features.features(f, VEHICLE) for f in (flight, without_them))
+    assert with_them == pytest.approx(without, nan_ok=True)
 
 
 def test_a_log_without_attitude_has_no_features(flight):
     columns = {k: v for k, v in flight.log.columns.items() if k != "roll_rad"}
-    assert features.features(ready(FlightLog(columns, flight.log.meta), VEHICLE), VEHICLE) is None
+    assert flight_features.features(ready(FlightLog(columns, flight.log.meta), VEHICLE), VEHICLE) is None
 
 
 def test_whitened_nominal_flights_have_no_covariance():

@@ -1,0 +1,39 @@
+"""Features in units of what nominal flights scatter by."""
+
+import numpy as np
+import pytest
+
+from airtouch.gap.features import feature
+from airtouch.gap.features.feature_space import SQUASHED, Standard, standard_of
+from airtouch.gap.features.flight_features import table
+
+
+def test_features_far_out_grow_with_the_logarithm_and_missing_ones_say_nothing():
+    standard = Standard(np.zeros(4), np.array([1.0, 1.0, 0.0, 1.0]))
+    values = standard(np.array([[2.0, -SQUASHED * np.e, 100.0, np.nan]]))[0]
+    assert values == pytest.approx([2.0, -2.0 * SQUASHED, 0.0, 0.0])
+
+
+def test_a_standard_is_the_median_and_the_middle_two_thirds():
+    rng = np.random.default_rng(1)
+    features = 3.0 + 2.0 * rng.normal(size=(1000, len(table())))
+    features[:50] = 1e6  # flights that hit something
+    standard = standard_of(features)
+    assert np.median(standard.middle) == pytest.approx(3.0, abs=0.2)
+    assert np.median(standard.deviation) == pytest.approx(2.0, rel=0.1)
+
+
+def test_no_feature_is_known_better_than_the_simulator_is():
+    """Features that do not vary at all: coherences, logarithms and the clock have a least deviation, others none."""
+    deviation = dict(zip((f.name for f in table()), standard_of(np.ones((50, len(table())))).deviation, strict=True))
+    assert deviation["roll real command:turn 0"] == feature.LEAST_COHERENCE
+    assert deviation["roll power command 0"] == feature.LEAST_LOG
+    assert deviation["clock rms"] == feature.LEAST_CLOCK and deviation["clock lost"] == feature.LEAST_LOST
+    assert deviation["later mean force left x"] == 0.0
+
+
+def test_every_feature_has_a_name_of_its_own_and_says_no_more_than_the_simulator_is_exact():
+    least = {f.name: f.least for f in table()}
+    assert len(least) == len(table())
+    assert {least[n] for n in least if " variance " in n or " power " in n or " alone " in n} == {feature.LEAST_LOG}
+    assert {least[n] for n in least if " real " in n or " imaginary " in n} == {feature.LEAST_COHERENCE}
