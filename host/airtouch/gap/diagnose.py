@@ -25,7 +25,7 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.nominal.consistency import differences
+from airtouch.gap.nominal.consistency import differences, flown_unlike
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
@@ -163,7 +163,7 @@ def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
     notes = [note for f in case.usable for note in f.notes] + [*of_logs]
     notes += list(case.calibration.notes) if case.calibration else [NO_BASELINE]
     notes += differences(case.study, case.nominal)
-    notes += measure.flown_unlike(case.study, case.usable)
+    notes += flown_unlike(case.study, case.usable)
     if len(case.judged) < len(case.usable):
         notes.append(f"candidates were judged on {len(case.judged)} of {len(case.usable)} flights, evenly chosen")
     return tuple(dict.fromkeys(notes))

@@ -19,6 +19,7 @@ from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
+from airtouch.gap.where.command_power import command_spectra
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -65,13 +66,13 @@ class Pictures:
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     spectra: tuple[Spectrum, ...] = ()
-    commands: Mapping[str, Any] = field(default_factory=dict)  #: `measure.command_spectra`
+    commands: Mapping[str, Any] = field(default_factory=dict)  #: `command_power.command_spectra`
 
 
 def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
        headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis: headline is the cell that its answer speaks of."""
-    commands = measure.command_spectra(flights, nominal, study.vehicle)
+    commands = command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
         return Pictures(commands=commands)
     first = flights[:MOST_FLIGHTS]

@@ -18,7 +18,7 @@ from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
+from airtouch.gap.signals.spectra import AIR, LEAKED, LENGTH, blocks, difference_power, frequencies
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
@@ -134,7 +134,7 @@ def _gyro_share(study: Study) -> np.ndarray:
 def _difference(regime: str) -> np.ndarray:
     """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
     f = frequencies(regime)
-    return 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
+    return difference_power(np.maximum(f, LEAKED * f[1])) / PERIOD_S ** 2
 
 
 def _motor_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:

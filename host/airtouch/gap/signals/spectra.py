@@ -26,6 +26,7 @@ LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean 
 #: band of `hardness.BANDS_HZ`; chosen.
 TRIM_HZ = 0.6
 FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
+LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
 LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floor over frequency; chosen
@@ -173,9 +174,14 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
     """PSD (bins, COUNT) of the sensors' white noise; differences of the gyro rise with frequency."""
     f = frequencies(regime)
     white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
-    shape = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2
-    white[:, TORQUE] = shape[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
+    differences = difference_power(np.maximum(f, LEAKED * f[1]))
+    white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
     return white
+
+
+def difference_power(f: np.ndarray) -> np.ndarray:
+    """PSD (bins,) at frequencies f (Hz) of the differences of two samples of what is white, over its own PSD."""
+    return 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:

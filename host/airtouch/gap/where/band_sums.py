@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.signals.channels import COUNT, RATE, TORQUE
+from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE
+from airtouch.gap.signals.spectra import difference_power
 from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -159,9 +160,9 @@ def sensor_rms(vehicle: Vehicle) -> np.ndarray:
     f = (np.arange(NOISE_FREQUENCIES) + 0.5) * (0.5 / NOISE_FREQUENCIES) / PERIOD_S
     gain = gains(f) ** 2
     white = gain.mean(axis=1)
-    differenced = (gain * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2).mean(axis=1) / PERIOD_S ** 2
+    differenced = (gain * difference_power(f)).mean(axis=1) / PERIOD_S ** 2
     out = np.zeros((len(BANDS_HZ), COUNT))
-    out[:, :3] = white[:, None] * np.asarray(row["acc_noise"]) ** 2
+    out[:, FORCE] = white[:, None] * np.asarray(row["acc_noise"]) ** 2
     out[:, TORQUE] = differenced[:, None] * np.asarray(row["gyro_noise"]) ** 2
     out[:, RATE] = white[:, None] * np.asarray(row["gyro_noise"]) ** 2
     return np.sqrt(out)
