@@ -7,11 +7,12 @@ the simulator, flown with and without the effect over a platform like the flight
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from airtouch.gap.flights import motion
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
@@ -29,12 +30,17 @@ COUNT = sum(n for _, n in BINS)
 KINDS = ("entry", "exit")
 LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
 SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges are simulated
+UNSURE = 3  #: samples before an edge that may belong to it already; chosen
+LEAST_MPS = 1e-6  #: speed that a direction is divided by at least
 LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
 WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
 #: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
 SHRINKAGE = 0.3
 #: speed (m/s) and seconds of a crossing where a log does not show them; chosen
 USUAL_MPS, USUAL_S = 0.3, 2.5
+SPEEDS_MPS, LENGTHS_M = (0.1, 0.9), (0.4, 2.0)  #: of simulated crossings: what such missions can fly; chosen
+LEAST_CLEARANCE_M = 0.01  #: of simulated crossings; chosen
+LEAST_TOP_M = 0.02  #: height of a simulated platform at least; chosen
 _MISSION = """
 name = "edge-response"
 [[platform]]
@@ -46,6 +52,18 @@ control = "velocity"
 step = [{{ do = "wait", time_s = 0.5 }}, {{ do = "take-off", height_m = {height} }}, {{ do = "hover", time_s = 3.0 }},
         {{ do = "go", distance_m = {way}, speed_mps = {speed} }}, {{ do = "hover", time_s = 1.0 }}, {{ do = "land" }}]
 """
+
+
+class Crossing(NamedTuple):
+    """A flight's way over a platform, rounded so that flights share a simulation.
+
+    height_m: over the floor; clearance_m: over the platform; speed_mps; length_m: of the platform along the way.
+    """
+
+    height_m: float
+    clearance_m: float
+    speed_mps: float
+    length_m: float
 
 
 @dataclass(frozen=True)
@@ -68,37 +86,48 @@ def edges_of(flight: Flight) -> list[Edge]:
     """Edges with enough flight around them, none where there is no down range."""
     if not flight.log.has("zrange_m"):
         return []
-    air = flight.phase != 0
+    air = flight.phase != GROUND
     return flight.workspace.once("edges", (), lambda: [
         e for e in true_edges(flight.log, PLATFORM_STEP_M)
         if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()])
 
 
-def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int) -> np.ndarray:
+def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
     """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
     window = slice(at - BEFORE, at + AFTER)
-    thrust = vehicle.thrust(motion.interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
-    if log.has(*VELOCITY[:2]):
-        speed = motion.interpolate_missing(log.stack(VELOCITY[:2])[window])
-        heading = speed[:BEFORE].mean(axis=0)
-        speed = speed @ (heading / max(float(np.hypot(*heading)), 1e-6))
-    else:
-        speed = np.zeros(BEFORE + AFTER)
-    if log.has(POSITION[2]):
-        height = motion.interpolate_missing(log[POSITION[2]][window])
-    elif log.has("zrange_m"):
-        height = motion.interpolate_missing(log["zrange_m"][window])
-        step = np.diff(height, prepend=height[0])
-        step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
-        height = np.cumsum(step)
-    else:
-        height = np.zeros(BEFORE + AFTER)
+    thrust, speed, height = _thrust(log, vehicle, window), _speed(log, window), _height(log, window)
     out = []
     for values, (width, n) in zip((thrust, speed, height), BINS, strict=True):
         size = int(round(width / PERIOD_S))
-        values = values - values[:BEFORE - 3].mean()
+        values = values - values[:BEFORE - UNSURE].mean()
         out.append(values[BEFORE:BEFORE + n * size].reshape(n, size).mean(axis=1))
     return np.concatenate(out)
+
+
+def _thrust(log: FlightLog, vehicle: Vehicle, window: slice) -> np.ndarray:
+    """Commanded thrust, N per motor."""
+    return vehicle.thrust(motion.interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
+
+
+def _speed(log: FlightLog, window: slice) -> np.ndarray:
+    """Speed along the path before the edge, m/s; 0 where the log has none."""
+    if not log.has(*VELOCITY[:2]):
+        return np.zeros(BEFORE + AFTER)
+    speed = motion.interpolate_missing(log.stack(VELOCITY[:2])[window])
+    heading = speed[:BEFORE].mean(axis=0)
+    return speed @ (heading / max(float(np.hypot(*heading)), LEAST_MPS))
+
+
+def _height(log: FlightLog, window: slice) -> np.ndarray:
+    """Height, m: as logged, else the down range without its steps, else 0."""
+    if log.has(POSITION[2]):
+        return motion.interpolate_missing(log[POSITION[2]][window])
+    if not log.has("zrange_m"):
+        return np.zeros(BEFORE + AFTER)
+    height = motion.interpolate_missing(log["zrange_m"][window])
+    step = np.diff(height, prepend=height[0])
+    step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
+    return np.cumsum(step)
 
 
 def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
@@ -108,8 +137,8 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
     for f in flights:
         edges = edges_of(f)
         for e in edges:
-            responses[e.kind].append(response(f.log, vehicle, f.turn, e.sample))
-        without_edge += [response(f.log, vehicle, f.turn, at) for at in _without_edge(f, edges)]
+            responses[e.kind].append(response(f.log, vehicle, e.sample))
+        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges)]
     if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
         return None
     covariance = _covariance(np.array(without_edge), responses)
@@ -141,24 +170,24 @@ def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]])
 
 def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
     """Response of one edge less the nominal one, whitened by its scatter, (COUNT,)."""
-    raw = response(flight.log, floor.vehicle, flight.turn, edge.sample) - floor.nominal[edge.kind]
+    raw = response(flight.log, floor.vehicle, edge.sample) - floor.nominal[edge.kind]
     return floor.whiten @ raw / np.sqrt(1.0 + 1.0 / floor.counts[edge.kind])
 
 
 def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
     """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
-    place = _place(flight)
+    crossing = crossing_of(flight)
 
     def make() -> dict[str, np.ndarray]:
         term = terms(effect)[0]
         step = term.step(parameter)
         neutral = term.effect.scaled(term.effect.values(), 0.0)
         stepped = {**neutral, parameter: neutral[parameter] + step}
-        base = _simulated_responses(floor, place, ())
-        with_effect = _simulated_responses(floor, place, (Active(term.effect, stepped),))
+        base = _simulated_responses(floor, crossing, ())
+        with_effect = _simulated_responses(floor, crossing, (Active(term.effect, stepped),))
         return {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k]) for k in KINDS}
 
-    return floor.workspace.once("templates", (effect, parameter, place), make)
+    return floor.workspace.once("templates", (effect, parameter, crossing), make)
 
 
 def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
@@ -174,8 +203,8 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
     return total
 
 
-def _place(flight: Flight) -> tuple[float, float, float, float]:
-    """Height and clearance (m), speed (m/s) and length (m) of crossing, rounded so that flights share a simulation."""
+def crossing_of(flight: Flight) -> Crossing:
+    """The flight's first way over a platform; USUAL_MPS and USUAL_S stand in for what the log does not show."""
     edges = edges_of(flight)
     if not edges:
         raise ValueError(f"{flight.name}: no edge in this flight")
@@ -188,9 +217,9 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
         v = motion.interpolate_missing(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else USUAL_S
-    speed = float(np.clip(speed, 0.1, 0.9))
-    length = float(np.clip(seconds * speed, 0.4, 2.0))
-    return round(high, 1), round(max(low, 0.01), 2), round(speed, 1), round(length, 1)
+    speed = float(np.clip(speed, *SPEEDS_MPS))
+    length = float(np.clip(seconds * speed, *LENGTHS_M))
+    return Crossing(round(high, 1), round(max(low, LEAST_CLEARANCE_M), 2), round(speed, 1), round(length, 1))
 
 
 def calm(vehicle: Vehicle) -> Vehicle:
@@ -203,24 +232,24 @@ def calm(vehicle: Vehicle) -> Vehicle:
                    range_drift_rms=0.0, flow_noise_mps=(0.02, 0.02), flow_noise_time_s=0.02)
 
 
-def _simulated_responses(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active],
            ) -> dict[str, np.ndarray]:
     """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; cached."""
-    key = (place, tuple((a.effect.name, tuple(a.values.items())) for a in active))
-    return floor.workspace.once("flown", key, lambda: _simulate(floor, place, active))
+    key = (crossing, tuple((a.effect.name, tuple(a.values.items())) for a in active))
+    return floor.workspace.once("flown", key, lambda: _simulate(floor, crossing, active))
 
 
-def _simulate(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active],
                ) -> dict[str, np.ndarray]:
     """Mean response (COUNT,) by kind of two flights over a platform; 0 for a kind that neither crosses."""
-    height, low, speed, length = place
-    text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
-                           way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
+    height, clearance, speed, length = crossing
+    text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - clearance, LEAST_TOP_M),
+                           height=height, way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
     logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=calm(floor.vehicle),
                                  effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
     for log in logs:
-        for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - low))):
+        for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - clearance))):
             if BEFORE <= e.sample < len(log) - AFTER:
-                responses[e.kind].append(response(log, floor.vehicle, None, e.sample))
+                responses[e.kind].append(response(log, floor.vehicle, e.sample))
     return {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in responses.items()}
