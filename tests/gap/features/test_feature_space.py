@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.features import feature
-from airtouch.gap.features.feature_space import SQUASHED, Standard, standard_of
+from airtouch.gap.features.feature_space import SQUASHED, Standard, directions, standard_of
 from airtouch.gap.features.flight_features import table
 
 
@@ -37,3 +37,13 @@ def test_every_feature_has_a_name_of_its_own_and_says_no_more_than_the_simulator
     assert len(least) == len(table())
     assert {least[n] for n in least if " variance " in n or " power " in n or " alone " in n} == {feature.LEAST_LOG}
     assert {least[n] for n in least if " real " in n or " imaginary " in n} == {feature.LEAST_COHERENCE}
+
+
+@pytest.mark.parametrize(("many", "length", "few", "of_few", "first"), [
+    (5, 9.0, 3, 1000.0, 1),  # beyond a length of 8 their number counts alone
+    (10, 8.2, 9, 20.0, 1),
+    (3, 6.0, 2, 8.0, 0)])  # below it the squared length: 3 x 36 are less than 2 x 64
+def test_long_shifts_count_no_more_than_those_of_length_eight(many, length, few, of_few, first):
+    shifts = np.concatenate([np.tile(of_few * np.eye(4)[0], (few, 1)), np.tile(length * np.eye(4)[1], (many, 1))])
+    axes = directions([], 0, shifts, 1)
+    assert np.abs(axes[:, 0]) == pytest.approx(np.eye(4)[first])

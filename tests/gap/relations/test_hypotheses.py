@@ -205,3 +205,32 @@ def test_another_name_of_the_likeliest_effect_is_not_added_to_it():
     of = replace(library(), model=replace(library().model, classes=classes), nameless_share=np.zeros(2),
                  second_share=np.zeros(2), distance_scatter=np.zeros(2))
     assert len(infer(of, (noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1])[None]).classes) == 1
+
+
+def two_ways(cosine):
+    """Two classes whose directions have this cosine, and a flight without noise that has 30 and 20 of them."""
+    classes = library().model.classes[:2]
+    ways = np.eye(Q)[0], cosine * np.eye(Q)[0] + np.sqrt(1.0 - cosine ** 2) * np.eye(Q)[1]
+    model = LearnedModel(tuple(replace(c, table=np.tile(w, (1, 3, 1))) for c, w in zip(classes, ways, strict=True)),
+                         np.zeros((Q, 0)), np.zeros((Q, 0)))
+    return model, FlightFeatures(30.0 * ways[0] + 20.0 * ways[1], model)
+
+
+def test_effects_fitted_in_turn_come_near_the_two_that_are_there():
+    """Each round leaves a share cosine^2 = 1/4 of the error of 15 and 7.5: three leave a 32nd and a 64th of 15."""
+    model, flight = two_ways(0.5)
+    start = flight.at_fits([flight.with_class(c).fits[0] for c in model.classes])  # projections: 40 and 35
+    assert [f.strength[0] for f in start.fits] == pytest.approx([40.0, 35.0], rel=5e-3)  # the grid is that fine
+    refitted = flight.refitted(start)
+    errors = [abs(f.strength[0] - true) for f, true in zip(refitted.fits, (30.0, 20.0), strict=True)]
+    assert errors == pytest.approx([15.0 / 32.0, 15.0 / 64.0], abs=0.08)
+
+
+def test_effects_are_not_refitted_to_something_less_likely():
+    """Classes flown up to 50: strengths of 60 and 40 explain the flight whole, and a fit would cut the first."""
+    model, flight = two_ways(0.0)
+    flight = FlightFeatures(2.0 * flight.values, model)
+    whole = flight.at_fits([replace(flight.with_class(c).fits[0], strength=np.array([s]))
+                            for c, s in zip(model.classes, (60.0, 40.0), strict=True)])
+    assert flight.refitted(whole) is whole
+    assert flight.with_two(*model.classes).level == pytest.approx(whole.level - 0.5 * 10.0 ** 2, abs=0.5)

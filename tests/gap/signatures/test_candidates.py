@@ -81,3 +81,9 @@ def test_a_gain_that_was_named_alone_is_its_own_term_with_its_values():
     alone = terms("controller_gain")[3]
     found = Found("controller_gain", alone.quantities(np.array([0.4])))
     assert term_of(found).values == alone.at(np.array([0.4]))
+
+
+def test_several_gains_are_the_term_in_which_all_of_them_are_free():
+    together = terms("controller_gain")[0]
+    lower = together.quantities(together.scaled({"rate": 0.9, "attitude": 0.7, "position": 0.8, "height": 0.95}))
+    assert term_of(Found("controller_gain", lower)).free == together.free
