@@ -63,13 +63,13 @@ class Elements(NamedTuple):
 class Correction(NamedTuple):
     """What the floor is off by in one flight, under a hypothesis.
 
-    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; count: blocks, by their weight;
+    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together;
     covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
     """
 
     log_power: np.ndarray
     cost: float
-    count: float
+    weight: float
     covariance: np.ndarray
 
 
@@ -202,8 +202,8 @@ class CommandView:
             correction = self._correction(s, ratio, wide)
             for a in range(len(AXES)):  # what the shapes can take up tells nothing
                 j = rise[:, :, a]
-                cross = correction.count * j @ self.shapes.T
-                information += correction.count * j @ j.T - cross @ correction.covariance @ cross.T
+                cross = correction.weight * j @ self.shapes.T
+                information += correction.weight * j @ j.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
     def _level(self, ratio: np.ndarray, wide: bool) -> float:
@@ -224,8 +224,8 @@ class CommandView:
         over_floor = s / (self.loop.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
-        count = OVERLAP_WEIGHT * len(s)
-        normal = count * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
+        weight = OVERLAP_WEIGHT * len(s)
+        normal = weight * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
         covariance = np.linalg.inv(normal)
         amount = np.zeros((SHAPES, len(AXES)))
         for _ in range(ROUNDS):
@@ -233,7 +233,7 @@ class CommandView:
             amount += covariance @ (self.shapes @ push - amount / spread[:, None] ** 2)
         cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
         cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
-        return Correction(self.shapes.T @ amount, cost, count, covariance)
+        return Correction(self.shapes.T @ amount, cost, weight, covariance)
 
 
 def shapes() -> np.ndarray:
