@@ -5,8 +5,8 @@
 
 Where each decision is made; a folder imports only those above it:
 
-- `flights`, a log made ready: `flight`, on a regular `clock`, without moments of `contact`; `motion` with its
-  `filters`; its `blocks`; how hard it is flown: `hardness`.
+- `flights`, a log made ready: a `flight`, where it has the `fitness`, on a regular `clock`, without `missing` samples
+  and moments of `contact`; its `attitude` and `heights`, by `filters`; its `blocks`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
   `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import COLUMN, residual

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.gap.flights.contact import within
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.gap.signals.channels import FORCE, TORQUE, angular_acceleration, residual
 from airtouch.logs.flight_log import ATTITUDE, GYRO, VELOCITY, FlightLog

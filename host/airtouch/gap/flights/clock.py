@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.flights import motion
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.resample import resample
@@ -42,7 +42,7 @@ def with_lost_rows(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np
     n = len(log)
     if not log.has("t_s"):
         return log, np.zeros(n), np.zeros(n, bool)
-    time = motion.interpolate_missing(log["t_s"])
+    time = interpolate_missing(log["t_s"])
     period = _period(time)
     place = np.arange(n)
     for gap in lost_samples(time, period):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.flights import motion
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
@@ -106,14 +106,14 @@ def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
 
 def _thrust(log: FlightLog, vehicle: Vehicle, window: slice) -> np.ndarray:
     """Commanded thrust, N per motor."""
-    return vehicle.thrust(motion.interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
+    return vehicle.thrust(interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
 
 
 def _speed(log: FlightLog, window: slice) -> np.ndarray:
     """Speed along the path before the edge, m/s; 0 where the log has none."""
     if not log.has(*VELOCITY[:2]):
         return np.zeros(BEFORE + AFTER)
-    speed = motion.interpolate_missing(log.stack(VELOCITY[:2])[window])
+    speed = interpolate_missing(log.stack(VELOCITY[:2])[window])
     heading = speed[:BEFORE].mean(axis=0)
     return speed @ (heading / max(float(np.hypot(*heading)), LEAST_MPS))
 
@@ -121,10 +121,10 @@ def _speed(log: FlightLog, window: slice) -> np.ndarray:
 def _height(log: FlightLog, window: slice) -> np.ndarray:
     """Height, m: as logged, else the down range without its steps, else 0."""
     if log.has(POSITION[2]):
-        return motion.interpolate_missing(log[POSITION[2]][window])
+        return interpolate_missing(log[POSITION[2]][window])
     if not log.has("zrange_m"):
         return np.zeros(BEFORE + AFTER)
-    height = motion.interpolate_missing(log["zrange_m"][window])
+    height = interpolate_missing(log["zrange_m"][window])
     step = np.diff(height, prepend=height[0])
     step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
     return np.cumsum(step)
@@ -214,7 +214,7 @@ def crossing_of(flight: Flight) -> Crossing:
     high, low = max(edge.height_before_m, edge.height_after_m), min(edge.height_before_m, edge.height_after_m)
     speed = USUAL_MPS
     if flight.log.has(*VELOCITY[:2]):
-        v = motion.interpolate_missing(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
+        v = interpolate_missing(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else USUAL_S
     speed = float(np.clip(speed, *SPEEDS_MPS))

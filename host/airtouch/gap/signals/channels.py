@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
