@@ -44,8 +44,8 @@ Where each decision is made; a folder imports only those above it:
   `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: the `hover_pattern` of a flight, `hover_hypotheses` drawn from `priors`, their
   evidence by `hover_balance`, what it says: `hover_posterior`; `balance_result`.
-- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score` with its `intervals`, `blind_severity`; on a
-  cluster: `on_cluster`.
+- `sealed`, withheld effects: a set is made by `blind`, with effects as strong as `blind_severity` says, its `blind_key`
+  opened once; scored by `blind_score` with its `intervals`; all of it: `blind_run`; on a cluster: `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`, and what
   two cores may do at once goes through `second_process`.
 """

@@ -1,12 +1,9 @@
 """Sealed sets: flights whose effect is withheld, so that nobody, this package included, can look.
 
-A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose
-effect is drawn, and `sealed.json` with the SHA-256 of the key. The key lies apart, in
-`FOLDER.key.json` beside the folder.
+A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose effect is drawn, and
+`sealed.json` with the SHA-256 of the key (`blind_key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
-import hashlib
-import json
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
@@ -20,6 +17,7 @@ import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.sealed.blind_key import OPENED, SEALED, key_of, seal
 from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
@@ -68,26 +66,17 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
     table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
              "severities": {k: list(v) for k, v in severities.items()}, "answers": answers}
-    _seal(out, key, table)
+    seal(out, key, table, CAL)
     return key
-
-
-def _seal(out: Path, key: Path, table: Mapping[str, Any]) -> None:
-    """Write the key, and its SHA-256 into the folder of its set."""
-    content = (json.dumps(table, indent=1) + "\n").encode()
-    write_bytes(content, key, True)
-    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": len(table["answers"]),
-              "calibration_flights": CAL}
-    write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
     """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised."""
-    for path in (out / "sealed.json", key):
+    for path in (out / SEALED, key):
         if path.exists() and not force:
             raise AirTouchError(f"{path}: exists already; use --force to replace it")
     out.mkdir(parents=True, exist_ok=True)
-    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob("opened.json")] if force else []:
+    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob(OPENED)] if force else []:
         old.unlink()
 
 
@@ -97,48 +86,6 @@ def _nats_when_told(study: Study, log: FlightLog, effects: Sequence[Mapping[str,
         return {}
     told = Active(get(effects[0]["name"]), effects[0]["values"])
     return {"nats": log_ratio(Data(study, list(measure.usable([log], study.vehicle, []))), told)}
-
-
-def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
-    """Open the key of a set and score the diagnoses in `answers`: see `blind_score.figures`."""
-    from airtouch.gap.sealed import blind_score
-
-    cases = blind_score.read_answers(answers)
-    table = open_key(folder, hashlib.sha256(json.dumps(
-        [c for c in cases if not c.get("without")], sort_keys=True).encode()).hexdigest(), key)
-    return blind_score.figures(table, cases)
-
-
-def key_of(folder: Path) -> Path:
-    """Where the key of a set lies when nothing else is said: beside the folder."""
-    return folder.resolve().with_name(folder.resolve().name + ".key.json")
-
-
-def open_key(folder: Path, answers_sha256: str, key: Path | None = None) -> dict[str, Any]:
-    """The key, if it is the one that was sealed; the first opening is recorded with the answers' hash.
-
-    Raises AirTouchError for a key that was changed, and when other answers are already scored:
-    who has seen the key cannot answer blindly.
-    """
-    folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
-    try:
-        sealed = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))["key_sha256"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
-                            "`airtouch gap blind make`") from None
-    try:
-        content = key.read_bytes()
-    except OSError as error:
-        raise AirTouchError(f"{key}: the key cannot be read: {error.strerror}; name it with --key") from None
-    if hashlib.sha256(content).hexdigest() != sealed:
-        raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
-    opened = folder / "opened.json"
-    if opened.exists():
-        if json.loads(opened.read_text(encoding="utf-8")).get("answers_sha256") != answers_sha256:
-            raise AirTouchError(f"{opened}: the key was opened for other answers; make a new set to answer again")
-    else:
-        write_bytes((json.dumps({"answers_sha256": answers_sha256}) + "\n").encode(), opened, False)
-    return json.loads(content)
 
 
 def stripped(log: FlightLog) -> FlightLog:

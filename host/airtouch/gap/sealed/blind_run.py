@@ -3,7 +3,6 @@
 One JSON for each case under OUT/answers: what is there is not done again.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -16,7 +15,8 @@ import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
-from airtouch.gap.sealed import blind
+from airtouch.gap.sealed import blind, blind_score
+from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
@@ -44,7 +44,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     one core for each flight, once more for each single one.
     """
     out = Path(out)
-    if not (out / "sealed.json").exists():
+    if not (out / SEALED).exists():
         blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
     answers = out / "answers"
     names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
@@ -52,12 +52,11 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
     first = sorted(answers.glob("flight_????.json"))
     # the key is opened for the answers above; effects can be withheld only when they are known
-    sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
-    key = blind.open_key(out, sealed)["answers"]
+    key = open_key(out, answers_sha256([json.loads(p.read_text()) for p in first]))["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, spread)
-    return blind.score(out, answers)
+    return blind_score.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
