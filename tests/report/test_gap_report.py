@@ -142,7 +142,7 @@ def test_the_report_computes_nothing():
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
-        allowed = ("measure", "result", "where.gap_map", "where.summary", "answer.advice", "answer.pictures",
+        allowed = ("measure", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
                    "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)

@@ -37,8 +37,9 @@ Where each decision is made; a folder imports only those above it:
   `recorded`: when recorded flights may name an effect.
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
-- `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; beside it `rotor_speeds` and
-  `command_power`; without a diagnosis: `measure`.
+- `where` the gap lies: `band_sums` of a `filter_bank`, in `regimes` of a flight; of these `cell_tables`, a `gap_map`
+  and its `summary`, a cell in words: `cell_words`; beside it `rotor_speeds` and `command_power`; without a diagnosis:
+  `measure`.
 - `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
   intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
   `advice`; `words`, `pictures`.

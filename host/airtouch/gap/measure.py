@@ -17,8 +17,9 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.command_power import CommandPower, command_power, mean_spectra
-from airtouch.gap.where.gap_map import GapMap, Part, assemble, in_words, overall, part_of, where
+from airtouch.gap.where.gap_map import GapMap, Part, assemble, overall, part_of, where
 from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.result import Cell, Found, Step
 from airtouch.gap.signatures.alike import names_alike
-from airtouch.gap.where.gap_map import PHASE_WORDS
+from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how

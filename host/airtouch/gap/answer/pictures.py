@@ -18,8 +18,9 @@ from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power,
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
+from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import command_spectra
+from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 

@@ -7,7 +7,7 @@ from typing import Any
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, ratio, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, ratio, short
 
 
 def answer(diagnosis: Diagnosis) -> str:
