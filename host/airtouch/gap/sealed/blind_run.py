@@ -16,6 +16,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.sealed import blind, blind_score
+from airtouch.gap.sealed.blind import Say
 from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
@@ -23,20 +24,20 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
-Say = Callable[[str], None]
 Mapper = Callable[[Callable, Iterable], Iterable]
 Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
 CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
 Answer = tuple[str, tuple[str, ...], str]  #: name of a flight, effects left out, the diagnosis as JSON
 AHEAD = 4  #: flights sent to each process and not yet back; chosen
+#: fields of a diagnosis that an answer has
+ANSWERED = ("flights", "without", "verdict", "effects", "ranking", "indistinguishable", "gap", "shrink", "control")
 DEATHS = 3  #: of local processes, after which the work goes on; chosen
 #: of a local process, which `_begin` sets once: a task then carries the name of a file, and not the study
 _study: Study | None = None
 
 
 def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
-        kinds: Iterable[str] | None = None, spread: Mapper | None = None, progress: Say = lambda _: None,
-        ) -> dict[str, Any]:
+        spread: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
 
     unknown: how many single flights are diagnosed once more without their effect, all by default. spread: what
@@ -45,7 +46,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     """
     out = Path(out)
     if not (out / SEALED).exists():
-        blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
+        blind.make(out, flights, seed, progress=progress)
     answers = out / "answers"
     names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
@@ -125,6 +126,5 @@ def _diagnosed(study: Study, case: Case) -> Answer:
     name, without, log = case
     diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
     diagnosis |= {"flights": [name], "without": list(without)}
-    content = {k: diagnosis[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
-                                     "gap", "shrink", "control")}
+    content = {k: diagnosis[k] for k in ANSWERED}
     return name, without, json.dumps(content) + "\n"
