@@ -11,10 +11,11 @@ Where each decision is made; a folder imports only those above it:
   which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
   `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
   simulated flights with it are drawn.
+- `edges`, what flights do at the edges of a platform: the `edge_response`, and what `edge_effects` add to it.
 - `loop`, the closed loop: `axis_plant` and `controller`, their transfer functions `loop_model`; what noise makes of the
   commands, `noise_spectra`, and steps of a set-point, `set_point_steps`; how the vehicle turns upon a command,
   `command_response`, and what part of its torque that is, `torque_share`; what a torque from outside leaves:
-  `disturbed`; `command_spectra` of flights, from which `identify` finds a `closed_loop`; at edges: `edge_response`.
+  `disturbed`; `command_spectra` of flights, from which `identify` finds a `closed_loop`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
   (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,

@@ -7,10 +7,11 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
+from airtouch.gap.edges import edge_response
 from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
-from airtouch.gap.loop import command_spectra, controller, edge_response, identify, loop_model, noise_spectra
+from airtouch.gap.loop import command_spectra, controller, identify, loop_model, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.command_response import accelerations_per_command
 from airtouch.gap.loop.set_point_steps import NO_STEP

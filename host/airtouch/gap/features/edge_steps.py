@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airtouch.gap.edges.edge_response import BEFORE, KINDS, UNSURE, edges_of
 from airtouch.gap.features.feature import Feature
 from airtouch.gap.features.flight_signals import (
     COMMAND,
@@ -15,7 +16,6 @@ from airtouch.gap.features.flight_signals import (
     TORQUE_LEFT,
     FlightSignals,
 )
-from airtouch.gap.loop.edge_response import BEFORE, KINDS, UNSURE, edges_of
 
 BINS = (*((10 * k, 10 * k + 10) for k in range(8)), (80, 110))  #: samples after an edge of each mean; chosen
 

@@ -21,14 +21,13 @@ To it comes what noise of the gyro above 50 Hz folds into the log (`aliases_of`)
 **Which loop** (`identify`). Strengths and, where the firmware's gains do not explain nominal flights, gains are those
 of the highest Whittle likelihood of the measured S_uu (`command_spectra`). `closed_loop` has the result.
 
-**What is compared.** Three views of a flight ask for three quantities under effects, over those without:
+**What is compared.** Two views of a flight ask for what effects change, over what is without:
 
 - its commands: S_uu, `ClosedLoop.ratio` (compared in `signals.command_view`);
 - its torque: the share of a logged command's torque that turns the vehicle, q = S_yu / S_uu over s P, y = s w
   (`command_response`, with `set_point_steps` beside the noise; with and without effects `torque_share`), and what a
   torque from outside leaves: S in the gyro, and the command that answers it (`disturbed`); both are compared in
-  `signals.response`;
-- the second after an edge: thrust, speed and height against simulated flights (`edge_response`).
+  `signals.response`.
 
 Sources: loops and sensitivity, Astrom and Murray, Feedback Systems, 2nd ed. 2021, chapter 12; sampling and hold,
 Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed. 1998; cross spectra, Bendat and Piersol, Random

@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from airtouch.gap.edges.edge_response import EdgeFloor
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of
 from airtouch.gap.loop.axis_plant import PlantRow, axis_plant
@@ -25,7 +26,6 @@ from airtouch.gap.loop.command_spectra import (
     through_window,
 )
 from airtouch.gap.loop.controller import AXES, Controller, firmware_of
-from airtouch.gap.loop.edge_response import EdgeFloor
 from airtouch.gap.loop.loop_model import AxisLoop, excess_phase, torque_per_command
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.loop.set_point_steps import NO_STEP, Step

@@ -43,8 +43,8 @@ def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.nda
     logged = commands(flight, vehicle)[:, :len(AXES)]
     cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
     spectra = np.fft.rfft(cut * window, axis=1)[:, _judged()] * scale
-    calm = _calm(np.abs(spectra) ** 2)
-    return first[calm], spectra[calm]
+    level = _without_step(np.abs(spectra) ** 2)
+    return first[level], spectra[level]
 
 
 def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
@@ -75,7 +75,7 @@ def steady(flight: Flight) -> np.ndarray:
     return level
 
 
-def _calm(power: np.ndarray) -> np.ndarray:
+def _without_step(power: np.ndarray) -> np.ndarray:
     """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
     if len(power) < FEWEST:
         return np.ones(len(power), bool)

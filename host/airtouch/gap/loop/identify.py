@@ -14,6 +14,7 @@ from numba import float64, int64, njit, types
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 
+from airtouch.gap.edges.edge_response import edge_floor_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.flights.hardness import hardness_of, slopes_of
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, axis_plant
@@ -27,7 +28,6 @@ from airtouch.gap.loop.command_spectra import (
     typical,
 )
 from airtouch.gap.loop.controller import AXES, Controller, firmware
-from airtouch.gap.loop.edge_response import edge_floor_of
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare

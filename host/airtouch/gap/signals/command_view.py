@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit
 
+from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop import edge_response
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, frequencies
 from airtouch.gap.loop.controller import AXES
@@ -150,12 +150,12 @@ class CommandView:
 
     def moved(self, active: Sequence[Active]) -> np.ndarray:
         """Values (elements,) less what effects add to the responses at edges."""
-        if not self.edges or not any(a.effect.name in edge_response.SHOWN for a in active):
+        if not self.edges or not any(a.effect.name in edge_effects.SHOWN for a in active):
             return self.values
         out = self.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT
         for flight, _, e in self.edges:
-            out[at:at + edge_response.COUNT] -= edge_response.expected(self._edge_floor, flight, e, active)
+            out[at:at + edge_response.COUNT] -= edge_effects.expected(self._edge_floor, flight, e, active)
             at += edge_response.COUNT
         return out
 
