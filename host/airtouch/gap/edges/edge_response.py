@@ -126,8 +126,9 @@ def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]])
     spread = np.cov((without_edge - np.mean(without_edge, axis=0)).T)
     out = ((1.0 - SHRINKAGE) * spread + SHRINKAGE * np.diag(np.diag(spread))
            + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9))
-    deviations = np.array([x - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1 for x in v])
-    if len(deviations):
+    of_kinds = [np.array(v) - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1]
+    if of_kinds:
+        deviations = np.concatenate(of_kinds)
         own = deviations.T @ deviations / max(sum(len(v) - 1 for v in at_edges.values()), 1)
         out += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
     return out

@@ -22,7 +22,7 @@ from scipy.linalg import solve_triangular
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, two_of
 from airtouch.gap.relations.effect_class import learn_class, stands_out
-from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
+from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
     Drawing,
@@ -185,9 +185,9 @@ def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
 def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the length of the smaller one's shift."""
     one, two = library.model.classes[a], library.model.classes[b]
-    flight = FlightFeatures(values, library.model)
+    flight = FlightHypotheses(values, library.model)
     both = flight.with_two(one, two)
-    return flight.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
+    return flight.rescaling(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
-from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
+from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Library
@@ -115,7 +115,7 @@ class _Fitted:
     """A flight with one effect, and the hypothesis of its class."""
 
     active: Active
-    flight: FlightFeatures
+    flight: FlightHypotheses
     hypothesis: Hypothesis
 
     @property
@@ -230,7 +230,7 @@ def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, 
             return a, b
 
 
-def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightFeatures | None:
+def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightHypotheses | None:
     """The features of a flight with effects; None where it does not end well."""
     features = fly(scene, number, active)
-    return None if features is None else FlightFeatures(library.coordinates(features[None])[0], library.model)
+    return None if features is None else FlightHypotheses(library.coordinates(features[None])[0], library.model)
