@@ -60,7 +60,7 @@ def test_a_gyro_that_reads_too_much_is_the_likeliest_class_of_its_flights_and_si
     own, scene = learned.model.classes[-1], Scene(shipped.scenario, VEHICLE)
     for number, share in ((7001, 0.06), (7002, 0.12)):  # not of the flights that it was learned from
         flight = FlightHypotheses(learned.coordinates(fly(scene, number, [Active(effect, {"share": share})])[None])[0],
-                                learned.model)
+                                  learned.model)
         first = flight.single_effects()[0]
         assert first.effects == {effect.name}
         (amount,), (deviation,) = own.readout(first.fits[0].strength)

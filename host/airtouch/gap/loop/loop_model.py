@@ -84,25 +84,33 @@ def plant_of(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
 
 
 def loop_parts(c: Controller, plant: AxisPlant, f: np.ndarray) -> LoopParts:
-    """The transfer functions of a controller and a plant at frequencies f (bins,)."""
-    factors = factors_of(c, f)
-    s = factors.s
-    to_rate = plant_of(c, plant, f)
-    late = sensed_late(c, plant, f)
-    renewed = factors.renewed
+    """The transfer functions of a controller and a plant at frequencies f (bins,).
+
+    In roll and pitch, with gain G, sensors' delay L, low-passes B of controller and gyro, renewal E of the estimate,
+    C = 1 + i / s + d and I = 1 + i / s of the loop that its index names (C' = C, or I where the derivative is of the
+    rate alone), gravity g and factors on the gains in `plant`:
+
+        R = G C L / B
+        A = G C' angle I_angle E / s L / B
+        V = G C' angle I_angle velocity I_velocity E g / s^2 L
+
+    In thrust, of the climb: R = G I L E / B, A = R angle I_angle / s, with B the low-pass of the acceleration.
+    """
+    factors, to_rate = factors_of(c, f), plant_of(c, plant, f)
+    s, late = factors.s, sensed_late(c, plant, f)
     if plant.axis == "thrust":
         k = plant.height_gain
-        late = late * renewed / factors.acc
-        climb = k * c.gain * factors.integral * late
+        climb = k * c.gain * factors.integral * (late * factors.renewed / factors.acc)
         height = climb * c.angle * k * factors.angle_integral / s
         return LoopParts(to_rate, climb, height, 0.0 * s, climb + height)
     k = c.gain * plant.rate_gain
     filtered = late / factors.lowpass / factors.chip
     rate = k * factors.pid * filtered
-    angle = k * (factors.pid if c.on_error else factors.integral) * c.angle * plant.attitude_gain
-    angle = angle * factors.angle_integral
-    velocity = angle * c.velocity * plant.position_gain * factors.velocity_integral
-    angle, velocity = angle * filtered * renewed / s, velocity * renewed * plant.gravity_mps2 / factors.s2 * late
+    per_angle = k * (factors.pid if c.on_error else factors.integral) * c.angle * plant.attitude_gain
+    per_angle = per_angle * factors.angle_integral
+    per_velocity = per_angle * c.velocity * plant.position_gain * factors.velocity_integral
+    angle = per_angle * filtered * factors.renewed / s
+    velocity = per_velocity * factors.renewed * plant.gravity_mps2 / factors.s2 * late
     return LoopParts(to_rate, rate, angle, velocity, rate + angle + velocity)
 
 
