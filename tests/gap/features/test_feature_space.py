@@ -29,7 +29,7 @@ def test_no_feature_is_known_better_than_the_simulator_is():
     assert deviation["roll real command:turn 0"] == feature.LEAST_COHERENCE
     assert deviation["roll power command 0"] == feature.LEAST_LOG
     assert deviation["clock rms"] == feature.LEAST_CLOCK and deviation["clock lost"] == feature.LEAST_LOST
-    assert deviation["later mean force left x"] == 0.0
+    assert deviation["later mean force residual x"] == 0.0
 
 
 def test_every_feature_has_a_name_of_its_own_and_says_no_more_than_the_simulator_is_exact():

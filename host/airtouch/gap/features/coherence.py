@@ -7,13 +7,13 @@ import numpy as np
 
 from airtouch.gap.features.feature import LEAST_COHERENCE, LEAST_LOG, Feature
 from airtouch.gap.features.flight_signals import (
-    ANGLE_LEFT,
+    ANGLE_RESIDUAL,
     COMMAND,
-    FORCE_LEFT,
+    FORCE_RESIDUAL,
     LIFT,
-    RANGE_LEFT,
-    SPEED_LEFT,
-    TORQUE_LEFT,
+    RANGE_RESIDUAL,
+    SPEED_RESIDUAL,
+    TORQUE_RESIDUAL,
     TURN,
     FlightSignals,
 )
@@ -28,13 +28,13 @@ LEAST_ALONE = 1e-4  #: share of a signal's power that the others of its group do
 #: signals that move together, each by its name and its column of the table: roll with y, pitch with x, climb, yaw
 GROUPS: dict[str, dict[str, int]] = {
     **{axis: {"command": COMMAND.start + 1 + turned, "turn": TURN.start + turned,
-              "force": FORCE_LEFT.start + pushed, "torque": TORQUE_LEFT.start + turned,
-              "speed": SPEED_LEFT.start + pushed, "angle": ANGLE_LEFT.start + turned}
+              "force": FORCE_RESIDUAL.start + pushed, "torque": TORQUE_RESIDUAL.start + turned,
+              "speed": SPEED_RESIDUAL.start + pushed, "angle": ANGLE_RESIDUAL.start + turned}
        for axis, turned, pushed in (("roll", 0, 1), ("pitch", 1, 0))},
-    "climb": {"command": COMMAND.start, "lift": LIFT.start, "force": FORCE_LEFT.start + 2,
-              "speed": SPEED_LEFT.start + 2, "range": RANGE_LEFT.start},
-    "yaw": {"command": COMMAND.start + 3, "turn": TURN.start + 2, "torque": TORQUE_LEFT.start + 2,
-            "angle": ANGLE_LEFT.start + 2},
+    "climb": {"command": COMMAND.start, "lift": LIFT.start, "force": FORCE_RESIDUAL.start + 2,
+              "speed": SPEED_RESIDUAL.start + 2, "range": RANGE_RESIDUAL.start},
+    "yaw": {"command": COMMAND.start + 3, "turn": TURN.start + 2, "torque": TORQUE_RESIDUAL.start + 2,
+            "angle": ANGLE_RESIDUAL.start + 2},
 }
 
 

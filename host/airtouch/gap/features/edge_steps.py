@@ -10,10 +10,10 @@ from airtouch.gap.edges.edge_response import BEFORE, KINDS, UNSURE, edges_of
 from airtouch.gap.features.feature import Feature
 from airtouch.gap.features.flight_signals import (
     COMMAND,
-    FORCE_LEFT,
-    RANGE_LEFT,
-    SPEED_LEFT,
-    TORQUE_LEFT,
+    FORCE_RESIDUAL,
+    RANGE_RESIDUAL,
+    SPEED_RESIDUAL,
+    TORQUE_RESIDUAL,
     FlightSignals,
 )
 
@@ -30,16 +30,16 @@ class Signal(NamedTuple):
 
 SIGNALS = (
     Signal("thrust command", False, lambda s: s.table[:, COMMAND.start]),
-    Signal("force left x", True, lambda s: s.table[:, FORCE_LEFT.start]),
-    Signal("force left z", False, lambda s: s.table[:, FORCE_LEFT.start + 2]),
-    Signal("torque left y", True, lambda s: s.table[:, TORQUE_LEFT.start + 1]),
-    Signal("speed left x", True, lambda s: s.table[:, SPEED_LEFT.start]),
-    Signal("speed left z", False, lambda s: s.table[:, SPEED_LEFT.start + 2]),
+    Signal("force residual x", True, lambda s: s.table[:, FORCE_RESIDUAL.start]),
+    Signal("force residual z", False, lambda s: s.table[:, FORCE_RESIDUAL.start + 2]),
+    Signal("torque residual y", True, lambda s: s.table[:, TORQUE_RESIDUAL.start + 1]),
+    Signal("speed residual x", True, lambda s: s.table[:, SPEED_RESIDUAL.start]),
+    Signal("speed residual z", False, lambda s: s.table[:, SPEED_RESIDUAL.start + 2]),
     Signal("velocity x", True, lambda s: s.velocity[:, 0]),
     Signal("climb", False, lambda s: s.velocity[:, 2]),
     Signal("pitch", True, lambda s: s.angles[:, 1]),
     Signal("height", False, lambda s: s.height),
-    Signal("range left", False, lambda s: s.table[:, RANGE_LEFT.start]),
+    Signal("range residual", False, lambda s: s.table[:, RANGE_RESIDUAL.start]),
 )
 VELOCITY = [s.name for s in SIGNALS].index("velocity x")  #: by its sign the flight goes forward
 

@@ -16,11 +16,11 @@ from airtouch.vehicle import Vehicle
 
 NEEDED = (*GYRO, *VELOCITY, *ATTITUDE, "zrange_m", "z_m")  #: columns beside commands and accelerations
 #: columns of `FlightSignals.table`, by what they are of
-COMMAND, TURN, LIFT, FORCE_LEFT, TORQUE_LEFT, SPEED_LEFT, ANGLE_LEFT, RANGE_LEFT = (
+COMMAND, TURN, LIFT, FORCE_RESIDUAL, TORQUE_RESIDUAL, SPEED_RESIDUAL, ANGLE_RESIDUAL, RANGE_RESIDUAL = (
     slice(0, 4), slice(4, 7), slice(7, 8), slice(8, 11), slice(11, 14), slice(14, 17), slice(17, 20), slice(20, 21))
 #: their names, one by one
 COLUMNS = ("thrust command", "roll command", "pitch command", "yaw command", *(f"turn {a}" for a in "xyz"), "lift",
-           *(f"{what} left {a}" for what in ("force", "torque", "speed", "angle") for a in "xyz"), "range left")
+           *(f"{what} residual {a}" for what in ("force", "torque", "speed", "angle") for a in "xyz"), "range residual")
 COUNT = len(COLUMNS)
 #: down range over standing below which legs may touch in flight, and for how long around it
 CONTACT_M, CONTACT_S = 0.012, 0.15  # chosen

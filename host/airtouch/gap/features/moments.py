@@ -8,10 +8,10 @@ from airtouch.gap.features.feature import LEAST_CLOCK, LEAST_LOG, LEAST_LOST, Fe
 from airtouch.gap.features.flight_signals import (
     COLUMNS,
     COMMAND,
-    FORCE_LEFT,
-    RANGE_LEFT,
-    SPEED_LEFT,
-    TORQUE_LEFT,
+    FORCE_RESIDUAL,
+    RANGE_RESIDUAL,
+    SPEED_RESIDUAL,
+    TORQUE_RESIDUAL,
     FlightSignals,
 )
 from airtouch.gap.flights.clock import LEAST_JITTER_S
@@ -20,8 +20,8 @@ from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
 AXES = "xyz"
-REGRESSED = {"force": FORCE_LEFT, "torque": TORQUE_LEFT, "speed": SPEED_LEFT}
-OF_MEANS = slice(FORCE_LEFT.start, SPEED_LEFT.stop)  #: columns of the table whose means are looked at
+REGRESSED = {"force": FORCE_RESIDUAL, "torque": TORQUE_RESIDUAL, "speed": SPEED_RESIDUAL}
+OF_MEANS = slice(FORCE_RESIDUAL.start, SPEED_RESIDUAL.stop)  #: columns of the table whose means are looked at
 FEWEST = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
 FEWEST_AT_REST = 4  #: samples at rest of which a variance is taken; chosen
 FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow and what deviates from it fast; chosen
@@ -33,7 +33,7 @@ LEAST_SCORE = 1e-9  #: sum of squares of a column that is added to it, so that n
 def table() -> tuple[Feature, ...]:
     """What `moments` gives, in its order: scores, each phase, the second half, at rest, the clock."""
     means = [*COLUMNS[OF_MEANS], *COLUMNS[COMMAND]]
-    slow = [*(f"{what} {axis}" for what in ("angle", "velocity", "rate") for axis in AXES), *COLUMNS[RANGE_LEFT]]
+    slow = [*(f"{what} {axis}" for what in ("angle", "velocity", "rate") for axis in AXES), *COLUMNS[RANGE_RESIDUAL]]
     of_phase = [*(Feature(f"mean {what}") for what in (*means, *slow)),
                 *(Feature(f"variance {what}", LEAST_LOG) for what in COLUMNS)]
     imu = [f"{what} {axis}" for what in ("acceleration", "rate") for axis in AXES]
@@ -80,7 +80,7 @@ def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
     some = in_phase if in_phase.sum() > FEWEST else signals.air
     assert signals.flight.rates is not None
     slow = [x[some].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
-                                           signals.table[:, RANGE_LEFT])]
+                                           signals.table[:, RANGE_RESIDUAL])]
     fast = (signals.table - _smoothed(signals.table))[some].var(axis=0)
     return np.concatenate([_means(signals, some), *slow, np.log(fast + LEAST_VARIANCE)])
 
