@@ -26,6 +26,10 @@ SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges ar
 USUAL_MPS, USUAL_S = 0.3, 2.5
 SPEEDS_MPS, LENGTHS_M = (0.1, 0.9), (0.4, 2.0)  #: of simulated crossings: what such missions can fly; chosen
 LEAST_CLEARANCE_M = 0.01  #: of simulated crossings; chosen
+#: m from take-off to the platform, and beyond it at the end; s that the vehicle takes to stop; chosen
+AHEAD_M, BEYOND_M, STOPPING_S = 1.5, 0.3, 1.5
+#: m/s and s, rms and correlation time of the flow sensor's noise that stays; chosen
+FLOW_NOISE_MPS, FLOW_NOISE_S = 0.02, 0.02
 LEAST_TOP_M = 0.02  #: height of a simulated platform at least; chosen
 _MISSION = """
 name = "edge-response"
@@ -107,7 +111,8 @@ def exact_sensors(vehicle: Vehicle) -> Vehicle:
     smallest corrections of its attitude.
     """
     return replace(vehicle, acc_noise_rms_mps2=0.0, gyro_noise_rms_radps=0.0, range_noise_rms_m=0.0,
-                   range_drift_rms=0.0, flow_noise_mps=(0.02, 0.02), flow_noise_time_s=0.02)
+                   range_drift_rms=0.0, flow_noise_mps=(FLOW_NOISE_MPS, FLOW_NOISE_MPS),
+                   flow_noise_time_s=FLOW_NOISE_S)
 
 
 def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active],
@@ -120,8 +125,8 @@ def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[
 def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active]) -> dict[str, np.ndarray]:
     """Mean response (COUNT,) by kind of two flights over a platform; 0 for a kind that neither crosses."""
     height, clearance, speed, length = crossing
-    text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - clearance, LEAST_TOP_M),
-                           height=height, way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
+    text = _MISSION.format(length=length, centre=AHEAD_M + 0.5 * length, top=max(height - clearance, LEAST_TOP_M),
+                           height=height, way=AHEAD_M + length + STOPPING_S * speed + BEYOND_M, speed=speed)
     logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=exact_sensors(floor.vehicle),
                                  effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}

@@ -43,6 +43,7 @@ UNSTABLE = 30.0
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 PLANTS = 500  #: hypotheses whose plant is cached, chosen by memory: about 2 kB each
+LEAST_NOISE_RADPS = 1e-9  #: rad/s, of a gyro that another is divided by
 LOOPS = 1000  #: spectra of an axis that are cached, chosen by memory: about 10 kB each
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
@@ -190,7 +191,7 @@ class ClosedLoop:
 
     def _gyro_noise(self) -> np.ndarray:
         """Rms (3,) of the calibrated gyro's noise, rad/s."""
-        return np.maximum(self._nominal_row["gyro_noise"], 1e-9)
+        return np.maximum(self._nominal_row["gyro_noise"], LEAST_NOISE_RADPS)
 
 
 def _power_and_phase(loop: AxisLoop, f: np.ndarray) -> tuple[np.ndarray, float]:

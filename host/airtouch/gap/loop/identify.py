@@ -37,6 +37,8 @@ FEWEST = 6  #: blocks of nominal flights, for a command view; chosen
 #: nats by which fitted gains must be likelier than the firmware's documented ones, for each axis; chosen
 FREE_GAINS = 1.5
 FLOOR_SMOOTH = 3.0  #: bins, standard deviation of the Gaussian that smooths the floor over the model's shape; chosen
+LEAST_STRENGTH = 1e-9  #: of a noise, over the whole, so that it can grow again
+LEAST_VELOCITY_GAIN = 1e-3  #: rad per m/s, of a velocity loop that is searched
 STEPS = 300  #: updates of noise strengths; chosen
 SEARCH_STEPS = 40  #: updates of noise strengths for each controller that a search tries; chosen
 SEARCH_BLOCKS = 8.0  #: blocks that the misfit counts for against the prior of the gains in a search; chosen
@@ -117,13 +119,13 @@ def _update(strengths, shapes, power, steps):
             for b in range(bins):
                 up += shapes[s, b] * square[b]
                 down += shapes[s, b] * over[b]
-            strengths[s] = max(strengths[s] * np.sqrt(up / down), 1e-9)
+            strengths[s] = max(strengths[s] * np.sqrt(up / down), LEAST_STRENGTH)
 
 
 def _search(row: PlantRow, axis: str, power: np.ndarray) -> AxisFit:
     """The gains of a cascade, near the firmware's, of highest posterior for the shape of a command's power (bins,)."""
     known, plant = firmware(row, axis), axis_plant(row, axis)
-    middle = np.log([known.gain, known.angle, max(known.velocity, 1e-3)])
+    middle = np.log([known.gain, known.angle, max(known.velocity, LEAST_VELOCITY_GAIN)])
     spread = np.array(GAIN_SPREAD)
     free = 2 if axis == "thrust" else 3
 

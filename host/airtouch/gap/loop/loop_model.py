@@ -15,6 +15,7 @@ from airtouch.gap.loop.controller import Controller
 LOWEST_HZ = 0.05  #: a frequency below it counts as it, so that integrals stay finite; chosen
 OUTER_S = 0.01  #: s, period of the firmware's position loop and of its estimator's predictions
 IMU_S = 0.001  #: s between samples of the IMU, which the firmware reads at 1 kHz
+OPEN = 0.49  #: share of the IMU's rate from which a low-pass's cutoff lets everything pass, as the simulator has it
 CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1: up to below the log's 50 Hz; chosen
 
 
@@ -190,7 +191,7 @@ def butterworth(s: np.ndarray, cutoff: float) -> np.ndarray | float:
 
     As in `simulation.sensors.filters`: bilinear, so that it takes more than its analogue towards half of that rate.
     """
-    if cutoff <= 0.0 or cutoff >= 0.49 / IMU_S:
+    if cutoff <= 0.0 or cutoff >= OPEN / IMU_S:
         return 1.0
     x = 1j * np.tan(0.5 * IMU_S * s.imag) / np.tan(np.pi * cutoff * IMU_S)
     return 1.0 + np.sqrt(2.0) * x + x * x

@@ -65,7 +65,7 @@ def sensor_noise(vehicle: Vehicle) -> np.ndarray:
     """White noise (COUNT,) that the vehicle's sensors are declared to have, rms at 100 Hz: m/s^2, and rad/s twice."""
     acc = vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
     gyro = vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
-    return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - 9)])
+    return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - COMMAND.start)])
 
 
 def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_loop.ClosedLoop | None,

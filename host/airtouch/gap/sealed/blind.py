@@ -32,6 +32,8 @@ CAL = 6  #: flights free of effects; chosen
 SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects; chosen
 PAIR_SEVERITIES = (1, 2)  #: places among the severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
+ANEW = 10_000  #: added to the number of a flight for each time that it is drawn anew
+MOST_FLOWN = 10  #: flights flown for each that is to end well; chosen
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
 Say = Callable[[str], None]
@@ -96,7 +98,7 @@ def stripped(log: FlightLog) -> FlightLog:
 
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
     """Flights free of effects that end well, from a number on."""
-    every = flown(SCENARIO, range(first, first + 10 * count), vehicle=vehicle, seed=seed, workers=1)
+    every = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
     return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
 
 
@@ -143,7 +145,7 @@ def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Seve
     """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
     for attempt in range(TRIES):
         active: list[Active] = [KINDS[k].active(severities[k][place] * WEAKER ** attempt, rng) for k, place in drawn]
-        log = next(iter(flown(SCENARIO, [number + 10_000 * attempt], vehicle=vehicle, effects=active, seed=seed,
+        log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=vehicle, effects=active, seed=seed,
                               workers=1)))
         if isinstance(log, FlightLog) and list(measure.usable([stripped(log)], vehicle, [])):
             return stripped(log), [{"name": a.effect.name, "kind": k, "level": place, "values": dict(a.values)}

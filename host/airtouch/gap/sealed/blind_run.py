@@ -48,7 +48,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     if not (out / SEALED).exists():
         blind.make(out, flights, seed, progress=progress)
     answers = out / "answers"
-    names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
+    names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
     first = sorted(answers.glob("flight_????.json"))

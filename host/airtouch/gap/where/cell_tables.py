@@ -19,6 +19,7 @@ INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
 #: degrees of freedom of a block at most, as blocks differ by more than chance; chosen. With it the intervals hold the
 #: true rms in 85 of 100 cells or more (test_map.py)
 FREEDOM = 4.0
+FLOOR_SEED = 100  #: of the floors' bootstrap, no phase's number, which is that of a phase's own
 AIR = "air"  #: key of the floor of phases in which no nominal flight was
 
 #: phase, or AIR: floor and its upper end, (regimes, bands, COUNT) each
@@ -124,7 +125,7 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
     sources: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
     for key, source, phase in sources:
         spread = _without_common(source, phase, count)
-        table = table_of(spread, phase, seed=100) if spread is not None else None
+        table = table_of(spread, phase, seed=FLOOR_SEED) if spread is not None else None
         if table is None:
             continue
         whole = table.rms[:1], table.high[:1]  # of the phase, for regimes in which no nominal flight was
