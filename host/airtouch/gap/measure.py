@@ -29,9 +29,10 @@ from airtouch.vehicle import Vehicle
 class Measurement:
     """The gap map with its largest cells, and what these logs cannot say.
 
-    gap: rms over the floor of all cells in the air, for the vehicle as declared and, with
-    baseline flights, as calibrated on them; spectra: of the commands, as flown and as
-    nominal flights have them (command view), N^2/Hz.
+    gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
+    calibrated on them; calibration: those parameters; spectra: of the commands, as flown and as nominal flights have
+    them (`command_power`), N^2/Hz; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
+    flights were not used.
     """
 
     vehicle: str
@@ -42,7 +43,7 @@ class Measurement:
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)
     spectra: Mapping[str, Any] = field(default_factory=dict)
-    rotors: tuple[Mapping[str, float], ...] = ()  #: speeds as logged and as modelled, in the air, 1/min
+    rotors: tuple[Mapping[str, float], ...] = ()
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -104,11 +105,13 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
-        vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap,
-        maps[0].flights, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
-        speeds_over_flights([m.speeds for m in measured]), tuple(notes),
-        cannot_of([m.cannot for m in measured]), tuple(left_out))
+        vehicle=vehicle.name, map=maps[0], gap=gap,
+        where=tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))),
+        flights=maps[0].flights, baseline=tuple(f.name for f in nominal),
+        calibration=fitted.parameters if fitted else {},
+        spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
+        rotors=speeds_over_flights([m.speeds for m in measured]), notes=tuple(notes),
+        cannot=cannot_of([m.cannot for m in measured]), left_out=tuple(left_out))
 
 
 def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], run: Callable, progress: Callable[[str], None],
@@ -150,7 +153,9 @@ def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> 
 
 
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """What logs cannot say, each reason once, with the number of flights where it is not all. flights: reasons of each.
+    """What logs cannot say, each reason once, with the number of flights where it is not all.
+
+    flights: reasons of each flight.
     """
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())

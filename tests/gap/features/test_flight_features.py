@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.features import coherence, flight_features
+from airtouch.gap.features import coherence, edge_steps, flight_features, moments
 from airtouch.gap.features.feature_space import cholesky_factor
-from airtouch.gap.features.flight_signals import COMMAND, LIFT, signals_of
+from airtouch.gap.features.flight_signals import COLUMNS, COMMAND, LIFT, signals_of
 from airtouch.gap.flights.flight import ready
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
@@ -33,6 +33,22 @@ def test_coherence_of_a_signal_and_its_noisy_copy(flight):
     assert np.mean([np.exp(coherences[f"climb alone lift {k}"]) for k in wide]) == pytest.approx(0.2, abs=0.04)
     assert np.mean([coherences[f"climb power lift {k}"] - coherences[f"climb power command {k}"] for k in wide]) \
         == pytest.approx(np.log(5.0), abs=0.1)
+
+
+@pytest.mark.parametrize(("column", "words"), [
+    ("force residual z", ("force residual z", "force z follows")), ("thrust command", ("thrust command",)),
+    ("speed residual x", ("speed residual x", "speed x follows")), ("range residual", ("range residual",))])
+def test_a_feature_has_the_name_of_the_signal_that_moves_it(flight, column, words):
+    """One column of the table gets an offset and noise: what has its name changes, and nothing else does."""
+    signals = signals_of(flight, VEHICLE)
+    table = signals.table.copy()
+    table[:, COLUMNS.index(column)] += 1.0 + np.random.default_rng(1).normal(size=len(table))
+    moved = replace(signals, table=table)
+    for module, values in ((moments, lambda s: moments.moments(s, VEHICLE)), (edge_steps, edge_steps.edge_steps)):
+        changed = {f.name for f, a, b in zip(module.table(), values(signals), values(moved), strict=True)
+                   if not (a == b or np.isnan([a, b]).all())}
+        named = {f.name for f in module.table() if any(w in f.name for w in words)}
+        assert changed <= named and len(changed) > 0.9 * len(named)
 
 
 def test_a_row_lost_by_chance_hardly_moves_the_relations(flight):
