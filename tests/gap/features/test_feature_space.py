@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.features import feature
-from airtouch.gap.features.feature_space import SQUASHED, Standard, directions, standard_of
+from airtouch.gap.features.feature_space import SQUASHED, Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.features.flight_features import table
 
 
@@ -47,3 +47,18 @@ def test_long_shifts_count_no_more_than_those_of_length_eight(many, length, few,
     shifts = np.concatenate([np.tile(of_few * np.eye(4)[0], (few, 1)), np.tile(length * np.eye(4)[1], (many, 1))])
     axes = directions([], 0, shifts, 1)
     assert np.abs(axes[:, 0]) == pytest.approx(np.eye(4)[first])
+
+
+def test_a_tenth_of_the_covariance_is_variance_that_no_nominal_flight_shows():
+    """Two features that always agree: as exact as their difference is no simulated vehicle."""
+    draws = np.repeat(np.random.default_rng(1).normal(size=(50, 1)), 2, axis=1)
+    lower = cholesky_factor(draws)
+    variance = draws[:, 0].var(ddof=1)
+    assert lower @ lower.T == pytest.approx(np.array([[0.9 * variance + 0.1, 0.9 * variance],
+                                                      [0.9 * variance, 0.9 * variance + 0.1]]))
+
+
+def test_directions_are_those_that_shifts_have():
+    """Shifts along one way have one direction, however many are asked for."""
+    axes = directions([5.0 * np.tile(np.eye(4)[2], (6, 1))], 3, 9.0 * np.tile(np.eye(4)[0], (6, 1)), 3)
+    assert np.abs(axes) == pytest.approx(np.eye(4)[:, [0, 2]])
