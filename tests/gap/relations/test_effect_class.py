@@ -113,3 +113,12 @@ def test_no_more_than_the_sixteen_widest_directions_of_scatter_are_learned():
     flights[:, 1:21] += 50.0 * spread * rng.normal(size=(many, 20))
     learned = learn_class("one", "one", None, shift[:, :1], shift, flights)
     assert np.sqrt(learned.variances) == pytest.approx(spread[:16], rel=0.15)
+
+
+@pytest.mark.parametrize(("negative", "signed"), [(32, False), (48, True)])
+def test_a_class_has_two_signs_from_a_tenth_of_negative_strengths_on(negative, signed):
+    """Of 400 flights; a few that hit something may lie on the other side."""
+    strength = np.geomspace(3.0, 50.0, N) * np.where(np.arange(N) % (N // negative) == 0, -1.0, 1.0)
+    strength[np.flatnonzero(strength < 0.0)[negative:]] *= -1.0
+    shift = strength[:, None] * np.eye(Q)[0]
+    assert learn_class("one", "one", None, np.abs(strength[:, None]), shift, shift).signed is signed

@@ -96,3 +96,11 @@ def test_weights_fall_as_a_normal_density_from_the_nearest_flight_or_from_one_wi
                                ([-3.0, -4.0, -5.0], [1.0, 2.0, 3.0])):
         assert readout_module._weights(width * np.array(distances)) == pytest.approx(
             np.exp(-0.5 * np.array(counted) ** 2))
+
+
+def test_the_deviation_is_that_of_flights_less_the_two_that_a_line_uses_up():
+    residual = np.random.default_rng(4).normal(size=(10, 1))
+    exact = np.sqrt((residual ** 2).sum() / (10.0 - 2.0))
+    assert readout_module._deviation(residual, np.ones(10)) == pytest.approx([exact])
+    twice = np.concatenate([residual, residual])  # half the weight: as many flights (Kish 1965)
+    assert readout_module._deviation(twice, np.repeat([1.0, 0.0], 10)) == pytest.approx([exact])
