@@ -10,6 +10,7 @@ from airtouch.cli.shared import scores
 from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.ranking import agreeing
 from airtouch.gap.result import Found, Quantity
+from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
 from airtouch.gap.where import summary
 from airtouch.report import gap_report, gap_tables
 from airtouch.simulation import effects as registry
@@ -121,7 +122,7 @@ def test_advised_commands_can_be_given():
         parsed_effect = registry.parse(line.split("--effect ")[1].strip("'"))
         expected = {k: q.value for k, q in values.items()}
         assert parsed_effect[0] == name and parsed_effect[1] == pytest.approx(expected, rel=1e-3)
-    for name in (*advice.MISSIONS.values(), *(m for _, m in advice.SEPARATES.values() if m)):
+    for name in (*advice.MISSIONS.values(), *(c.mission for c in (*ALIKE, *CONFUSED) if c.mission), MISSION):
         assert mission.load(name).legs
 
 

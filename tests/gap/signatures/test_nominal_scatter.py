@@ -19,7 +19,7 @@ def draw_strengths(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int)
                      float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 
-SHARED = {n for group, _ in ALIKE for n in group}  #: names of one thing, which have one scatter
+SHARED = {n for confusion in ALIKE for n in confusion.effects}  #: names of one thing, which have one scatter
 REAL = [n for n in table() if not n.startswith("simulated")]
 
 

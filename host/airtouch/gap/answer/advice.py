@@ -5,26 +5,12 @@ from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.result import Cell, Found, Step
-from airtouch.gap.signatures.alike import names_alike
+from airtouch.gap.signatures.alike import confusion_among
 from airtouch.gap.where.gap_map import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"
-#: what separates pairs that logs like these confuse, and the mission that shows it, "" where no ready one does
-SEPARATES = {
-    frozenset({"motor_lag", "actuator_delay"}): ("command steps in hover at two step sizes, or log rpm: a lag "
-                                                 "rounds the response, a delay shifts it", ""),
-    frozenset({"motor_lag", "inertia"}): ("log rpm, or add quick yaw turns: inertia scales every response alike", ""),
-    frozenset({"wind", "imu_bias"}): ("stand still with motors off for five seconds, and turn the vehicle by 90 "
-                                      "degrees in hover: wind turns in body axes and is gone on the ground, a bias is "
-                                      "neither", ""),
-    frozenset({"weak_motor", "com_offset"}): ("add yaw turns: a weak rotor leaves yaw torque, an offset does not", ""),
-    frozenset({"rotor_drag", "blade_flapping"}): ("fly faster than 1 m/s: flapping tilts the vehicle as well", ""),
-    frozenset({"sensor_latency", "controller_gain"}): ("log the attitude set-points, or fly steps of attitude: a sweep "
-                                                       "has them where it starts and stops", "there-and-back"),
-    frozenset({"battery_sag", "thrust_coefficient"}): ("log the battery voltage over a whole flight", "hover"),
-}
 #: mission with most of a phase; take-off and landing are in every one
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
@@ -81,12 +67,9 @@ def collect(mission: str) -> str:
 
 def _apart(group: tuple[str, ...]) -> Step:
     """What tells the effects of a group from one another."""
-    alike_group = names_alike(group[0])
-    if alike_group and alike_group[0] <= frozenset(group):
-        return Step(f"To tell {' from '.join(sorted(alike_group[0]))}: {alike_group[1]}.")
-    tell, mission = next((t for k, t in SEPARATES.items() if k <= frozenset(group)),
-                         ("repeat the flight with other speeds and heights", "there-and-back"))
-    return Step(f"To tell {' from '.join(group)}: {tell}.", collect(mission) if mission else "")
+    among = confusion_among(group)
+    return Step(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
+                collect(among.mission) if among.mission else "")
 
 
 def _open(headline: Cell | None, vehicle: str) -> list[Step]:

@@ -16,12 +16,8 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.calibrate import Calibration
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.signature import CLOCK, MEAN
+from airtouch.gap.signatures.signature import CLOCK, MEAN, WRONG
 from airtouch.vehicle import Vehicle
-
-#: effects of which the first that is not the answer is the wrong one, fitted alike; chosen, common ones of force,
-#: torque and sensors
-WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
 def control(data: Data, selection: Selection, cells: Cells) -> dict[str, Any]:

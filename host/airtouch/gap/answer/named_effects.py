@@ -12,7 +12,7 @@ from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import Found
-from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM, signature_of
+from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
@@ -104,12 +104,13 @@ def with_random_part(effect: Found, part: Term) -> Found:
     """
     if effect.name != part.name:
         return effect
-    own, of_mean = part.values["strength"], effect.parameters["strength"]
+    (amount,) = part.signature.free  # the strength
+    own, of_mean = part.values[amount], effect.parameters[amount]
     limits = {p.name: p.high for p in part.effect.parameters}
     strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
     raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
-    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
+    return Found(effect.name, {**effect.parameters, amount: raised, **scaled}, effect.seconds)
 
 
 def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Reading) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +146,7 @@ def _of_clock(term: Term, samples: int) -> np.ndarray:
     bursts is the variance of a Poisson number of bursts.
     """
     count = 2.0 * samples / 10.0
-    bursts = signature_of(term.effect).bursts
+    bursts = term.signature.bursts
     if bursts is not None:
         share, burst = (term.values[p] for p in bursts)
         count = share * samples / (2.0 * burst - 1.0)
@@ -158,11 +159,11 @@ def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.n
     of_loop: fraction of a parameter by which the model of the loop may be wrong.
     """
     pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
-             if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
+             if t.identity == term.identity]
     between = np.zeros((len(term.free), len(term.free)))
     if len(pairs) == 2:
         between = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
     loop = law is not None and law.changes_loop((term.active(),))
     error = max(of_loop if loop else MODEL_ERROR if term.kind == SPECTRUM else 0.0,
-                signature_of(term.effect).own_scatter)
+                term.signature.own_scatter)
     return covariance + between + np.diag((error * term.scaled(term.values)) ** 2)

@@ -83,7 +83,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named:
-        group = names_alike(step.name)
-        if group and not any(step.name in g for g in groups):
-            groups.append(tuple(sorted(group[0])))
+        alike = names_alike(step.name)
+        if alike and not any(step.name in g for g in groups):
+            groups.append(tuple(sorted(alike.effects)))
     return tuple(groups)

@@ -18,6 +18,7 @@ from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
+from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
@@ -68,7 +69,7 @@ def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
 
 def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells, seed: int = 0) -> Shrink:
     """The gap over all held-out blocks, each half judged under the fit of the other. seed: of the bootstrap."""
-    if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
+    if judged is not None and judged.terms and all(t.kind == CLOCK and not t.signature.loses_rows for t in judged.terms):
         return shrink_of_jitter(data)
     before = cells.before
     if not len(before):

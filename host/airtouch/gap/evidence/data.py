@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY, ClosedLoop
+from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
 from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SCALES_TORQUE = frozenset({"inertia"})  #: effects that only multiply torque, and would shrink any trim
 #: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
 KEPT, KEPT_SAMPLES = 96, 20000
 
@@ -93,7 +93,7 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
     """
     response = data.study.response
-    replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
+    replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
         with_all = _replayed(data, replayed)
         return _without_means(data, replayed, with_all) if data.slow else with_all
@@ -102,7 +102,8 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
 
 def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
              ) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap, torque compared with what the commands lead to expect. replayed: without COMMAND_ONLY."""
+    """Spectra of the gap, torque compared with what the commands lead to expect. replayed: those of the effects that the logged
+    commands lead to."""
     with_all = _replayed(data, replayed)
     law = data.study.controller
     assert law is not None  # a response is known of nominal flights, and so is their loop
@@ -156,7 +157,7 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
 def _without_means(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
                    ) -> list[dict[str, np.ndarray]]:
     """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
-    unscaled = [a for a in active if a.effect.name not in SCALES_TORQUE]
+    unscaled = [a for a in active if not signature_of(a.effect).scales_torque]
     if len(unscaled) == len(active):
         return with_all
     out = [{r: v.copy() for r, v in e.items()} for e in with_all]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of
-from airtouch.gap.evidence.problem import LOOP, Problem
+from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import Slopes, active_at
 from airtouch.gap.signatures.term import Term
 
@@ -51,7 +51,7 @@ class _Posterior:
     def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
                  wide: bool) -> None:
         self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
-        of_loop = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
+        of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         own = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
         self.prior = np.concatenate([own, [deviation for _, deviation in problem.unit_offsets]])
 
@@ -125,7 +125,7 @@ def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -
     for t in mean:
         own = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name in LOOP and len(problem.commands) and np.isnan(known[own]).all():
+        if t.signature.loop_only and len(problem.commands) and np.isnan(known[own]).all():
             x = _best_on_grid(problem, mean, x, own)
     return x
 

@@ -12,20 +12,18 @@ from airtouch.gap.evidence.cells import BANDS_HZ, COMMAND_VIEW, REPLAY_VIEW, RES
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged, squared
 from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.signature import MEAN, signature_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
 DOUBT = 0.25
 #: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
@@ -98,7 +96,7 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """The gap (n,) with effects in the model."""
-        replayed = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
+        replayed = _beside_edges(active)
         replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.own]
         command_values = self.commands.moved([a for a in active if not a.gate])
         return np.where(self.known, self.with_commands(replay_values, command_values), 0.0)
@@ -131,7 +129,7 @@ class Problem:
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
         law = self.data.study.controller
-        loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
+        loop = _beside_edges(active) if law else []
         if not self.own or not loop or not law.changes_loop(loop):
             return np.zeros(self.own)
         gather = self.layout.gather
@@ -182,6 +180,11 @@ class Problem:
         """`unit_offsets` without zeros: indices, values there, deviation. No two have an index in common."""
         places = [np.flatnonzero(column) for column, _ in self.unit_offsets]
         return [(here, column[here], spread) for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
+
+
+def _beside_edges(active: Sequence[Active]) -> list[Active]:
+    """The effects that show beside edges: in the replay, or in the loop that is part of it."""
+    return [a for a in active if signature_of(a.effect).loop_only or not signature_of(a.effect).commands_only]
 
 
 def _counted(slow: bool) -> dict[str, np.ndarray]:

@@ -19,6 +19,7 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
+from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
@@ -28,15 +29,14 @@ SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen 
 LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by; chosen
 RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
 LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
-SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
 def growth(term: Term, x: float) -> float:
     """Added power at scaled strength x over that at 1."""
-    if term.name == "imu_noise":
-        values = term.at(np.array([x])), term.at(np.array([1.0]))
-        return max(values[0]["factor"] ** 2 - 1.0, 0.0) / (values[1]["factor"] ** 2 - 1.0)
-    return x * x
+    if not term.signature.factors:
+        return x * x
+    factor, of_one = (term.at(np.array([scaled]))[term.free[0]] for scaled in (x, 1.0))
+    return max(factor ** 2 - 1.0, 0.0) / (of_one ** 2 - 1.0)
 
 
 def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
@@ -66,11 +66,11 @@ def _covered(data: Data, i: int, regime: str, gate: Sequence[tuple[str, float, f
 def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """PSD (blocks, bins, COUNT) by regime that a random effect of unit strength adds to flight i."""
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
-    maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
+    maker = {IMU_NOISE: _imu_noise, THRUST_NOISE: _motor_noise, ROTOR_LINES: _vibration}.get(term.signature.spectrum)
     power_by_regime = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
     response = data.study.response
     if response is not None and data.flights[i].rates is not None:
-        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.name in SENSED)
+        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.signature.sensed)
     return power_by_regime
 
 

@@ -44,8 +44,6 @@ LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 PLANTS = 500  #: hypotheses whose plant is cached, chosen by memory: about 2 kB each
 LOOPS = 1000  #: spectra of an axis that are cached, chosen by memory: about 10 kB each
-#: effects that change the commands alone: replayed motor commands hold nothing of them
-COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
 
 
 class Hypothesis(NamedTuple):

@@ -13,6 +13,7 @@ import numpy as np
 from airtouch.gap.flights import motion
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
@@ -28,7 +29,6 @@ BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust,
 COUNT = sum(n for _, n in BINS)
 KINDS = ("entry", "exit")
 LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
-SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges are simulated
 LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
 WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
 #: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
@@ -165,7 +165,7 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
     """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
     total = np.zeros(COUNT)
     for a in active:
-        if a.effect.name not in SHOWN:
+        if not signature_of(a.effect).at_edges:
             continue
         term = terms(a.effect.name)[0]
         for name, amount in zip(term.free, term.scaled(a.values), strict=True):

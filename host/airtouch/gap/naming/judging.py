@@ -143,7 +143,7 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     and nobody knows how far they lie from it. fitted: the hypothesis' terms; fits: those of its spectra on each half.
     """
     hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
+    same = [next(t for t in terms if (t.identity, t.kind) == (term.identity, term.kind)) for terms in hypotheses]
     k = len(term.free)
     each = np.array([t.scaled(t.values)[:k] for t in same])
     strength = term.among_all(each.mean(axis=0))
@@ -166,11 +166,6 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
     out = np.diag(np.full(len(place), np.inf))
     out[np.ix_(own, own)] = covariance[np.ix_(place[own], place[own])]
     return out
-
-
-def _kind_of(term: Term) -> tuple:
-    """What tells a term from others of a hypothesis."""
-    return term.name, term.kind, term.values.get("rotor")
 
 
 def _refined(data: Data, part: Part, found: Fit) -> Fit:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.fit import left_over
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
@@ -102,16 +101,16 @@ def addable(name: str, variants: Sequence[Hypothesis], held: Hypothesis) -> list
     own = [t for t in held if not t.companion]
     if any(t.name != name and interchangeable(name, t.name) for t in own):
         return []
-    there = {(t.name, t.values.get("rotor")) for t in own}
+    there = {t.identity for t in own}
     return [Variant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
-            if not any((t.name, t.values.get("rotor")) in there for t in terms)]
+            if not any(t.identity in there for t in terms)]
 
 
 def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
     """Add a variant to the looks, where a look can judge it with what that says."""
     if random_of(variant.terms):
         looks.random.append(variant)
-    elif any(t.kind != MEAN or t.name in COMMAND_ONLY for t in variant.terms):
+    elif any(t.kind != MEAN or t.signature.commands_only for t in variant.terms):
         looks.unseen.append(variant)
     else:
         look = _mean_look(start, variant)

@@ -6,7 +6,6 @@ Between two days the gains of a loop differ a little, and nominal flights meet g
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.passing.gates import TOLD
 from airtouch.gap.signatures.signature import MEAN
@@ -54,4 +53,4 @@ def changes_the_loop(data: Data, selection: Selection) -> bool:
     if law is None or chosen is None or len(selection.named) != 1:
         return False
     terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
-    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
+    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.signature.loop_only for t in terms))

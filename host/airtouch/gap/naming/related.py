@@ -10,7 +10,6 @@ from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
-from airtouch.gap.signatures.random_draws import SHAPED
 
 
 def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
@@ -62,4 +61,4 @@ def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis
         return [v for v in variants if v[0].free == (alone,)]
     if of.shape is None:
         return list(variants)
-    return [v for v in variants if v[0].values[SHAPED[of.name]] == of.shape]
+    return [v for v in variants if v[0].values[v[0].signature.class_by] == of.shape]

@@ -13,7 +13,6 @@ from airtouch.gap.evidence.data import Data, spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import Part, Problem, problem_of
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -77,7 +76,7 @@ def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.nd
     residuals, extra_power: for each part the flattened values (n,) that the effects chosen before leave, and the power
     (n,) that random ones add. beside: those effects, free to give way a little.
     """
-    mean, other = ([t for t in some if t.kind == MEAN and t.name not in COMMAND_ONLY] for some in (terms, beside))
+    mean, other = ([t for t in some if t.kind == MEAN and not t.signature.commands_only] for some in (terms, beside))
     tables = [_columns(screen, part, (*mean, *other)) for part in parts]
     n = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - n)

@@ -103,15 +103,14 @@ def _by_replay(search: Search, state: State, passing: Judged | None) -> Selectio
         state.singles, state.steps, before, after, on.parts, state.least, study.nominal,
         assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
         nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
-        of_times=clock_left(on.data, [t.name for t in last]))
+        of_times=clock_left(on.data, last))
     return replace(selection, contradicted=contradicted(on, selection.chosen)) if study.simulated else selection
 
 
 def nameless(on: Trial, chosen: Judged | None) -> float:
     """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    named = [t.name for t in chosen.terms] if chosen else ()
-    return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, named)
+    return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())
 
 
 def _nominal_gain(data: Data) -> float:

@@ -120,10 +120,10 @@ def _updated_rms(own: Scatter, known: Sequence[Apparent], middle: Mapping[str, n
 def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Scatter by effect, in which names of one thing in the logs, as mass and thrust, have the wider of theirs."""
     out = dict(rms)
-    for group, _ in ALIKE:
-        same = [out[n] for n in group if n in out]
+    for confusion in ALIKE:
+        same = [out[n] for n in confusion.effects if n in out]
         if len({len(x) for x in same}) == 1:
-            out |= {n: np.max(same, axis=0) for n in group if n in out}
+            out |= {n: np.max(same, axis=0) for n in confusion.effects if n in out}
     return out
 
 

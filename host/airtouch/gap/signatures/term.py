@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from airtouch.gap.result import Quantity
-from airtouch.gap.signatures.signature import MEAN, free_of, signature_of
+from airtouch.gap.signatures.signature import MEAN, Signature, free_of, signature_of
 from airtouch.simulation.effects import Active, Effect, Parameter
 
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
@@ -33,6 +33,16 @@ class Term:
         """Name of the effect in the registry."""
         return self.effect.name
 
+    @property
+    def signature(self) -> Signature:
+        """What the diagnosis knows of the effect."""
+        return signature_of(self.effect)
+
+    @property
+    def identity(self) -> tuple[str, float | None]:
+        """Name of the effect, and of one of which several may act together which of them this is."""
+        return self.name, self.values.get(self.signature.several_by)
+
     def active(self, x: np.ndarray | None = None) -> Active:
         """The effect at scaled parameters x (k,), clipped to its bounds; None: at the values of the term."""
         return Active(self.effect, dict(self.values) if x is None else self.at(x), self.gate)
@@ -51,12 +61,12 @@ class Term:
 
     def refined(self) -> "Term":
         """The term with those parameters free too that are fitted last."""
-        later = tuple(p for p in signature_of(self.effect).free_later if p not in self.free)
+        later = tuple(p for p in self.signature.free_later if p not in self.free)
         return replace(self, free=self.free + later) if later else self
 
     def shaped(self) -> "list[Term]":
         """The term in each shape that all the data may choose among; none where its effect has no shapes."""
-        shape = signature_of(self.effect).shape
+        shape = self.signature.shape
         if shape is None or self.kind != MEAN:
             return []
         return [replace(self, values={**self.values, shape.parameter: v}) for v in shape.values]
