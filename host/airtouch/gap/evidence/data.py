@@ -169,17 +169,15 @@ def _without_means(data: Data, active: Sequence[Active], with_all: list[dict[str
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    residuals = data.workspace.once("ungated", (), lambda: [{} for _ in data.flights])
-    return _cached(data, "spectra", active, lambda: [
-        _replay(data, *each, active) for each in zip(data.flights, data.first, residuals, strict=True)])
+    return _cached(data, "spectra", active, lambda: [_replay(data, i, active) for i in range(len(data.flights))])
 
 
-def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], residuals: dict, active: Sequence[Active],
-            ) -> dict[str, np.ndarray]:
-    """`_replayed` of one flight. first: of its blocks by regime; residuals: those of effects that always act, kept."""
-    bridged = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), residuals)
+def _replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
+    """`_replayed` of flight i, by regime."""
+    bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
+                               data.workspace.once("residuals", i, Workspace))
     out = {}
-    for r, begin in first.items():  # commands are the command view's: nothing is left of them here
+    for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = blocks(bridged[:, :COMMAND.start], begin, r)
         out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[r][:, :, :COMMAND.start] = replayed

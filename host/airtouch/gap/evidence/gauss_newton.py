@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of
+from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import Slopes, active_at
 from airtouch.gap.signatures.term import Term
@@ -63,8 +63,8 @@ class _Posterior:
             values[index] -= amount * column
         command_power, price = self.problem.commanded(active, self.wide)
         power = self.added + command_power
-        return _State(x, offsets, values, power,
-                      price + cost_of(self.problem, values, power, x, offsets, self.prior))
+        away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
+        return _State(x, offsets, values, power, price + (0.5 * away - self.problem.likelihood(values, power)))
 
 
 def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
@@ -101,11 +101,11 @@ def _step(posterior: _Posterior, slopes: Slopes, now: _State, bounds: tuple[np.n
     """
     problem, size = posterior.problem, len(now.x)
     columns = [*slopes.columns, *(-column for column, _ in problem.unit_offsets)]
-    weights = weights_of(problem, now.values, now.power)
-    of_power = slopes.of_power(now.x, now.values, now.power, posterior.wide)
+    equations = normal_equations(columns, posterior.prior, now.values, weights_of(problem, now.values, now.power),
+                                 np.concatenate([now.x, now.offsets]))
+    equations = equations.with_power(*slopes.of_power(now.x, now.values, now.power, posterior.wide))
     for _ in range(TRIES):
-        change, covariance = bounded_step(columns, posterior.prior, now.values, weights, now.x, now.offsets, *bounds,
-                                          of_power, damping)
+        change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
         if new.cost < now.cost - 1e-9:
             return new, covariance, damping * CALMED, True

@@ -2,7 +2,7 @@
 
 import functools
 import weakref
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -36,6 +36,11 @@ class Part:
 
     pieces: tuple[Piece, ...]
 
+    @property
+    def key(self) -> Hashable:
+        """Equal for two parts of the same blocks."""
+        return tuple((flight, regime, chosen.tobytes()) for flight, regime, chosen in self.pieces)
+
 
 @dataclass(frozen=True)
 class Elements:
@@ -68,7 +73,7 @@ class Problem:
 
     def __init__(self, data: Data, part: Part) -> None:
         # the data keeps its problems: no cycle, no garbage to wait for
-        self.data, self.part, self.workspace = weakref.proxy(data), part, Workspace()
+        self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.slow))
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
         #: power (own,) of the floor, without what lost rows add
@@ -215,13 +220,12 @@ def _of_commands(commands: CommandView) -> Elements:
 
 
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
-    """Every block of every flight, one and the same part in each call, or of the flights of these numbers."""
-    if flights is None:
-        return data.workspace.once("whole", (), lambda: whole_of(data, range(len(data.flights))))
-    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in flights for r in (AIR, REST)
+    """Every block of every flight, or of the flights of these numbers."""
+    numbers = range(len(data.flights)) if flights is None else flights
+    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
                       if len(data.first[i][r])))
 
 
 def problem_of(data: Data, part: Part) -> Problem:
     """The flattened blocks of a part, made once."""
-    return data.workspace.once("problem", id(part), lambda: (part, Problem(data, part)))[1]  # the part lives as long
+    return data.workspace.once("problem", part.key, lambda: Problem(data, part))

@@ -12,7 +12,7 @@ from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import Fit, cell_gains, fit, judge
 from airtouch.gap.evidence.problem import Part
-from airtouch.gap.naming.screen import Screen
+from airtouch.gap.naming.screen import ROUND_TRIP
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
@@ -28,7 +28,6 @@ LEAST_GAIN = 12.0
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
 STRETCHED = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
-ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 
 
 @dataclass(frozen=True)
@@ -36,19 +35,18 @@ class Trial:
     """What hypotheses are judged on.
 
     parts: the two halves of the flights; base: log likelihood (2, 2) of no effect, as sure of the commands' floor as
-    without and with random effects, on each half; screen: what the first look has made so far.
+    without and with random effects, on each half.
     """
 
     data: Data
     parts: tuple[Part, Part]
     base: Sequence[Sequence[float]]
-    screen: Screen
 
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
     parts = halves(data)
-    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)], Screen(data))
+    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)])
 
 
 def halves(data: Data) -> tuple[Part, Part]:

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.fit import left_over
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
-from airtouch.gap.naming.screen import first_order, random_look
+from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
@@ -36,16 +35,11 @@ class RandomLook(NamedTuple):
 
 @dataclass(frozen=True)
 class Start:
-    """What a round begins from: the hypothesis that is chosen, and what it leaves of each half.
-
-    residuals: flattened values (n,) of each half that the hypothesis, fitted on the other half, leaves; extra_power
-    (n,): what it adds to their expected power.
-    """
+    """What a round begins from: the hypothesis that is chosen, and what it leaves of each half."""
 
     on: Trial
     chosen: Judged | None
-    residuals: Sequence[np.ndarray]
-    extra_power: Sequence[np.ndarray]
+    halves: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
@@ -73,13 +67,8 @@ class Looks:
 
 def start_of(on: Trial, chosen: Judged | None) -> Start:
     """What a round begins from, each half as the fit on the other half leaves it."""
-    residuals, extra_power = [], []
-    for half, part in enumerate(on.parts):
-        fitted = chosen.fits[1 - half].terms if chosen and chosen.fits else ()
-        problem, values, power = left_over(on.data, part, fitted)
-        residuals.append(values)
-        extra_power.append(power - problem.power)
-    return Start(on, chosen, residuals, extra_power)
+    fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    return Start(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
 
 
 def first_looks(start: Start, candidates: Mapping[str, Sequence[Hypothesis]], progress: Callable[[str], None]) -> Looks:
@@ -122,14 +111,13 @@ def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
 
 def _mean_look(start: Start, variant: Variant) -> Judged:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
-    on, terms = start.on, variant.terms
-    gain, fitted, variances = first_order(on.screen, on.parts, start.residuals, start.extra_power, terms, start.held)
-    gain += start.gain - price_of(terms) - variant.choice
-    own, k = terms[0], len(terms[0].free)
-    halves = np.array(fitted)[:, :k]
+    terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
+    look = first_order(start.on.data, start.halves, terms, start.held)
+    gain = look.gain + (start.gain - price_of(terms) - variant.choice)
+    halves = np.array(look.fitted)[:, :k]
     return Judged(variant.name, (*start.held, *terms), gain, full=False, choice=variant.choice,
                   strength=own.among_all(halves.mean(axis=0)),
-                  covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, variances, k))))
+                  covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
 
 def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
@@ -141,7 +129,7 @@ def _only_in_commands(on: Trial, terms: Hypothesis) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
     law = on.data.study.controller
     moved = [t.active(np.ones(len(t.free))) for t in terms]
-    return law is not None and not any(on.screen.shows(t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
+    return law is not None and not any(shows(on.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
 def random_looks(start: Start, variants: Sequence[Variant], means: Sequence[Judged], thorough: bool,
@@ -169,13 +157,13 @@ def _by_name(start: Start, variants: Iterable[Variant], mean_of: Mapping[str, Ju
 
     Where that mean effect was looked at, only beside its best variant.
     """
-    on, looks = start.on, {}
+    looks: dict[str, list[RandomLook]] = {}
     for variant in variants:
         name, terms, choice = variant
         if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
             continue
         if len(terms) == 1 or terms[0].kind == MEAN:
-            gain, strength = random_look(on.screen, on.parts, start.residuals, start.extra_power, random_of(terms)[0])
+            gain, strength = random_look(start.halves, random_of(terms)[0])
             looks.setdefault(name, []).append(RandomLook(gain - choice, strength, variant))
     return looks
 
