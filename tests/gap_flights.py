@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.evidence.data import Study
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import Floor

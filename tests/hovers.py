@@ -12,7 +12,7 @@ from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import signals
 from gap_flights import VEHICLE, flight, noise
 

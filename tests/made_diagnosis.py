@@ -7,13 +7,13 @@ from airtouch import vehicle
 from airtouch.gap.answer.pictures import of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked, Step
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, Ranked
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")
-FOUND = Found("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
+FOUND = NamedEffect("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
 
 
 def fly_pushed():
@@ -39,7 +39,7 @@ def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **mor
         "Weigh the <vehicle>.", {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
         map=whole, headline=headline or summary.headline(cells, bool(effects)),
-        next=(Step("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
+        next=(NextStep("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
 
 
 def of_flights(logs, effects=(FOUND,), **more):

@@ -32,7 +32,7 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.sealed import blind
 from airtouch.gap.signatures import scatter_estimates
-from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter
+from airtouch.gap.signatures.scatter import Apparent, Scatter
 from airtouch.gap.signatures.scatter_estimates import measured
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog

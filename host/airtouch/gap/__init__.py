@@ -7,18 +7,17 @@ Where each decision is made; a folder imports only those above it:
 
 - `flights`, a log made ready: `flight`, on a regular `clock`, without moments of `contact`; `motion` with its
   `filters`; its `blocks`; how hard it is flown: `hardness`.
-- `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
-  which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
-  `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
-  simulated flights with it are drawn.
+- `signatures`, what is known of each effect: its `signature` says how it is fitted and where it shows, as a `term` of a
+  hypothesis, of which `candidates` has all; names `alike`; `scatter` says how strong it seems where there is none, by
+  `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how simulated flights with it are drawn.
 - `loop`, the closed loop: `axis_plant` and `controller`, their transfer functions `loop_model`, what noise and
   set-points make of the commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`, what
   part of a command's torque turns the vehicle: `torque_share`; `command_spectra` of flights, from which `identify`
   finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
-- `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
-  (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,
-  `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
+- `evidence`, how likely the flights are under an effect: `data`, compared with a `study`, of which a `problem` has the
+  blocks in one flat array (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`,
+  `least_squares`, `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
 - `passing`, what comes and goes: `gates`, of `stretches` of blocks and `bursts`; `overhead` takes its seconds from
   another vehicle's log.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
@@ -32,7 +31,7 @@ Where each decision is made; a folder imports only those above it:
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
   that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the
-  effects: `related`; `selection` holds what was found, with its probabilities; `contradiction` by the flights;
+  effects: `related`; `selection` has the result with its probabilities; `contradiction` by the flights;
   `recorded`: when recorded flights may name an effect.
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.

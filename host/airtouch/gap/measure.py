@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.evidence.data import Study
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
 from airtouch.gap.loop.command_spectra import block_spectra, frequencies

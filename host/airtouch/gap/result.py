@@ -21,7 +21,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Found:
+class NamedEffect:
     """An effect that the diagnosis names, with its fitted parameters.
 
     seconds: stretches (flight, from_s, to_s) in which it acts; empty where it always does.
@@ -85,7 +85,7 @@ class GapMap:
 
 
 @dataclass(frozen=True)
-class Step:
+class NextStep:
     """What to do next: a sentence, the command that does it, the heading of a page that says how;
     "" where there is none."""
 
@@ -108,7 +108,7 @@ class Diagnosis:
     """
 
     verdict: str
-    effects: tuple[Found, ...]
+    effects: tuple[NamedEffect, ...]
     ranking: tuple[Ranked, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     where: tuple[Cell, ...]
@@ -123,14 +123,14 @@ class Diagnosis:
     unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
     map: GapMap | None = None  #: every cell, of which `where` has the largest
     headline: Cell | None = None  #: the cell that the answer speaks of
-    next: tuple[Step, ...] = ()  #: what to do next; `advice` is their text
+    next: tuple[NextStep, ...] = ()  #: what to do next; `advice` is their text
     vehicle: str = ""
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
     #: `gap.answer.pictures.Pictures`, where they were asked for
     pictures: Any = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
-    held: Any = field(default=None, repr=False, compare=False)
+    calibrated: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""

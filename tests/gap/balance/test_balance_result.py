@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.balance_result import likeliest, probabilities
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
 
 
 def test_the_hypotheses_of_a_name_count_together():
@@ -37,7 +37,8 @@ def test_the_other_name_of_a_weight_is_counted_with_the_answer():
 def test_names_of_half_the_probability_fit_alike():
     total = {"none": 0.26, "mass": 0.5, "slung_load": 0.24, "unknown": 0.3}
     assert balance_result._alike([], total, "mass", 0.5) == (("mass", "none"),)
-    assert balance_result._alike([Found("mass", {})], {"mass": 1.0}, "mass", 1.0) == (("mass", "thrust_coefficient"),)
+    named = [NamedEffect("mass", {})]
+    assert balance_result._alike(named, {"mass": 1.0}, "mass", 1.0) == (("mass", "thrust_coefficient"),)
 
 
 def test_the_wrong_effect_of_the_control_is_improbable():

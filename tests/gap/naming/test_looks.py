@@ -1,4 +1,4 @@
-"""Which variants may stand beside the effects that are held, and what their choice costs."""
+"""Which variants may stand beside the effects that are chosen, and what their choice costs."""
 
 import numpy as np
 import pytest

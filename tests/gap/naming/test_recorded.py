@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.naming.recorded import LEAST_CLOSED, STANDS_OUT, closes_too_little, must_close_the_gap
-from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import terms
 
 
@@ -23,7 +23,7 @@ def flights(recorded):
 
 @pytest.mark.parametrize(("selection", "must"), [
     (named("actuator_delay"), True), (named("mass"), False), (named("wind", gate=((0, 1),)), True),
-    (named("downwash", gate=((0, 1),), key=TOLD), False), (SimpleNamespace(chosen=None, named=()), False)])
+    (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), False), (SimpleNamespace(chosen=None, named=()), False)])
 def test_recorded_flights_hold_effects_of_the_loop_and_passing_ones_against_the_gap(selection, must):
     assert must_close_the_gap(flights(recorded=True), selection) == must
     assert not must_close_the_gap(flights(recorded=False), selection)

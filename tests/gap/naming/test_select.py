@@ -12,17 +12,17 @@ from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.selection import Judged, probabilities
-from airtouch.gap.passing.gates import TOLD, gated
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Scatter, size_of
+from airtouch.gap.signatures.scatter import FALSE_SHARE, Scatter, size_of
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
@@ -207,14 +207,15 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     assert names_where_nominal_flights_have(0.5 * (least + share)) == {"mass", "downwash"}
 
 
-@pytest.mark.parametrize(("overhead", "key", "since_s"), [((9.0, 12.0), TOLD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
+@pytest.mark.parametrize(("overhead", "key", "since_s"), [
+    ((9.0, 12.0), KNOWN_OVERHEAD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
 def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
     """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
     study = replace(scattered(), overhead=(("pushed", *overhead),))
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
     assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
-    assert (step.choice == 0.0) == (key == TOLD)
+    assert (step.choice == 0.0) == (key == KNOWN_OVERHEAD)
 
 
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
@@ -281,7 +282,7 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     on = judging.trial_of(data)
     loss, worst = contradicted(on, selection.chosen)
     assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
-    resting = [Part(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
+    resting = [BlockSet(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
     by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
                   for train, test in ((0, 1), (1, 0)))
     assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0

@@ -12,7 +12,7 @@ from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import nameless, select
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, fly, noise
 from hovers import (

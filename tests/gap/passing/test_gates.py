@@ -17,7 +17,7 @@ from airtouch.gap.passing import gates, stretches
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import GATED
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
@@ -157,8 +157,8 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
 
 def test_words_say_when_and_what_is_open():
     from airtouch.gap.answer import words
-    from airtouch.gap.result import Found, Quantity
-    assert words.effect_in_words(Found("wind", {"x": Quantity(0.3, unit="m/s")}, (("a/b.csv", 2.0, 5.04),))) \
+    from airtouch.gap.result import NamedEffect, Quantity
+    assert words.effect_in_words(NamedEffect("wind", {"x": Quantity(0.3, unit="m/s")}, (("a/b.csv", 2.0, 5.04),))) \
         == "wind: x 0.3 m/s; acts from 2.0 to 5.0 s of b.csv"
     entry = {"channel": "force_z", "band_hz": [0.5, 2.0], "phase": "cruise", "flight": "a/b.csv", "from_s": 12.0,
              "to_s": 18.4, "over_floor": 6.08, "follows": ["height", "speed"], "nearest": []}

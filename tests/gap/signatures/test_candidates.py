@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.result import Found
+from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.alike import interchangeable, names_alike
 from airtouch.gap.signatures.candidates import all_candidates, gated, is_random, kind_of, strength_term, term_of, terms
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
@@ -72,12 +72,12 @@ def test_mass_and_thrust_are_two_names_of_one_thing():
 def test_a_named_effect_is_its_own_variant_again():
     (own,) = (t for t in terms("motor_noise") if t.values["time"] == 0.02)
     values = own.quantities(own.scaled({**own.values, "rms": 0.05}))
-    again = term_of(Found("motor_noise", values, (("flight", 1.0, 2.0),)))
+    again = term_of(NamedEffect("motor_noise", values, (("flight", 1.0, 2.0),)))
     assert again.values == {**own.values, "rms": pytest.approx(0.05)}
     assert again.gate == (("flight", 1.0, 2.0),) and again.kind == SPECTRUM
 
 
 def test_a_gain_that_was_named_alone_is_its_own_term_with_its_values():
     alone = terms("controller_gain")[3]
-    found = Found("controller_gain", alone.quantities(np.array([0.4])))
+    found = NamedEffect("controller_gain", alone.quantities(np.array([0.4])))
     assert term_of(found).values == alone.at(np.array([0.4]))

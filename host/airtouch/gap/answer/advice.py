@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.result import Cell, Found, Step
+from airtouch.gap.result import Cell, NamedEffect, NextStep
 from airtouch.gap.signatures.alike import confusion_among
 from airtouch.gap.where.gap_map import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
@@ -15,32 +15,32 @@ URI = "radio://0/80/2M/E7E7E7E7E7"
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def advice(steps: Sequence[Step]) -> str:
+def advice(steps: Sequence[NextStep]) -> str:
     """The steps as text."""
     return " ".join(s.text for s in steps)
 
 
-def steps(verdict: str, effects: Sequence[Found], alike: Sequence[tuple[str, ...]], headline: Cell | None,
-          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[Step, ...]:
+def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[str, ...]], headline: Cell | None,
+          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[NextStep, ...]:
     """What to do next, most useful first."""
     said = [_apart(group) for group in alike]
     if verdict == "unknown":
         said += _open(headline, vehicle)
     if verdict == "effect":
         named = " and ".join(e.name for e in effects)
-        said.append(Step(f"Switch on {named} with these parameters in the simulator, and fly it again.",
+        said.append(NextStep(f"Switch on {named} with these parameters in the simulator, and fly it again.",
                          switched_on(effects, vehicle)))
     if verdict == "none":
-        said.append(Step("Nothing to add; longer flights would lower the floor."))
+        said.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not baseline:
-        said.append(Step("Give flights that are known to be nominal with --baseline: they lower the floor and show "
+        said.append(NextStep("Give flights that are known to be nominal with --baseline: they lower the floor and show "
                          "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
     if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
-        said.append(Step("Log the gyro: it shows torque at every frequency."))
+        said.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(said)
 
 
-def switched_on(effects: Sequence[Found], vehicle: str) -> str:
+def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
     """The command that flies the named effects in the simulator."""
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
@@ -65,24 +65,25 @@ def collect(mission: str) -> str:
     return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
 
 
-def _apart(group: tuple[str, ...]) -> Step:
+def _apart(group: tuple[str, ...]) -> NextStep:
     """What tells the effects of a group from one another."""
     among = confusion_among(group)
-    return Step(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
+    return NextStep(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
                 collect(among.mission) if among.mission else "")
 
 
-def _open(headline: Cell | None, vehicle: str) -> list[Step]:
+def _open(headline: Cell | None, vehicle: str) -> list[NextStep]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
     said = []
     if headline is not None and headline.phase in MISSIONS:
-        said.append(Step(f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
-                         collect(MISSIONS[headline.phase])))
+        said.append(NextStep(
+            f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
+            collect(MISSIONS[headline.phase])))
     elif headline is not None:
-        said.append(Step("Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
-    said.append(Step("Write the effect that you suspect in a file of your own, and diagnose again with it among the "
-                     "candidates.",
-                     f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... "
-                     "--effects-file mine.py",
-                     ADD_AN_EFFECT))
+        said.append(NextStep(
+            "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
+    said.append(NextStep(
+        "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
+        f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effects-file mine.py",
+        ADD_AN_EFFECT))
     return said

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 from airtouch.gap.answer.named_effects import chosen_effects
 from airtouch.gap.answer.reasons import why_not
-from airtouch.gap.answer.shrink import Cells, Shrink, nearer, shrink_of
+from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Selection, probabilities
-from airtouch.gap.result import Found, Quantity, Ranked
+from airtouch.gap.result import NamedEffect, Quantity, Ranked
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
@@ -17,7 +17,7 @@ AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by def
 CLOSE = 3.0
 
 
-def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> str:
+def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     """The verdict: "none", "effect" or "unknown". A gap at its floor is none, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
@@ -28,20 +28,18 @@ def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> s
     if selection.inference is not None:
         return "unknown" if not selection.explained else "none" if selection.chosen is None else "effect"
     outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.before <= AT_FLOOR and not outside_the_gap:
+    if gap.named.before <= AT_FLOOR and not outside_the_gap:
         odd_times = selection.of_times > selection.allowed
-        if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, cells)):
+        if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, gap)):
             return "none"
     if not selection.explained:
         return "unknown"
     return "none" if selection.chosen is None else "effect"
 
 
-def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked], Shrink, str, list[Found]]:
-    """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
-    parts = selection.parts
-    overall = shrink_of(data, parts, selection.chosen, cells)
-    verdict = verdict_of(data, selection, overall, cells)
+def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[Ranked], str, list[NamedEffect]]:
+    """Every candidate with probability and shrink, best first; the verdict; the effects named."""
+    verdict = verdict_of(data, selection, gap)
     effects = chosen_effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(selection, verdict == "none"), answer)
@@ -50,14 +48,14 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
         single = selection.singles.get(name)
         share = Quantity(0.0)
         if name == answer and effects and len(selection.named) == 1:
-            share = overall.share
+            share = gap.named.share
         elif single is not None and single.full and single.gain > FIRST_GAIN:
-            share = shrink_of(data, parts, single, cells).share
+            share = shrink_of(data, selection.parts, single, gap).share
         nats = None if single is None else selection.gained(single)
         out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
-    return out, overall, verdict, effects
+    return out, verdict, effects
 
 
 def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, ratio, short
@@ -50,7 +50,7 @@ def _which(diagnosis: Diagnosis) -> str:
     return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
 
 
-def _named(effect: Found) -> str:
+def _named(effect: NamedEffect) -> str:
     """The effect's name, and of which rotor."""
     rotor = effect.parameters.get("rotor")
     return plain(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
@@ -104,14 +104,14 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
-def effect_in_words(effect: Found) -> str:
+def effect_in_words(effect: NamedEffect) -> str:
     """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`; of one that comes and goes, when it acts."""
     when = seconds_in_words(effect)
     return (f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
             + (f"; acts from {when}" if when else ""))
 
 
-def seconds_in_words(effect: Found) -> str:
+def seconds_in_words(effect: NamedEffect) -> str:
     """When an effect acts, "" where it always does."""
     return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
 

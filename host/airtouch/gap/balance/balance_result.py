@@ -16,7 +16,7 @@ from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, Quantity, Ranked
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where import summary
 from airtouch.simulation.effects import Parameter, get
@@ -123,7 +123,7 @@ def likeliest(total: Mapping[str, float]) -> tuple[str, float]:
     return first, family[first]
 
 
-def _alike(effects: Sequence[Found], total: Mapping[str, float], first: str, probability: float,
+def _alike(effects: Sequence[NamedEffect], total: Mapping[str, float], first: str, probability: float,
            ) -> tuple[tuple[str, ...], ...]:
     """Sets of names that the flights cannot tell apart: names of one thing, and those that COMPETE with the answer."""
     alike = [tuple(sorted(group[0])) for e in effects if (group := names_alike(e.name))]
@@ -189,14 +189,14 @@ def _quantile(values: np.ndarray, weight: np.ndarray, q: float) -> float:
     return float(np.interp(q, np.cumsum(weight[order]), values[order]))
 
 
-def _found(fit: Fit) -> list[Found]:
+def _found(fit: Fit) -> list[NamedEffect]:
     """The effects, posterior means with 90 % intervals; a weight's com_offset only where its side is sure."""
     out = []
     for name, drawn in fit.hypothesis.effects:
         alone = len(fit.hypothesis.effects) == 1
         if name == OFF_CENTRE and not alone and not any(side_is_sure(v, fit.weight) for v in drawn.values()):
             continue
-        out.append(Found(name, {p.name: _posterior(drawn[p.name], fit.weight, p)
+        out.append(NamedEffect(name, {p.name: _posterior(drawn[p.name], fit.weight, p)
                                 for p in get(name).parameters if p.name in drawn}))
     return out
 

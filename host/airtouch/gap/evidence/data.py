@@ -2,56 +2,21 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
-from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, starts
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
-from airtouch.vehicle import Vehicle
 
 #: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
 KEPT, KEPT_SAMPLES = 96, 20000
-
-
-@dataclass(frozen=True)
-class Study:
-    """What a diagnosis holds flights against: vehicle, calibration, controller and floor."""
-
-    vehicle: Vehicle
-    calibration: tuple[Active, ...]
-    controller: ClosedLoop | None
-    floor: Floor
-    response: Response | None = None
-    unnamed_floor: Any = None  #: unnamed.columns.UnnamedFloor of the nominal flights
-    nominal: int = 0  #: how many there were
-    scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
-    relations: Any = None  #: relations.library.Library that holds for the nominal flights, if there is one
-    #: (flight, from_s, to_s) in which another vehicle is known to be overhead; none: nobody knows
-    overhead: tuple[tuple[str, float, float], ...] = ()
-
-    @property
-    def simulated(self) -> bool:
-        """Whether its nominal flights are those of a simulator, which are all drawn alike."""
-        return self.scatter is not None and self.scatter.exact
-
-    @property
-    def same_models(self) -> bool:
-        """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
-        return self.simulated and self.controller is not None and self.controller.by_firmware
-
-    @property
-    def recorded(self) -> bool:
-        """Whether its nominal flights are recorded ones. Without nominal flights this is False, as `simulated` is."""
-        return self.scatter is not None and not self.scatter.exact
 
 
 @dataclass
@@ -102,8 +67,10 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
 
 def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
              ) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap, torque compared with what the commands lead to expect. replayed: those of the effects that the logged
-    commands lead to."""
+    """Spectra of the gap, torque compared with what the commands lead to expect.
+
+    replayed: the effects that do not show in the commands alone.
+    """
     with_all = _replayed(data, replayed)
     law = data.study.controller
     assert law is not None  # a response is known of nominal flights, and so is their loop

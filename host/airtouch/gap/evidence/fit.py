@@ -4,6 +4,7 @@ Mean effects are fitted by Gauss-Newton on the whitened spectra, random ones by 
 strength; what differs from flight to flight (offsets) has a prior.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.gauss_newton import gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
-from airtouch.gap.evidence.problem import Part, Problem, problem_of
+from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import random_of
@@ -34,7 +35,7 @@ CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelih
 
 
 @dataclass
-class Fit:
+class FittedTerms:
     """A hypothesis fitted.
 
     terms: with their values; scaled (k,), covariance (k, k): of the free parameters of its mean effects; offsets (m,):
@@ -47,9 +48,20 @@ class Fit:
     offsets: np.ndarray
     gained: float
 
+    def place(self, term: Term) -> slice:
+        """Where the parameters of one of its mean effects are among the k."""
+        before = itertools.takewhile(lambda t: t is not term, self.terms)
+        first = sum(len(t.free) for t in before if t.kind == MEAN)
+        return slice(first, first + len(term.free))
 
-def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None,
-        prior: np.ndarray | float = PRIOR_UNITS) -> Fit:
+
+def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
+    """Scaled parameters (k,) of the mean effects among terms with values."""
+    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in terms if t.kind == MEAN)])
+
+
+def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
+        prior: np.ndarray | float = PRIOR_UNITS) -> FittedTerms:
     """Fit of effects to the blocks of `part`; the residual is judged elsewhere.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior: standard deviation of
@@ -74,7 +86,7 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     if random:
         command_power, cost = problem.commanded([*active, *(t.active() for t in random)], True)
     gained = problem.likelihood(solution.values, random_power + command_power) - cost
-    return Fit(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
+    return FittedTerms(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
 
 
 def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> tuple[Term, ...]:
@@ -89,7 +101,7 @@ def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -
     return tuple(out)
 
 
-def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> float:
+def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False) -> float:
     """Log likelihood of blocks under effects fitted elsewhere; offsets between flights fitted anew.
 
     wide: the commands' floor is as uncertain as under random effects, though there are none.
@@ -98,14 +110,14 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
     return problem.likelihood(values, added) - price
 
 
-def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem, its residual (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
     problem, values, added, _ = _explained(data, part, terms, wide)
     return problem, values, problem.power + added
 
 
-def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
+def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (GROUPS,) that effects with these parameters add in each cell: view, channel and band."""
     problem, values, power = left_over(data, part, (), bool(random_of(terms)))
     without = problem.likelihood.each(values, power - problem.power)
@@ -113,7 +125,7 @@ def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     return np.bincount(problem.groups, problem.likelihood.each(values, power - problem.power) - without, GROUPS)
 
 
-def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
     """Problem of a part, its residual under effects, the power that they add, and the cost of offsets and floor."""
     problem = problem_of(data, part)
@@ -162,7 +174,7 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.
     return term.fitted(np.full(len(term.free), float(np.exp(optimum.x))))
 
 
-def strength_variance(data: Data, part: Part, terms: Sequence[Term], term: Term) -> np.ndarray:
+def strength_variance(data: Data, part: BlockSet, terms: Sequence[Term], term: Term) -> np.ndarray:
     """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature; inf for none."""
     x = term.scaled(term.values)
     levels = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.evidence.slopes import Slopes, active_at
+from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
 from airtouch.gap.signatures.term import Term
 
 ITERATIONS = 8  #: steps at most; chosen
@@ -81,7 +81,7 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
         return MeanFit(x, offsets, covariance, problem.base)
     posterior = _Posterior(problem, mean, added, spread, wide)
     now = posterior.at(x, offsets)
-    slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0
+    slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
     for _ in range(ITERATIONS):
         slopes.take(now.x, stuck)
         before = now.cost
@@ -93,8 +93,8 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
     return MeanFit(now.x, now.offsets, covariance, now.values)
 
 
-def _step(posterior: _Posterior, slopes: Slopes, now: _State, bounds: tuple[np.ndarray, np.ndarray], damping: float,
-          ) -> tuple[_State, np.ndarray, float, bool]:
+def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],
+          damping: float) -> tuple[_State, np.ndarray, float, bool]:
     """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained.
 
     It is shortened until it gains, TRIES times at most.

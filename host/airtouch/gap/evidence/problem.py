@@ -31,7 +31,7 @@ FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
 
 
 @dataclass(frozen=True)
-class Part:
+class BlockSet:
     """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
 
     pieces: tuple[Piece, ...]
@@ -71,7 +71,7 @@ class Problem:
     whether a value is one of the torque.
     """
 
-    def __init__(self, data: Data, part: Part) -> None:
+    def __init__(self, data: Data, part: BlockSet) -> None:
         # the data keeps its problems: no cycle, no garbage to wait for
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.slow))
@@ -219,13 +219,13 @@ def _of_commands(commands: CommandView) -> Elements:
                     commands.freedom, commands.freedom)
 
 
-def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
+def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
     """Every block of every flight, or of the flights of these numbers."""
     numbers = range(len(data.flights)) if flights is None else flights
-    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
+    return BlockSet(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
                       if len(data.first[i][r])))
 
 
-def problem_of(data: Data, part: Part) -> Problem:
+def problem_of(data: Data, part: BlockSet) -> Problem:
     """The flattened blocks of a part, made once."""
     return data.workspace.once("problem", part.key, lambda: Problem(data, part))

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.axis_plant import axis_plant

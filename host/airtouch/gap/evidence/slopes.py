@@ -23,7 +23,7 @@ def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     return out
 
 
-class Slopes:
+class SpectraSlopes:
     """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
 
     at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import TEMPERATURE, Hypothesis, Judged
+from airtouch.gap.naming.selection import TEMPERATURE, Judged
 from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.naming.thresholds import needed_beside, random_by_misfit
 from airtouch.gap.signatures.candidates import is_random
+from airtouch.gap.signatures.term import Terms
 
 MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
 MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`_worth_adding`); chosen
@@ -26,7 +27,7 @@ class Search:
     """
 
     on: Trial
-    candidates: Mapping[str, Sequence[Hypothesis]]
+    candidates: Mapping[str, Sequence[Terms]]
     alone: Mapping[str, Judged]
     least: Mapping[str, float]
     progress: Callable[[str], None]

@@ -10,14 +10,14 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import Fit, cell_gains, fit, judge
-from airtouch.gap.evidence.problem import Part
+from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
+from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.screen import ROUND_TRIP
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
@@ -39,7 +39,7 @@ class Trial:
     """
 
     data: Data
-    parts: tuple[Part, Part]
+    parts: tuple[BlockSet, BlockSet]
     base: Sequence[Sequence[float]]
 
 
@@ -49,7 +49,7 @@ def trial_of(data: Data) -> Trial:
     return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)])
 
 
-def halves(data: Data) -> tuple[Part, Part]:
+def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     first, second = [], []
     numbers = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
@@ -62,7 +62,7 @@ def halves(data: Data) -> tuple[Part, Part]:
             even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
             first.append((i, regime, even))
             second.append((i, regime, ~even))
-    return Part(tuple(first)), Part(tuple(second))
+    return BlockSet(tuple(first)), BlockSet(tuple(second))
 
 
 def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
@@ -76,33 +76,33 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
-def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
+def crossed(on: Trial, name: str, terms: Terms, chosen: Judged | None, choice: float) -> Judged:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice: nats that the choice among its variants costs. Its gain is that of
     all effects over none, less what their parameters and the choice of their variants cost. Effects that are seen in
     the commands alone gain less beside the first random one; it is not charged with that (`_gained_while_certain`).
     """
-    held = chosen.terms if chosen else ()
+    before = chosen.terms if chosen else ()
     paid = choice + (chosen.choice if chosen else 0.0)
     beyond = (chosen.beyond if chosen else 0.0) + _gained_while_certain(on, terms, chosen)
     if chosen and all(t.kind == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
-        spectral = [t for t in (*held, *terms) if t.kind != CLOCK]
+        spectral = [t for t in (*before, *terms) if t.kind != CLOCK]
         fits = tuple(_fit_on(on, half, spectral, chosen) for half in (0, 1))
-        gain = clock_gains(on.data, held)
+        gain = clock_gains(on.data, before)
         for train, test in ROUND_TRIP:
             gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
         gain += beyond - price_of(fits[-1].terms) - paid
-    of_clock = [clock_gain(on.data, t)[0] for t in (*held, *terms) if t.kind == CLOCK]
+    of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.kind == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
     return Judged(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
                   covariance=covariance, apart=apart, beyond=beyond)
 
 
-def _gained_while_certain(on: Trial, terms: Hypothesis, chosen: Judged | None) -> float:
+def _gained_while_certain(on: Trial, terms: Terms, chosen: Judged | None) -> float:
     """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
 
     Beside a random effect the commands' floor is less certain.
@@ -113,8 +113,8 @@ def _gained_while_certain(on: Trial, terms: Hypothesis, chosen: Judged | None) -
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Judged | None) -> Fit:
-    """Effects fitted on a half, from where those that are chosen were found there."""
+def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Judged | None) -> FittedTerms:
+    """Effects fitted on a half, from where those that are chosen ended there."""
     part = on.parts[half]
     return _refined(on.data, part, fit(on.data, part, terms, _start(chosen, terms, half)))
 
@@ -133,7 +133,8 @@ def held_out_cell_gains(on: Trial, hypothesis: Judged) -> np.ndarray:
                   axis=0)
 
 
-def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],
+                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Strength, covariance and difference between the halves of the scaled parameters of one term of a hypothesis.
 
     strength (k,): the mean of both halves; covariance (k, k): 0 but for mean effects; difference (k,): half of what the
@@ -149,8 +150,8 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
         return strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength))
     covariance = np.zeros((k, k))
     for f, t in zip(fits, same, strict=True):
-        place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
-        covariance += f.covariance[place:place + k, place:place + k] / len(fits) ** 2
+        first = f.place(t).start
+        covariance += f.covariance[first:first + k, first:first + k] / len(fits) ** 2
     return strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1]))
 
 
@@ -166,16 +167,16 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
     return out
 
 
-def _refined(data: Data, part: Part, found: Fit) -> Fit:
+def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
     """A fit with the parameters free too that only a fit close to the truth can find."""
-    terms = [t.refined() for t in found.terms]
-    if all(a.free == b.free for a, b in zip(terms, found.terms, strict=True)):
-        return found
-    return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
+    terms = [t.refined() for t in fitted.terms]
+    if all(a.free == b.free for a, b in zip(terms, fitted.terms, strict=True)):
+        return fitted
+    return fit(data, part, terms, mean_parameters(terms))
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
-    """The scaled parameters (k,) found on a half before, NaN for those of the new effects; None where none were."""
+    """The scaled parameters (k,) fitted to a half before, NaN for those of the new effects; None where none are."""
     if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[half].scaled

@@ -8,20 +8,20 @@ import numpy as np
 
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
 from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 
 HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer in this view; chosen
 
 
-class Variant(NamedTuple):
+class PricedVariant(NamedTuple):
     """A variant of an effect; choice: nats that the choice among the effect's variants costs."""
 
     name: str
-    terms: Hypothesis
+    terms: Terms
     choice: float
 
 
@@ -30,7 +30,7 @@ class RandomLook(NamedTuple):
 
     gain: float
     strength: np.ndarray
-    variant: Variant
+    variant: PricedVariant
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Start:
         return self.chosen.gain if self.chosen else 0.0
 
     @property
-    def held(self) -> Hypothesis:
-        """Its terms."""
+    def terms(self) -> Terms:
+        """The terms of the hypothesis that is chosen."""
         return self.chosen.terms if self.chosen else ()
 
 
@@ -61,8 +61,8 @@ class Looks:
     """
 
     means: list[Judged] = field(default_factory=list)
-    random: list[Variant] = field(default_factory=list)
-    unseen: list[Variant] = field(default_factory=list)
+    random: list[PricedVariant] = field(default_factory=list)
+    unseen: list[PricedVariant] = field(default_factory=list)
 
 
 def start_of(on: Trial, chosen: Judged | None) -> Start:
@@ -71,31 +71,31 @@ def start_of(on: Trial, chosen: Judged | None) -> Start:
     return Start(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
 
 
-def first_looks(start: Start, candidates: Mapping[str, Sequence[Hypothesis]], progress: Callable[[str], None]) -> Looks:
+def first_looks(start: Start, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
     """A first look at every variant that may be added. progress: is told the name of every candidate."""
     looks = Looks()
     for name, variants in candidates.items():
         progress(name)
-        for variant in addable(name, variants, start.held):
+        for variant in addable(name, variants, start.terms):
             _look_at(start, variant, looks)
     return looks
 
 
-def addable(name: str, variants: Sequence[Hypothesis], held: Hypothesis) -> list[Variant]:
-    """The variants of an effect that may stand beside those that are held.
+def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
+    """The variants of an effect that may stand beside those that are chosen.
 
-    Not those of which a part is held already, of another rotor but for this one; none where another name for the same
-    thing is held. Each costs log n for the choice among the n variants with as many terms: else many would beat one.
+    Not those of which a part is chosen already, of another rotor but for this one; none where another name for the same
+    thing is chosen. Each costs log n for the choice among the n variants with as many terms: else many would beat one.
     """
-    own = [t for t in held if not t.companion]
+    own = [t for t in chosen if not t.companion]
     if any(t.name != name and interchangeable(name, t.name) for t in own):
         return []
     there = {t.identity for t in own}
-    return [Variant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
+    return [PricedVariant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
             if not any(t.identity in there for t in terms)]
 
 
-def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
+def _look_at(start: Start, variant: PricedVariant, looks: Looks) -> None:
     """Add a variant to the looks, where a look can judge it with what that says."""
     if random_of(variant.terms):
         looks.random.append(variant)
@@ -109,13 +109,13 @@ def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
             looks.means.append(look)
 
 
-def _mean_look(start: Start, variant: Variant) -> Judged:
+def _mean_look(start: Start, variant: PricedVariant) -> Judged:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    look = first_order(start.on.data, start.halves, terms, start.held)
+    look = first_order(start.on.data, start.halves, terms, start.terms)
     gain = look.gain + (start.gain - price_of(terms) - variant.choice)
     halves = np.array(look.fitted)[:, :k]
-    return Judged(variant.name, (*start.held, *terms), gain, full=False, choice=variant.choice,
+    return Judged(variant.name, (*start.terms, *terms), gain, full=False, choice=variant.choice,
                   strength=own.among_all(halves.mean(axis=0)),
                   covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
@@ -125,22 +125,22 @@ def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: in
     return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
 
 
-def _only_in_commands(on: Trial, terms: Hypothesis) -> bool:
+def _only_in_commands(on: Trial, terms: Terms) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
     law = on.data.study.controller
     moved = [t.active(np.ones(len(t.free))) for t in terms]
     return law is not None and not any(shows(on.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
-def random_looks(start: Start, variants: Sequence[Variant], means: Sequence[Judged], thorough: bool,
-                 ) -> tuple[list[Judged], list[Variant]]:
+def random_looks(start: Start, variants: Sequence[PricedVariant], means: Sequence[Judged], thorough: bool,
+                 ) -> tuple[list[Judged], list[PricedVariant]]:
     """Looks at variants with a random effect: candidates that promise little, and the variants to fit of the others.
 
     Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that looks best is
     fitted, with the longer ones that begin with the same term. means: looks at mean effects, best first; a candidate
     that is among them says by that how little it promises.
     """
-    mean_of = {j.name: j for j in reversed(means) if len(j.terms) == len(start.held) + 1}
+    mean_of = {j.name: j for j in reversed(means) if len(j.terms) == len(start.terms) + 1}
     unpromising, to_fit = [], []
     for name, looks in _by_name(start, variants, mean_of).items():
         best = max(looks, key=lambda look: look.gain)
@@ -152,7 +152,8 @@ def random_looks(start: Start, variants: Sequence[Variant], means: Sequence[Judg
     return unpromising, to_fit
 
 
-def _by_name(start: Start, variants: Iterable[Variant], mean_of: Mapping[str, Judged]) -> dict[str, list[RandomLook]]:
+def _by_name(start: Start, variants: Iterable[PricedVariant], mean_of: Mapping[str, Judged],
+             ) -> dict[str, list[RandomLook]]:
     """Looks at the variants of every candidate whose random part stands alone or beside one mean term.
 
     Where that mean effect was looked at, only beside its best variant.
@@ -168,7 +169,7 @@ def _by_name(start: Start, variants: Iterable[Variant], mean_of: Mapping[str, Ju
     return looks
 
 
-def _longer(variant: Variant, variants: Iterable[Variant]) -> list[Variant]:
+def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[PricedVariant]:
     """The variants of the same effect that have more terms and begin with the same one."""
     return [v for v in variants if v.name == variant.name and len(v.terms) > len(variant.terms)
             and _same(v.terms[0], variant.terms[0])]
@@ -177,7 +178,7 @@ def _longer(variant: Variant, variants: Iterable[Variant]) -> list[Variant]:
 def _as_judged(start: Start, look: RandomLook) -> Judged:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
     name, terms, choice = look.variant
-    return Judged(name, (*start.held, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
+    return Judged(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
                   strength=strength_term(terms).among_all(look.strength))
 
 

@@ -8,8 +8,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.passing.gates import TOLD, Gated, gated
-from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, Gated, gated
+from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.unnamed.generic import height_gain
 
 
@@ -29,7 +29,7 @@ def passing_effect(on: Trial, singles: Mapping[str, Judged], least: Mapping[str,
                if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
-    overhead = [g for g in passing if g.key == TOLD]
+    overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
     return _as_judged(on, max(overhead or passing, key=lambda g: g.gain))
 
 
@@ -43,7 +43,7 @@ def _as_judged(on: Trial, effect: Gated) -> Judged:
 
 
 def as_in_nominal_flights(data: Data, passing: Judged, steps: Sequence[Judged]) -> bool:
-    """Whether an effect that comes and goes adds no more to the effects found after it than in nominal flights."""
+    """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
                and news(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
 

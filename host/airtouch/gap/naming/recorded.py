@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.selection import Selection
-from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import MEAN
 
 #: share of the gap that the effect named must close: as much as the loop model may be wrong by, `problem.DOUBT`; chosen
@@ -24,7 +24,7 @@ def must_close_the_gap(data: Data, selection: Selection) -> bool:
     """
     if not data.study.recorded:
         return False
-    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != TOLD)
+    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != KNOWN_OVERHEAD)
 
 
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:

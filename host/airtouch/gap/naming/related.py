@@ -6,10 +6,11 @@ from dataclasses import replace
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
+from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
+from airtouch.gap.signatures.term import Terms
 
 
 def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
@@ -27,7 +28,7 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(known))
 
 
-def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Mapping[str, Judged],
+def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Judged],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
@@ -54,7 +55,7 @@ def signs_not_shown(selection: Selection) -> list[str]:
             for name in selection.inference.without_sign if name in names]
 
 
-def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:
+def matching(of: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
     alone = of.name.partition(" ")[2]
     if alone:

@@ -9,18 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, crossed
-from airtouch.gap.naming.looks import Variant, first_looks, random_looks, start_of
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.naming.looks import PricedVariant, first_looks, random_looks, start_of
+from airtouch.gap.naming.selection import Judged
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import strength_term
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
+from airtouch.gap.signatures.term import Terms
 
 FULL = 5  #: candidates that are fitted in full, after a first look at all; chosen for time
 PROMISING = 0.5  #: of FIRST_GAIN, that one of these must gain at a first look; chosen for time
 
 
-def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
+def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Judged | None,
              progress: Callable[[str], None] = lambda _: None, thorough: bool = False,
              promising: Container[str] = ()) -> dict[str, Judged]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
@@ -34,9 +35,9 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     means = _best_variants(looks.means)
     unpromising, random = random_looks(start, looks.random, means, thorough)
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
-    waiting = [*looks.unseen, *random, *(Variant(j.name, j.terms[len(start.held):], j.choice) for j in to_fit)]
+    waiting = [*looks.unseen, *random, *(PricedVariant(j.name, j.terms[len(start.terms):], j.choice) for j in to_fit)]
     fitted = shared(lambda v: crossed(on, v.name, v.terms, chosen, v.choice), waiting)
-    best = _best_of_each([*fitted, *looked_at], len(start.held))
+    best = _best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, start.gain)
@@ -60,7 +61,7 @@ def _split(looked: Sequence[Judged], gain: float, promising: Container[str]) -> 
     return [j for j, fit in pairs if fit], [j for j, fit in pairs if not fit]
 
 
-def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
+def _best_of_each(judged: Sequence[Judged], before: int) -> dict[str, Judged]:
     """The best hypothesis of each candidate, on top of so many terms that were there before.
 
     One with a random part or a companion must earn it, LEAST_GAIN; where its companion alone gains as much, it is that
@@ -74,7 +75,7 @@ def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
             best[j.name] = j
     for name, other in COMPANIONS.items():
         both, alone = best.get(name), best.get(other)
-        if both and alone and len(both.terms) > held + 1 and both.gain < alone.gain + LEAST_GAIN:
+        if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))
     return best
 

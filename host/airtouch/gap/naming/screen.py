@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data, spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, left_over, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import Part, Problem
+from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -40,14 +40,14 @@ class Remainder:
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """Mean effects to first order: held-out gain, nats; on each half scaled parameters (k,) and their variances (k,)."""
+    """Mean effects to first order: held-out gain, nats; of each half scaled parameters (k,) and their variances."""
 
     gain: float
     fitted: Sequence[np.ndarray]
     variances: Sequence[np.ndarray]
 
 
-def remainder_of(data: Data, part: Part, terms: Sequence[Term]) -> Remainder:
+def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder:
     """What effects with these parameters leave of a part of the flights."""
     problem, residual, power = left_over(data, part, terms)
     extra_power = power - problem.power

@@ -18,11 +18,12 @@ from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, seconds
 from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import UNKNOWN_GAIN, Hypothesis, Judged, Selection
+from airtouch.gap.naming.selection import UNKNOWN_GAIN, Judged, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD, SHAKES
+from airtouch.gap.signatures.term import Terms
 from airtouch.gap.unnamed.generic import generic_gain
 from airtouch.simulation import effects
 
@@ -33,7 +34,7 @@ WAKE_SHARE = 0.05
 NAMES = frozenset(effects.NAMES)  #: of the package's effects; the others are a user's own
 
 
-def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
+def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
     """Judge every candidate, then name effects.
 

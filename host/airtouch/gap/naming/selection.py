@@ -1,15 +1,15 @@
-"""What a selection of effects found: hypotheses judged, the steps, and the probability of each candidate."""
+"""The result of a selection of effects: hypotheses judged, the steps, and the probability of each candidate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.evidence.fit import Fit
-from airtouch.gap.evidence.problem import Part
+from airtouch.gap.evidence.fit import FittedTerms
+from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Terms
 
 #: nats that a nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
 #: floor, and where none did; both chosen (host/docs/gap.md, "What `unknown` means")
@@ -22,7 +22,6 @@ TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too 
 BEHIND = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
 #: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as BEHIND
 BELOW = 0.9
-Hypothesis = tuple[Term, ...]  #: terms that act together
 
 
 @dataclass(frozen=True)
@@ -37,9 +36,9 @@ class Judged:
     """
 
     name: str
-    terms: Hypothesis
+    terms: Terms
     gain: float
-    fits: tuple[Fit, ...] = ()
+    fits: tuple[FittedTerms, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
     choice: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
     #: nats of the gain that effects before the first random one gained while the commands' floor was more certain
@@ -68,7 +67,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Selection:
-    """What a selection of effects found; gains are in held-out nats.
+    """The result of a selection of effects; gains are in held-out nats.
 
     singles: the best variant of every candidate; steps: effects added one after another. free_before, free_after: gain
     of the nameless model over no effect and over the last step; of_times: of the latter, what the logged times hold;
@@ -81,7 +80,7 @@ class Selection:
     steps: tuple[Judged, ...]
     free_before: float
     free_after: float
-    parts: tuple[Part, Part]
+    parts: tuple[BlockSet, BlockSet]
     least: Mapping[str, float]  #: evidence that each candidate needs as the first
     nominal: int
     assumed: bool

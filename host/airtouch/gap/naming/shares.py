@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from airtouch.gap.evidence.clock import clock_gains
-from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.naming.judging import ROUND_TRIP, Trial, gain_of, price_of
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.signatures.signature import CLOCK, COMPANIONS, MEAN
+from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Term
 
 
@@ -29,8 +27,7 @@ def _gain_without(on: Trial, steps: Sequence[Judged], dropped: Judged) -> float:
         return gain
     for train, test in ROUND_TRIP:
         known = _others(last.fits[train].terms, dropped.name)
-        start = [t.scaled(t.values) for t in known if t.kind == MEAN]
-        refit = fit(on.data, on.parts[train], known, np.concatenate(start) if start else None)
+        refit = fit(on.data, on.parts[train], known, mean_parameters(known))
         gain += gain_of(on, test, refit.terms)
     cost_of_dropped = dropped.choice - (steps[place - 1].choice if place else 0.0)
     return gain - price_of(refit.terms) - (last.choice - cost_of_dropped)

@@ -5,9 +5,10 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.passing_effect import seconds
@@ -18,7 +19,7 @@ from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
-from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, size_of
+from airtouch.gap.signatures.scatter import Apparent, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
 from airtouch.gap.signatures.term import Term
@@ -30,7 +31,7 @@ NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the dat
 RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
 
 
-def nominal_scatter(study: Study, flights: Sequence[Flight], without: Sequence[str] = ()) -> Scatter:
+def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[str] = ()) -> Scatter:
     """How far the apparent strengths of every effect but those of `without` scatter among the nominal flights.
 
     It is measured in FLIGHTS of them, each held against the study of all.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.disturbed import disturbed

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
 from airtouch.robust import deviation

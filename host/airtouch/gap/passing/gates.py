@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import Fit, fit, judge
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.fit import FittedTerms, fit, judge
+from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import bursts
 from airtouch.gap.passing.stretches import LEAST_BLOCKS, Gate, each_block, stretches_of
 from airtouch.gap.signatures import candidates
@@ -20,7 +20,7 @@ from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Term
 
-TOLD = "told"  #: a wake in seconds in which another vehicle is known to be overhead
+KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle is known to be overhead
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Gated:
     """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs, nats."""
 
     name: str
-    fitted: Fit
+    fitted: FittedTerms
     gain: float
     cost: float
-    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or TOLD
+    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or KNOWN_OVERHEAD
 
     @property
     def strength(self) -> np.ndarray:
@@ -48,7 +48,7 @@ class Ungated:
     """
 
     data: Data
-    whole: Part
+    whole: BlockSet
     each: np.ndarray
     level: Mapping[bool, float]
 
@@ -66,7 +66,7 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
 
     without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
-    TOLD.
+    KNOWN_OVERHEAD.
     """
     base = ungated(data)
     if base is None:
@@ -74,7 +74,7 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     lively, out = bursts(data), {}
     for name, variants in candidates.gated(without).items():
         if name == OVERHEAD and data.study.overhead:
-            out[TOLD] = replace(_best(base, name, variants, data.study.overhead), key=TOLD)
+            out[KNOWN_OVERHEAD] = replace(_best(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
         tried = [(terms, gate, cost) for variant in variants for terms, gate, cost in (
             stretches_of(data, base.whole, base.each, variant), (variant, *lively)) if gate]
         if tried:

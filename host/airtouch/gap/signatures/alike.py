@@ -29,8 +29,8 @@ CONFUSED = (
     Confusion(frozenset({"motor_lag", "inertia"}),
               "log rpm, or add quick yaw turns: inertia scales every response alike"),
     Confusion(frozenset({"wind", "imu_bias"}),
-              "stand still with motors off for five seconds, and turn the vehicle by 90 degrees in hover: wind turns in "
-              "body axes and is gone on the ground, a bias is neither"),
+              "stand still with motors off for five seconds, and turn the vehicle by 90 degrees in hover: wind turns "
+              "in body axes and is gone on the ground, a bias is neither"),
     Confusion(frozenset({"weak_motor", "com_offset"}),
               "add yaw turns: a weak rotor leaves yaw torque, an offset does not"),
     Confusion(frozenset({"rotor_drag", "blade_flapping"}),

@@ -5,26 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.result import Found
+from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import COMPANIONS, GATED, SHAKES, SIGNATURES, SPECTRUM, signature_of
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
 
-Variant = tuple[Term, ...]  #: the terms of one hypothesis: the effect, its random part, its companion
 
-
-def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
+def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of every effect of the registry but those of `without`, by name and in its order.
 
     Moving air acts through the rotors' drag, and drag that acts on the air's velocity acts
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
     """
     without = set(without)
-    out: dict[str, list[Variant]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    out: dict[str, list[Terms]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
     for name, signature in SIGNATURES.items():
         if name in out and signature.steady is not None:
-            random: list[Variant] = [(*v, random_part_of(name)) for v in out[name]]
+            random: list[Terms] = [(*v, random_part_of(name)) for v in out[name]]
             out[name] = random if name in SHAKES else out[name] + random
     for name, companion in COMPANIONS.items():
         if name in out and companion not in without:
@@ -33,7 +31,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
     return out
 
 
-def gated(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
+def gated(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
     without, out = set(without), {}
     for name in GATED:
@@ -81,7 +79,7 @@ def is_random(name: str) -> bool:
     return name in SHAKES or name in EFFECTS and kind_of(get(name)) == SPECTRUM
 
 
-def term_of(effect: Found) -> Term:
+def term_of(effect: NamedEffect) -> Term:
     """The term of an effect that a diagnosis named, with its values: its own variant, or the nearest."""
     values = {k: q.value for k, q in effect.parameters.items()}
 

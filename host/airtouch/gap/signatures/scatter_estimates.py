@@ -8,8 +8,8 @@ from scipy.special import poch
 
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.nominal_scatter import LEAST_SPREAD, Apparent, Scatter, table
 from airtouch.gap.signatures.posterior import LEAST, moments, standard_deviation, updated
+from airtouch.gap.signatures.scatter import LEAST_SPREAD, Apparent, Scatter, table
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
 RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen

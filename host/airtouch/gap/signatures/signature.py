@@ -16,8 +16,8 @@ MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
 #: thrust, lines of the rotors
 IMU_NOISE, THRUST_NOISE, ROTOR_LINES = "white noise of the IMU", "noise of the thrust", "lines of the rotors"
 OVERHEAD = "downwash"  #: the effect of another vehicle overhead
-#: effects of which the first that is not the answer is fitted alike, as a deliberately wrong one; chosen, common ones of
-#: force, torque and sensors
+#: effects of which the first that is not the answer is fitted alike, as a deliberately wrong one; chosen, common ones
+#: of force, torque and sensors
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 

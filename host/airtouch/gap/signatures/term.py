@@ -128,6 +128,8 @@ class Term:
         return parameter_of(self.effect, name)
 
 
+Terms = tuple[Term, ...]  #: a hypothesis: effects that act together, each with its random part and its companion
+
 def parameter_of(effect: Effect, name: str) -> Parameter:
     """The parameter of an effect with a name."""
     return next(p for p in effect.parameters if p.name == name)

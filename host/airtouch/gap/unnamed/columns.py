@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.gap.evidence.cells import BANDS_HZ, GROUPS
 from airtouch.gap.evidence.data import Data, commanded
-from airtouch.gap.evidence.problem import Part, Problem
+from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
@@ -46,11 +46,11 @@ def no_floor() -> UnnamedFloor:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One channel of one flight, for a regression.
+class Regressors:
+    """What the values of one channel of one flight are regressed on.
 
-    own (elements,): its places among the problem's values; columns (elements, free + offsets): what they are regressed
-    on; offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
+    own (elements,): places of the values among the problem's; columns (elements, free + offsets): of the regression;
+    offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
     """
 
     channel: int
@@ -69,13 +69,13 @@ class Cell:
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
 
-def cells_of(data: Data, part: Part, problem: Problem) -> list[Cell]:
-    """The cells of a half; made once."""
-    return problem.workspace.once("cells", (), lambda: _cells(data, part, problem))
+def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
+    """The regressors of each channel of each flight of a part that has known values; made once."""
+    return problem.workspace.once("regressors", (), lambda: _regressors(data, part, problem))
 
 
-def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
-    """A cell for each channel of each flight that has known values."""
+def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
+    """See `regressors_of`."""
     out = []
     channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
     for c in range(CHANNELS):
@@ -85,7 +85,7 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
             own = elements[here]
             offsets = [(x[own], p) for x, p in problem.unit_offsets if np.any(x[own])]
             if len(own):
-                out.append(Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
+                out.append(Regressors(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
                                  np.array([p for _, p in offsets])))
     return out
 
@@ -121,7 +121,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
     return data.workspace.once("loop", (), make)
 
 
-def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
+def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.ndarray:
     """The columns (elements, columns) at the elements of one channel, in their order."""
     spectra, rows = _columns(data), []
     axis = channel % 3

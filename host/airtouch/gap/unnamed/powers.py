@@ -58,11 +58,11 @@ def power_factors(powers: Powers, middle: np.ndarray, spread: np.ndarray) -> tup
     out = middle.copy()
     count = np.bincount(cell, minlength=GROUPS)
     precision = 1.0 / np.maximum(spread ** 2, NOTHING)
-    held = np.bincount(cell, information(nu), GROUPS)
+    known = np.bincount(cell, information(nu), GROUPS)
     for _ in range(UPDATES):
         scaled = e * np.exp(-out[cell])
         push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
-        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * held + precision), -LONGEST, LONGEST)
+        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * known + precision), -LONGEST, LONGEST)
     out[count == 0] = middle[count == 0]
     scaled = e * np.exp(-out[cell])
     level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
@@ -113,8 +113,8 @@ def power_floor(flights: Sequence[Powers]) -> np.ndarray:
     log_power, chance = np.zeros((len(flights), GROUPS)), np.full((len(flights), GROUPS), np.nan)
     for i, powers in enumerate(flights):
         log_power[i] = power_factors(powers, *NO_PRIOR)[0]
-        held = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), GROUPS)
-        chance[i, held > 0.0] = 1.0 / held[held > 0.0]
+        own = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), GROUPS)
+        chance[i, own > 0.0] = 1.0 / own[own > 0.0]
     known = np.isfinite(chance)
     count = np.maximum(known.sum(axis=0), 1)
     middle = np.where(known, log_power, 0.0).sum(axis=0) / count

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual

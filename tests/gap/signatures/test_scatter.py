@@ -7,8 +7,8 @@ from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.alike import ALIKE
-from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Apparent, Scatter, size_of, table
 from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, standard_deviation
+from airtouch.gap.signatures.scatter import FALSE_SHARE, Apparent, Scatter, size_of, table
 from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, measured, scatter_of, student_log_density
 from airtouch.simulation.effects import EFFECTS
 
