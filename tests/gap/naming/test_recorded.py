@@ -1,5 +1,6 @@
 """Which effects must close a part of the gap of recorded flights to be named, and how much of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,13 +12,13 @@ from airtouch.gap.signatures.candidates import terms
 
 def named(name, gate=(), key=None):
     """A selection that names one effect."""
-    term = SimpleNamespace(name=name, kind=terms(name)[0].kind, gate=gate, active=lambda: name)
+    term = replace(terms(name)[0], gate=gate)
     return SimpleNamespace(chosen=SimpleNamespace(terms=(term,)), named=(SimpleNamespace(key=key or name),))
 
 
 def flights(recorded):
     """Data whose loop model knows that a delay of the motors changes the loop."""
-    law = SimpleNamespace(changes_loop=lambda active: "actuator_delay" in active)
+    law = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator_delay" for a in active))
     return SimpleNamespace(study=SimpleNamespace(recorded=recorded, controller=law))
 
 
