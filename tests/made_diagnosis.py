@@ -7,7 +7,7 @@ from airtouch import vehicle
 from airtouch.gap.answer.pictures import of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, Ranked
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
@@ -27,10 +27,10 @@ def cell(channel, phase, gap, floor=0.1, after=None, blocks=10, **more):
 
 
 def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **more):
-    rejected = [Ranked(n, p, Quantity(0.0), "another fits better")
+    rejected = [RankedCandidate(n, p, Quantity(0.0), "another fits better")
                 for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
     answer = effects[0].name if effects else verdict
-    ranking = [Ranked(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
+    ranking = [RankedCandidate(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
     whole = GapMap(tuple(cells), BASELINE, ("one.csv", "two.csv"))
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),

@@ -44,7 +44,7 @@ NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torqu
 
 @dataclass(frozen=True)
 class Case:
-    """What is diagnosed: flights made ready, held against the study of a vehicle.
+    """What is diagnosed: flights made ready, compared with the study of a vehicle.
 
     usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
     without a baseline.
@@ -125,7 +125,7 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
 
 
 def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
-    """The answer with what it is held against: the map and its largest cells, arms, what stays open, what to fly next.
+    """The answer with what it is compared with: the map and its largest cells, arms, what stays open, what to fly next.
 
     pictures: whether to keep the curves that a report shows.
     """

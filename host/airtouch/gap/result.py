@@ -33,7 +33,7 @@ class NamedEffect:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedCandidate:
     """A candidate: its probability, the share of the gap that it takes away on held-out data, why it is not the
     answer, and the log likelihood (nats) that held-out data gain by it alone."""
 
@@ -109,7 +109,7 @@ class Diagnosis:
 
     verdict: str
     effects: tuple[NamedEffect, ...]
-    ranking: tuple[Ranked, ...]
+    ranking: tuple[RankedCandidate, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     where: tuple[Cell, ...]
     gap: Mapping[str, float]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
@@ -13,7 +13,7 @@ TERMS = {name: (SimpleNamespace(name=name, kind="mean"),) for name in EVIDENCE}
 
 
 def judged(name, gain, evidence=None):
-    return Judged(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
+    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
 def selection(named=("mass",), inference=False, **more):

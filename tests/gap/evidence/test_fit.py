@@ -7,7 +7,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures import candidates
 from gap_flights import fly
 
@@ -33,7 +33,7 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     chosen = judging.crossed(on, "controller_gain", (gain,), None, 0.0)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
                               for train, test in judging.ROUND_TRIP) for wide in (False, True))
-    assert isinstance(chosen, Judged) and certain > uncertain + 10.0
+    assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
     both = judging.crossed(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
     assert both.beyond == pytest.approx(certain - uncertain)

@@ -11,7 +11,7 @@ from airtouch.gap.naming import judging, select
 from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, crossed
 from airtouch.gap.naming.looks import HOPELESS
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, with_a_push
@@ -125,7 +125,7 @@ def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatc
     data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
     assert select.select(data, candidates_of(["mass"])) is answer
     (judged_alone,) = judgements
-    assert isinstance(judged_alone["mass"], Judged) and judged_alone["mass"].gain > 100.0
+    assert isinstance(judged_alone["mass"], Candidate) and judged_alone["mass"].gain > 100.0
 
 
 def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):

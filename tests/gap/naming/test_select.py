@@ -17,7 +17,7 @@ from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.passing_effect import seconds
-from airtouch.gap.naming.selection import Judged, probabilities
+from airtouch.gap.naming.selection import Candidate, probabilities
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
@@ -324,7 +324,7 @@ def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
     assert recorded.free_before < 12.0 and exact.free_before > nominal.free_before + 100.0
-    other = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
+    other = replace(exact, nominal=6, steps=(Candidate("mass", (), 1000.0),))
     same_models = replace(other, same_models=True)
     assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)

@@ -1,4 +1,4 @@
-"""Apparent strengths of effects in a simulated flight that has none."""
+"""ApparentStrengths strengths of effects in a simulated flight that has none."""
 
 from types import SimpleNamespace
 

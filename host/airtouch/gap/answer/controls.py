@@ -1,4 +1,4 @@
-"""What the answer is held against: a deliberately wrong effect, and the vehicle as its file declares it."""
+"""What the answer is compared with: a deliberately wrong effect, and the vehicle as its file declares it."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.calibrate import Calibration
 from airtouch.gap.result import Diagnosis
@@ -26,7 +26,7 @@ def control(data: Data, selection: Selection, gap: Gap) -> dict[str, Any]:
     if name is None:
         return {}
     fits = tuple(fit(data, part, variants[name][0]) for part in selection.parts)
-    return {"name": name, **_plain(shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits), gap))}
+    return {"name": name, **_plain(shrink_of(data, selection.parts, Candidate(name, fits[0].terms, 0.0, fits), gap))}
 
 
 def arms(vehicle: Vehicle, nominal: Sequence[Flight], calibration: Calibration | None, judged: Sequence[Flight],
@@ -45,7 +45,7 @@ def arms(vehicle: Vehicle, nominal: Sequence[Flight], calibration: Calibration |
     terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
     start = mean_parameters(selection.chosen.fits[0].terms if selection.chosen.fits else ())
     fits = tuple(fit(data, part, terms, start) for part in parts)
-    gap = gap_of(data, parts, Judged(selection.chosen.name, terms, 0.0, fits))
+    gap = gap_of(data, parts, Candidate(selection.chosen.name, terms, 0.0, fits))
     return {"declared": _plain(gap.named), "calibrated": overall}
 
 

@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, FittedTerms, fit, judge, strength_variance
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
@@ -50,7 +50,7 @@ def _named(term: Term, x: np.ndarray, covariance: np.ndarray, readings: Mapping[
     return NamedEffect(term.name, term.quantities(*fitted), term.gate)
 
 
-def _in_spectra(data: Data, whole: Judged, fitted: FittedTerms, term: Term, readings: Mapping[str, Reading],
+def _in_spectra(data: Data, whole: Candidate, fitted: FittedTerms, term: Term, readings: Mapping[str, Reading],
                 ) -> tuple[np.ndarray, np.ndarray]:
     """Scaled parameters (k,) of an effect that shows in the spectra, and their covariance (k, k).
 
@@ -167,7 +167,7 @@ def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Rea
     return np.clip(x + gain @ apart, low, high), wider * (covariance - gain @ covariance[read])
 
 
-def _mean_of_halves(chosen: Judged) -> np.ndarray | None:
+def _mean_of_halves(chosen: Candidate) -> np.ndarray | None:
     """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
     scaled = [f.scaled for f in chosen.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None

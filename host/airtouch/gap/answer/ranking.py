@@ -8,7 +8,7 @@ from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Selection, probabilities
-from airtouch.gap.result import NamedEffect, Quantity, Ranked
+from airtouch.gap.result import NamedEffect, Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
@@ -37,7 +37,7 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     return "none" if selection.chosen is None else "effect"
 
 
-def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[Ranked], str, list[NamedEffect]]:
+def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[RankedCandidate], str, list[NamedEffect]]:
     """Every candidate with probability and shrink, best first; the verdict; the effects named."""
     verdict = verdict_of(data, selection, gap)
     effects = chosen_effects(data, selection) if verdict == "effect" else []
@@ -52,7 +52,7 @@ def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[Ranked], st
         elif single is not None and single.full and single.gain > FIRST_GAIN:
             share = shrink_of(data, selection.parts, single, gap).share
         nats = None if single is None else selection.gained(single)
-        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
+        out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out, verdict, effects

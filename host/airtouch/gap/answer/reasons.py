@@ -1,6 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
@@ -31,7 +31,7 @@ def nearest(selection: Selection) -> list[dict[str, str]]:
     return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
 
 
-def shortfall(selection: Selection, judged: Judged) -> str:
+def shortfall(selection: Selection, judged: Candidate) -> str:
     """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, judged.name)
@@ -72,7 +72,7 @@ def against(selection: Selection) -> str:
             f"{selection.allowed:.0f} may be left")
 
 
-def _why_beside(selection: Selection, step: Judged) -> str:
+def _why_beside(selection: Selection, step: Candidate) -> str:
     """The reason why an effect named beside the first has no more probability than the ranking says."""
     first = selection.named[0].name
     if selection.inference is not None:

@@ -15,7 +15,7 @@ from airtouch.gap.evidence.cells import GROUPS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.signature import CLOCK
@@ -58,7 +58,7 @@ class Gap:
     named: Shrink
 
 
-def gap_of(data: Data, parts: Sequence[BlockSet], named: Judged | None) -> Gap:
+def gap_of(data: Data, parts: Sequence[BlockSet], named: Candidate | None) -> Gap:
     """The gap of two halves of the data, each in the cells that the other shows. named: the effects named."""
     terms = _terms(named)
     cells = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
@@ -68,14 +68,14 @@ def gap_of(data: Data, parts: Sequence[BlockSet], named: Judged | None) -> Gap:
     return Gap(cells, calm, before, shrink_of_jitter(data) if _only_jitter(named) else _shrink(before, calm + after))
 
 
-def shrink_of(data: Data, parts: Sequence[BlockSet], judged: Judged, gap: Gap) -> Shrink:
+def shrink_of(data: Data, parts: Sequence[BlockSet], judged: Candidate, gap: Gap) -> Shrink:
     """How far another hypothesis than the effects named closes the gap of two halves."""
     if _only_jitter(judged):
         return shrink_of_jitter(data)
     return _shrink(gap.before, gap.calm + _energies(data, parts, _terms(judged), gap.cells))
 
 
-def _only_jitter(judged: Judged | None) -> bool:
+def _only_jitter(judged: Candidate | None) -> bool:
     """Whether a hypothesis moves the logged times and does nothing else."""
     return judged is not None and bool(judged.terms) \
         and all(t.kind == CLOCK and not t.signature.loses_rows for t in judged.terms)
@@ -125,7 +125,7 @@ def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def nearer(data: Data, parts: Sequence[BlockSet], judged: Judged | None, gap: Gap) -> bool:
+def nearer(data: Data, parts: Sequence[BlockSet], judged: Candidate | None, gap: Gap) -> bool:
     """Whether the cells of a gap lie nearer to the floor with a hypothesis than without, on held-out blocks.
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
@@ -144,7 +144,7 @@ def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[T
     return float(np.abs(total - count).sum())
 
 
-def _terms(judged: Judged | None) -> Sequence[Sequence[Term]]:
+def _terms(judged: Candidate | None) -> Sequence[Sequence[Term]]:
     """The terms of a hypothesis as fitted to each half; none where there is no hypothesis."""
     return [f.terms for f in judged.fits] if judged and judged.fits else ((), ())
 

@@ -16,7 +16,7 @@ from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, Quantity, Ranked
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.where import summary
 from airtouch.simulation.effects import Parameter, get
@@ -147,7 +147,7 @@ def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
     return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
 
 
-def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[Ranked]:
+def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     chance = dict(total)
     weight = OFF_CENTRE if first == WEIGHT else WEIGHT
@@ -157,7 +157,7 @@ def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink
     if chance.get(weight) == 0.0:
         why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
     best = max(chance.values())
-    return sorted((Ranked(n, p, shrink[n].share,
+    return sorted((RankedCandidate(n, p, shrink[n].share,
                           "" if n == first
                           else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
                    for n, p in chance.items()), key=lambda r: (r.name != first, -r.probability))

@@ -4,13 +4,13 @@ import numpy as np
 
 from airtouch.gap.evidence.cells import GROUPS, cell_words, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
-from airtouch.gap.naming.selection import UNKNOWN_ASSUMED, Judged
+from airtouch.gap.naming.selection import UNKNOWN_ASSUMED, Candidate
 
 #: nats that a right effect may lose in a cell by chance; chosen: by the bound in `losses` the chance of more is 37 %
 CHANCE_LOSS = 1.0
 
 
-def contradicted(on: Trial, chosen: Judged | None) -> tuple[float, str]:
+def contradicted(on: Trial, chosen: Candidate | None) -> tuple[float, str]:
     """Held-out nats that effects lose where they say what the flights do not show, and the worst cell in words.
 
     0 and no words where nothing is chosen.

@@ -13,7 +13,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.screen import ROUND_TRIP
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
@@ -76,7 +76,7 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
-def crossed(on: Trial, name: str, terms: Terms, chosen: Judged | None, choice: float) -> Judged:
+def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice: float) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice: nats that the choice among its variants costs. Its gain is that of
@@ -98,11 +98,11 @@ def crossed(on: Trial, name: str, terms: Terms, chosen: Judged | None, choice: f
     of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.kind == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Judged(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
+    return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
                   covariance=covariance, apart=apart, beyond=beyond)
 
 
-def _gained_while_certain(on: Trial, terms: Terms, chosen: Judged | None) -> float:
+def _gained_while_certain(on: Trial, terms: Terms, chosen: Candidate | None) -> float:
     """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
 
     Beside a random effect the commands' floor is less certain.
@@ -113,7 +113,7 @@ def _gained_while_certain(on: Trial, terms: Terms, chosen: Judged | None) -> flo
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Judged | None) -> FittedTerms:
+def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None) -> FittedTerms:
     """Effects fitted on a half, from where those that are chosen ended there."""
     part = on.parts[half]
     return _refined(on.data, part, fit(on.data, part, terms, _start(chosen, terms, half)))
@@ -127,7 +127,7 @@ def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> 
     return judge(on.data, on.parts[half], terms, wide) - on.base[wide or bool(random_of(terms))][half]
 
 
-def held_out_cell_gains(on: Trial, hypothesis: Judged) -> np.ndarray:
+def held_out_cell_gains(on: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (GROUPS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(on.data, on.parts[test], hypothesis.fits[train].terms) for train, test in ROUND_TRIP],
                   axis=0)
@@ -175,7 +175,7 @@ def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
     return fit(data, part, terms, mean_parameters(terms))
 
 
-def _start(chosen: Judged | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
     """The scaled parameters (k,) fitted to a half before, NaN for those of the new effects; None where none are."""
     if chosen is None or not chosen.fits:
         return None

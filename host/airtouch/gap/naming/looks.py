@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
 from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
@@ -34,11 +34,11 @@ class RandomLook(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Start:
+class RoundStart:
     """What a round begins from: the hypothesis that is chosen, and what it leaves of each half."""
 
     on: Trial
-    chosen: Judged | None
+    chosen: Candidate | None
     halves: Sequence[Remainder]
 
     @property
@@ -60,18 +60,18 @@ class Looks:
     `random_looks` looks; unseen: those that only a fit can judge.
     """
 
-    means: list[Judged] = field(default_factory=list)
+    means: list[Candidate] = field(default_factory=list)
     random: list[PricedVariant] = field(default_factory=list)
     unseen: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(on: Trial, chosen: Judged | None) -> Start:
+def start_of(on: Trial, chosen: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
     fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    return Start(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
+    return RoundStart(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
 
 
-def first_looks(start: Start, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
+def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
     """A first look at every variant that may be added. progress: is told the name of every candidate."""
     looks = Looks()
     for name, variants in candidates.items():
@@ -95,7 +95,7 @@ def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedV
             if not any(t.identity in there for t in terms)]
 
 
-def _look_at(start: Start, variant: PricedVariant, looks: Looks) -> None:
+def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
     """Add a variant to the looks, where a look can judge it with what that says."""
     if random_of(variant.terms):
         looks.random.append(variant)
@@ -109,13 +109,13 @@ def _look_at(start: Start, variant: PricedVariant, looks: Looks) -> None:
             looks.means.append(look)
 
 
-def _mean_look(start: Start, variant: PricedVariant) -> Judged:
+def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
     look = first_order(start.on.data, start.halves, terms, start.terms)
     gain = look.gain + (start.gain - price_of(terms) - variant.choice)
     halves = np.array(look.fitted)[:, :k]
-    return Judged(variant.name, (*start.terms, *terms), gain, full=False, choice=variant.choice,
+    return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice=variant.choice,
                   strength=own.among_all(halves.mean(axis=0)),
                   covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
@@ -132,8 +132,8 @@ def _only_in_commands(on: Trial, terms: Terms) -> bool:
     return law is not None and not any(shows(on.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
-def random_looks(start: Start, variants: Sequence[PricedVariant], means: Sequence[Judged], thorough: bool,
-                 ) -> tuple[list[Judged], list[PricedVariant]]:
+def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
+                 ) -> tuple[list[Candidate], list[PricedVariant]]:
     """Looks at variants with a random effect: candidates that promise little, and the variants to fit of the others.
 
     Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that looks best is
@@ -152,7 +152,7 @@ def random_looks(start: Start, variants: Sequence[PricedVariant], means: Sequenc
     return unpromising, to_fit
 
 
-def _by_name(start: Start, variants: Iterable[PricedVariant], mean_of: Mapping[str, Judged],
+def _by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
              ) -> dict[str, list[RandomLook]]:
     """Looks at the variants of every candidate whose random part stands alone or beside one mean term.
 
@@ -175,10 +175,10 @@ def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[P
             and _same(v.terms[0], variant.terms[0])]
 
 
-def _as_judged(start: Start, look: RandomLook) -> Judged:
+def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
     name, terms, choice = look.variant
-    return Judged(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
+    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
                   strength=strength_term(terms).among_all(look.strength))
 
 

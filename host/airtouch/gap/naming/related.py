@@ -6,7 +6,7 @@ from dataclasses import replace
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
@@ -28,13 +28,13 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(known))
 
 
-def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Judged],
+def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
     candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
     """
-    steps: list[Judged] = []
+    steps: list[Candidate] = []
     for effect in dict.fromkeys(of.effect for of in inference.classes):
         own = [of for of in inference.classes if of.effect == effect]
         variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}

@@ -18,7 +18,7 @@ from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, seconds
 from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import UNKNOWN_GAIN, Judged, Selection
+from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
@@ -76,7 +76,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     return _by_replay(search, state, passing)
 
 
-def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
+def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
 
     A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
@@ -88,7 +88,7 @@ def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
 
 
-def _by_replay(search: Search, state: State, passing: Judged | None) -> Selection:
+def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:
     """The selection that a forward search ended in, with what it leaves.
 
     passing: the effect that comes and goes of its first step; it is taken back where beside the others it is no more
@@ -108,7 +108,7 @@ def _by_replay(search: Search, state: State, passing: Judged | None) -> Selectio
     return replace(selection, contradicted=contradicted(on, selection.chosen)) if study.simulated else selection
 
 
-def nameless(on: Trial, chosen: Judged | None) -> float:
+def nameless(on: Trial, chosen: Candidate | None) -> float:
     """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
     return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())

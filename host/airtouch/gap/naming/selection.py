@@ -25,7 +25,7 @@ BELOW = 0.9
 
 
 @dataclass(frozen=True)
-class Judged:
+class Candidate:
     """A hypothesis with its gain over no effect, held-out nats, and its fits of both halves.
 
     name: its newest effect; terms: all of them, with their values. strength: scaled parameters (k,) of the newest
@@ -48,7 +48,7 @@ class Judged:
     apart: np.ndarray | float = 0.0
     evidence: float = 0.0
     named: bool = True
-    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is held against
+    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is compared with
     share: float = np.inf  #: where several effects are named: nats over the hypothesis of the others alone
 
     @property
@@ -76,8 +76,8 @@ class Selection:
     assumed: whether a chosen effect is random, or changes the loop in recorded flights.
     """
 
-    singles: Mapping[str, Judged]
-    steps: tuple[Judged, ...]
+    singles: Mapping[str, Candidate]
+    steps: tuple[Candidate, ...]
     free_before: float
     free_after: float
     parts: tuple[BlockSet, BlockSet]
@@ -92,17 +92,17 @@ class Selection:
     inference: Inference | None = None  #: what named the effects, where the relations of signals did
 
     @property
-    def whole(self) -> Judged | None:
+    def whole(self) -> Candidate | None:
         """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
         return self.steps[-1] if self.steps else None
 
     @property
-    def named(self) -> tuple[Judged, ...]:
+    def named(self) -> tuple[Candidate, ...]:
         """The steps whose effects are named, what adds most to the others first, what the log did to itself last."""
         return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
 
     @property
-    def chosen(self) -> Judged | None:
+    def chosen(self) -> Candidate | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
         names, whole = {s.name for s in self.named}, self.whole
         if not names or whole is None:
@@ -113,7 +113,7 @@ class Selection:
         fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
         return replace(whole, terms=tuple(terms), fits=tuple(fits))
 
-    def gained(self, one: Judged) -> float:
+    def gained(self, one: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
         return float(self.inference.evidence[one.name] if self.inference is not None else one.gain)
 

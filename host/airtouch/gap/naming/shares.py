@@ -6,19 +6,19 @@ from dataclasses import replace
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.naming.judging import ROUND_TRIP, Trial, gain_of, price_of
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(on: Trial, steps: Sequence[Judged]) -> list[Judged]:
+def with_shares(on: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
     """The steps of a selection, those that are named with their `share`, nats, where there are several."""
     if sum(s.named for s in steps) < 2:
         return list(steps)
     return [replace(s, share=steps[-1].gain - _gain_without(on, steps, s)) if s.named else s for s in steps]
 
 
-def _gain_without(on: Trial, steps: Sequence[Judged], dropped: Judged) -> float:
+def _gain_without(on: Trial, steps: Sequence[Candidate], dropped: Candidate) -> float:
     """Held-out nats of the last step's hypothesis without one of its effects, the others fitted anew."""
     last, place = steps[-1], [s.name for s in steps].index(dropped.name)
     others = _others(last.terms, dropped.name)

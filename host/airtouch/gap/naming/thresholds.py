@@ -9,7 +9,7 @@ from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, held_out_cell_gains
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import is_random, random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
@@ -26,7 +26,7 @@ ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 RANDOM_SHARE = 0.25
 
 
-def needed_beside(on: Trial, base: Judged, more: Judged) -> float:
+def needed_beside(on: Trial, base: Candidate, more: Candidate) -> float:
     """Held-out nats that a further effect must gain to be added.
 
     base: the hypothesis of the effects before it; more: the same with the further one.
@@ -39,12 +39,12 @@ def needed_beside(on: Trial, base: Judged, more: Judged) -> float:
     return misfit(on, base, more, share, everywhere=is_random(more.name))
 
 
-def random_by_misfit(on: Trial, base: Judged, more: Judged) -> bool:
+def random_by_misfit(on: Trial, base: Candidate, more: Candidate) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
     return is_random(more.name) and more.gain - base.gain < misfit(on, base, more, RANDOM_SHARE)
 
 
-def misfit(on: Trial, base: Judged, more: Judged, share: float, everywhere: bool = False) -> float:
+def misfit(on: Trial, base: Candidate, more: Candidate, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the effects before it are wrong by a share of theirs.
 
     base, more: as for `needed_beside`. What the effects on the logged times gain is no model's and does not count. In

@@ -14,12 +14,12 @@ from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
-from airtouch.gap.signatures.scatter import Apparent, Scatter, size_of
+from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
 from airtouch.gap.signatures.term import Term
@@ -40,13 +40,13 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
                       any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
 
 
-def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
+def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
     singles = round_of(on, all_candidates(without), None, thorough=True)
     passing = gated(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
-    return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
+    return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
                     nameless(on, None) / seconds(data),
                     {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
                      for n in GATED})
@@ -64,12 +64,12 @@ def is_recorded(flight: Flight) -> bool:
     return any(str(flight.log.meta.get(key, "")).split("-")[0] in RECORDERS for key in ("format", "origin_format"))
 
 
-def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Apparent:
+def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:
     """The apparent strengths of one nominal flight."""
     return apparent(Data(study, [flight]), without)
 
 
-def _error(data: Data, judged: Judged) -> np.ndarray:
+def _error(data: Data, judged: Candidate) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
     term = strength_term(judged.terms)
     if term.kind == CLOCK:
@@ -82,7 +82,7 @@ def _error(data: Data, judged: Judged) -> np.ndarray:
                     np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
 
 
-def _error_of_random(data: Data, judged: Judged, term: Term) -> np.ndarray:
+def _error_of_random(data: Data, judged: Candidate, term: Term) -> np.ndarray:
     """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)

@@ -24,7 +24,7 @@ KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle
 
 
 @dataclass(frozen=True)
-class Gated:
+class GatedEffect:
     """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs, nats."""
 
     name: str
@@ -40,7 +40,7 @@ class Gated:
 
 
 @dataclass(frozen=True)
-class Ungated:
+class NoEffect:
     """Flights without any effect, against which one that comes and goes is held.
 
     whole: all their blocks; each (b,): log likelihood of every block in the air; level: that of the flights, as sure of
@@ -53,22 +53,22 @@ class Ungated:
     level: Mapping[bool, float]
 
 
-def ungated(data: Data) -> Ungated | None:
+def no_effect(data: Data) -> NoEffect | None:
     """Flights without any effect; None where they are too short to say when an effect acts."""
     whole = whole_of(data)
     each = each_block(data, whole, ())
     if len(each) < LEAST_BLOCKS:
         return None
-    return Ungated(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
+    return NoEffect(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
 
 
-def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
+def gated(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
     """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
 
     without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
     KNOWN_OVERHEAD.
     """
-    base = ungated(data)
+    base = no_effect(data)
     if base is None:
         return {}
     lively, out = bursts(data), {}
@@ -82,22 +82,22 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     return out
 
 
-def within(data: Data, name: str, gate: Gate) -> Gated | None:
+def within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
     """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
-    base = ungated(data)
+    base = no_effect(data)
     return _best(base, name, candidates.gated()[name], gate) if base is not None else None
 
 
-def _best(base: Ungated, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> Gated:
+def _best(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
     """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
     return max((_judged(base, name, v, gate, 0.0) for v in variants), key=lambda j: j.gain)
 
 
-def _judged(base: Ungated, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> Gated:
+def _judged(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> GatedEffect:
     """An effect fitted within a gate, whose choice costs `cost` nats."""
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(base.data, base.whole, acting)
     free = sum(len(t.free) for t in acting)
     without = base.level[bool(random_of(acting))]
     gain = judge(base.data, base.whole, fitted.terms) - without - cost - 0.5 * free * np.log(len(base.each))
-    return Gated(name, fitted, gain, cost, name)
+    return GatedEffect(name, fitted, gain, cost, name)

@@ -1,7 +1,7 @@
 """When another vehicle was overhead, from its own log, and what the rest of the flight seems to have of its wake.
 
 Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
-the other vehicle's path is known, nothing is looked for: a wake in the known seconds is held against the rest of that
+the other vehicle's path is known, nothing is looked for: a wake in the known seconds is compared with the rest of that
 flight, which may be flown harder than others. Sizes scatter about that as they do in nominal flights.
 """
 
@@ -24,7 +24,7 @@ from airtouch.logs.segments import runs
 PLACE = ("x_m", "y_m", "z_m")
 #: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-#: the rule by which known seconds are held against the rest of a flight was chosen among seven on recorded flights
+#: the rule by which known seconds are compared with the rest of a flight was chosen among seven on recorded flights
 #: (host/docs/looks.md, 2026-11-25 04:11); of the numbers below none has a source of its own, all were chosen
 APART_S = 0.1  #: s, stretches with less between them are one
 LEAST_S = 0.05  #: s, shorter ones are none
