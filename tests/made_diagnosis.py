@@ -36,7 +36,7 @@ def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **mor
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),
         {"before": 4.0, "after": 1.3, "floor": 1.0}, Quantity(0.9, 0.8, 0.95) if effects else None,
         {"name": "wind", "before": 4.0, "after": 3.9, "floor": 1.0, "shrink": Quantity(0.03, -0.05, 0.1)},
-        "Weigh the <vehicle>.", {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
+        {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
         map=whole, headline=headline or summary.headline(cells, bool(effects)),
         next=(NextStep("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)

@@ -8,7 +8,6 @@ import numpy as np
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.answer.advice import advice as advice_text
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
 from airtouch.gap.answer.pictures import of as pictures_of
@@ -120,8 +119,7 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
         where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},
-        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {},
-        advice="")
+        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
 
 
 def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
@@ -141,7 +139,7 @@ def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bo
         result, where=cells, map=whole_map, headline=headline,
         arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
-        next=steps, advice=advice_text(steps),
+        next=steps,
         cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=case.calibration.parameters if case.calibration else {},

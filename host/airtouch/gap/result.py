@@ -115,7 +115,6 @@ class Diagnosis:
     gap: Mapping[str, float]
     shrink: Quantity | None
     control: Mapping[str, Any]
-    advice: str
     arms: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
@@ -123,7 +122,7 @@ class Diagnosis:
     unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
     map: GapMap | None = None  #: every cell, of which `where` has the largest
     headline: Cell | None = None  #: the cell that the answer speaks of
-    next: tuple[NextStep, ...] = ()  #: what to do next; `advice` is their text
+    next: tuple[NextStep, ...] = ()  #: what to do next
     vehicle: str = ""
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
@@ -138,6 +137,11 @@ class Diagnosis:
         answer = (named or ["effect"])[0] if self.verdict == "effect" else self.verdict
         if self.ranking and (answer != self.ranking[0].name or bool(named) != (self.verdict == "effect")):
             raise ValueError(f"the ranking begins with {self.ranking[0].name}, the verdict is {self.verdict} {named}")
+
+    @property
+    def advice(self) -> str:
+        """What to do next, as text."""
+        return " ".join(step.text for step in self.next)
 
     def __repr__(self) -> str:
         """One line: verdict, effects, the answer's probability, gap before and after; `plain` has everything."""

@@ -26,7 +26,7 @@ def test_of_variants_with_as_many_terms_the_best_is_taken():
     best = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
     by_rotor = [crossed(on, "weak_motor", variant, None, np.log(4.0)) for variant in all_candidates()["weak_motor"]]
     assert best.full and best.terms[0].values["rotor"] == 3.0
-    assert best.gain == max(j.gain for j in by_rotor) and best.choice == np.log(4.0)
+    assert best.gain == max(j.gain for j in by_rotor) and best.choice_cost == np.log(4.0)
     assert best.evidence == best.gain, "nothing is known of nominal flights"
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t as student
 
 from airtouch.gap.answer.reasons import shortfall
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
@@ -45,9 +45,9 @@ def test_where_nothing_is_nothing_is_found():
     assert not selection.assumed and selection.nominal_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
-    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice == 0.0
-    assert motor.choice == pytest.approx(np.log(4.0)), "one of four rotors"
-    assert selection.singles["wind"].choice == pytest.approx(np.log(2.0))
+    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice_cost == 0.0
+    assert motor.choice_cost == pytest.approx(np.log(4.0)), "one of four rotors"
+    assert selection.singles["wind"].choice_cost == pytest.approx(np.log(2.0))
 
 
 def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
@@ -146,7 +146,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
     single = selection.singles["downwash"]
     without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
-    assert single.choice > 0.0 and single.gain == pytest.approx(without_price - single.choice)
+    assert single.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.choice_cost)
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
@@ -215,7 +215,7 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
     assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
-    assert (step.choice == 0.0) == (key == KNOWN_OVERHEAD)
+    assert (step.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
 
 
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
@@ -256,10 +256,10 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
         assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
         assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
     dearer = judging.crossed(on, "mass", mass.terms, None, 0.5)
-    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice == 0.5
+    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice_cost == 0.5
     motor = candidates_of(["weak_motor"])["weak_motor"][0]
     both = judging.crossed(on, "weak_motor", motor, dearer, 0.25)
-    assert both.choice == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
+    assert both.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
 
@@ -301,7 +301,7 @@ def test_a_right_effect_is_not_contradicted():
 
 
 def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():
-    gains = np.zeros(GROUPS)
+    gains = np.zeros(CELLS)
     lift, forward, at_rest = 2, 0, 1000
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0

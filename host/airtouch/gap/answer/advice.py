@@ -15,11 +15,6 @@ URI = "radio://0/80/2M/E7E7E7E7E7"
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def advice(steps: Sequence[NextStep]) -> str:
-    """The steps as text."""
-    return " ".join(s.text for s in steps)
-
-
 def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[str, ...]], headline: Cell | None,
           flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[NextStep, ...]:
     """What to do next, most useful first."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
@@ -47,7 +47,7 @@ class Shrink:
 class Gap:
     """A gap on held-out data, and how far the effects named close it.
 
-    cells: in which it is measured, bool (GROUPS,) for each half, as the other half shows them; calm: by how much the
+    cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; calm: by how much the
     energy there (floor 1) is below nominal flights' once the effects named are in the model; before: energies (n,)
     without any effect, calm added; named: the shrink of the effects named.
     """
@@ -137,10 +137,10 @@ def nearer(data: Data, parts: Sequence[BlockSet], judged: Candidate | None, gap:
 def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]],
                cells: Sequence[np.ndarray]) -> float:
     """Distance of the cells' energy from the floor, above or below, summed over their values."""
-    total, count = np.zeros(GROUPS), np.zeros(GROUPS)
+    total, count = np.zeros(CELLS), np.zeros(CELLS)
     for groups, energies in _held_out(data, parts, terms, cells):
-        total += np.bincount(groups, energies, GROUPS)
-        count += np.bincount(groups, minlength=GROUPS)
+        total += np.bincount(groups, energies, CELLS)
+        count += np.bincount(groups, minlength=CELLS)
     return float(np.abs(total - count).sum())
 
 
@@ -159,20 +159,20 @@ def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
               ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """For each half, group (n,) and energy (n,) over the floor of its values in the cells.
 
-    The energy is what effects as fitted to the other half leave. cells: mask (GROUPS,) for each half.
+    The energy is what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
         problem, values, power = left_over(data, parts[half], terms[1 - half])
-        use = problem.known & cells[half][problem.groups]
-        yield problem.groups[use], np.minimum(squared(values[use]) / power[use], LARGEST)
+        use = problem.known & cells[half][problem.cells]
+        yield problem.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
 
 
 def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
-    """Mask (GROUPS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
+    """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
     energy = np.minimum(squared(values) / power, LARGEST)
-    count = np.bincount(problem.groups, problem.known, GROUPS)
-    mean = np.bincount(problem.groups, energy * problem.known, GROUPS) / np.maximum(count, 1)
+    count = np.bincount(problem.cells, problem.known, CELLS)
+    mean = np.bincount(problem.cells, energy * problem.known, CELLS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN

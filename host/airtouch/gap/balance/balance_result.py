@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 import airtouch.gap.measure as measure
-from airtouch.gap.answer.advice import advice as advice_text
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.pictures import of as pictures_of
 from airtouch.gap.answer.shrink import Shrink
@@ -75,7 +74,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         indistinguishable=alike, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
         control=_control(total, first, shrink) if verdict == "effect" else {},
-        advice=advice_text(steps), notes=_notes(voltage, notes),
+        notes=_notes(voltage, notes),
         cannot=measure.cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),

@@ -77,10 +77,14 @@ def _applied(data: Data, response: Response, active: Sequence[Active], replayed:
     not_loop = [a for a in replayed if not law.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
     change = law.torque_change(active, frequencies(AIR))
-    replays = (_replayed(data, s) for s in ((), by_command, not_loop))
-    sets = zip(data.flights, data.quiet, data.turning, *replays, with_all, strict=True)
-    return [e if f.rates is None else {**e, AIR: response.with_residual(e[AIR], q, _torque(m, n, d, o), change)}
-            for f, q, m, n, d, o, e in sets]
+    nominal, driven, disturbed = (_replayed(data, some) for some in ((), by_command, not_loop))
+    out = []
+    for i, gap in enumerate(with_all):
+        if data.flights[i].rates is not None:
+            torque = _torque(data.turning[i], nominal[i], driven[i], disturbed[i])
+            gap = {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
+        out.append(gap)
+    return out
 
 
 def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],

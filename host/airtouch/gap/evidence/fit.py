@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.gauss_newton import gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
@@ -77,14 +77,14 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     for _ in range(TURNS if random and mean else 1):
         solution = gauss_newton(problem, mean, x, random_power, prior, bool(random))
         x, active = solution.x, active_at(mean, solution.x)
-        command_power, cost = problem.commanded(active, bool(random))
+        command_power, cost = problem.loop_power(active, bool(random))
         random_power = _random_power(problem, random, solution.values, active) if random else 0.0
         level = problem.likelihood(solution.values, random_power + command_power) - cost
         if level < last_level + SETTLED:
             break
         last_level = level
     if random:
-        command_power, cost = problem.commanded([*active, *(t.active() for t in random)], True)
+        command_power, cost = problem.loop_power([*active, *(t.active() for t in random)], True)
     gained = problem.likelihood(solution.values, random_power + command_power) - cost
     return FittedTerms(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
 
@@ -118,11 +118,11 @@ def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = Fa
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
-    """Log likelihood (GROUPS,) that effects with these parameters add in each cell: view, channel and band."""
+    """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
     problem, values, power = left_over(data, part, (), bool(random_of(terms)))
     without = problem.likelihood.each(values, power - problem.power)
     problem, values, power = left_over(data, part, terms)
-    return np.bincount(problem.groups, problem.likelihood.each(values, power - problem.power) - without, GROUPS)
+    return np.bincount(problem.cells, problem.likelihood.each(values, power - problem.power) - without, CELLS)
 
 
 def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
@@ -136,7 +136,7 @@ def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = F
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
     """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
-    commanded, _ = problem.commanded(mean, True)
+    commanded, _ = problem.loop_power(mean, True)
     for _ in range(ROUNDS if len(random) > 1 else 1):
         for i in range(len(random)):
             random[i] = _strength(problem, random, i, values, commanded)

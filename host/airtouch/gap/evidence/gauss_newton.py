@@ -61,7 +61,7 @@ class _Posterior:
         values = self.problem.values(active) if self.mean else self.problem.base.copy()
         for amount, (index, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[index] -= amount * column
-        command_power, price = self.problem.commanded(active, self.wide)
+        command_power, price = self.problem.loop_power(active, self.wide)
         power = self.added + command_power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
         return _State(x, offsets, values, power, price + (0.5 * away - self.problem.likelihood(values, power)))
@@ -137,7 +137,7 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: ra
     for i, amount in itertools.product(own, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        command_power, cost = problem.commanded(active_at(mean, trial))
+        command_power, cost = problem.loop_power(active_at(mean, trial))
         level = problem.likelihood(problem.base, command_power) - cost
         if level > best:
             best, out = level, trial

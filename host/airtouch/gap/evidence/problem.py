@@ -65,9 +65,9 @@ class Elements:
 
 
 class Problem:
-    """A part of flights as flattened values (n,): those of the replay view, `own` of them, then those of the commands.
+    """A part of flights as flattened values (n,): `replay_count` of the replay view, then those of the commands.
 
-    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view; torque (own,):
+    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view; torque (replay,):
     whether a value is one of the torque.
     """
 
@@ -76,11 +76,11 @@ class Problem:
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.slow))
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
-        #: power (own,) of the floor, without what lost rows add
+        #: power (replay,) of the floor, without what lost rows add
         self.noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
                                          for f, b in zip(data.flights, data.first, strict=True)]).real
         replay = _of_replay(data, self.layout, self.noise)
-        self.own = len(replay.base)
+        self.replay_count = len(replay.base)
         self.torque = (replay.channel >= TORQUE.start) & (replay.channel < TORQUE.stop)
         self.air = self.layout.air_blocks(data.first)
         values = replay.followed_by(_of_commands(self.commands))
@@ -90,7 +90,7 @@ class Problem:
         self.likelihood = Likelihood(self.power, self.freedom, self.tail, self.known)
 
     @functools.cached_property
-    def groups(self) -> np.ndarray:
+    def cells(self) -> np.ndarray:
         """Number (n,) of the cell of each value (`cells`)."""
         bands = {r: np.digitize(frequencies(r), BANDS_HZ)[:, None] - 1 for r in (AIR, REST)}
         replay = self.layout.per_bin({r: cell_numbers(view, bands[r], np.arange(COUNT))
@@ -102,12 +102,12 @@ class Problem:
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """The gap (n,) with effects in the model."""
         replayed = _beside_edges(active)
-        replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.own]
+        replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.replay_count]
         command_values = self.commands.moved([a for a in active if not a.gate])
         return np.where(self.known, self.with_commands(replay_values, command_values), 0.0)
 
     def with_commands(self, own: np.ndarray, of_commands: np.ndarray | float = 0.0) -> np.ndarray:
-        """Values (own,) of the replay view, followed by one value, or one each, for those of the commands."""
+        """Values (replay,) of the replay view, followed by one value, or one each, for those of the commands."""
         return np.concatenate([own, np.broadcast_to(of_commands, len(self.commands))])
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
@@ -117,41 +117,41 @@ class Problem:
         """
         random = random_of(terms)
         mean = [t.active() for t in terms if t.kind == MEAN]
-        command_power, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
+        command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + command_power, cost
 
-    def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+    def loop_power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power (n,) that effects of the loop add to the floors of torque and commands, and nats that this costs.
 
         wide: as in `modelled`.
         """
         power, cost = self.commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.of_torque(active), power - self.commands.floor]), cost
+        return np.concatenate([self.torque_power(active), power - self.commands.floor]), cost
 
-    def of_torque(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (own,) that effects of the loop add to the floor of the torque.
+    def torque_power(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (replay,) that effects of the loop add to the floor of the torque.
 
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
         law = self.data.study.controller
         loop = _beside_edges(active) if law else []
-        if not self.own or not loop or not law.changes_loop(loop):
-            return np.zeros(self.own)
-        gather = self.layout.gather
-        change = np.where(self.known[:self.own], gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
+        if not self.replay_count or not loop or not law.changes_loop(loop):
+            return np.zeros(self.replay_count)
+        gather, own = self.layout.gather, slice(self.replay_count)
+        change = np.where(self.known[own], gather(spectra(self.data, loop)) - self.base[own], 0.0)
         steps = step_doubt(self.data, loop)
         doubt = DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
 
     def _noise_growth(self, change: Change) -> np.ndarray:
-        """Factor (own,) of a changed loop on the torque's floor, less 1, as far as the floor is noise of the loop."""
+        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as the floor is noise of the loop."""
         before, after = change.unexplained
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
         table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
         return self.layout.per_bin({AIR: table, REST: np.zeros(self.layout.keep[REST].shape)})
 
-    def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
+    def loops_differ(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
         """Whether the loops of roll and pitch differ between two hypotheses."""
         law = self.data.study.controller
         return law is not None and not law.same_loop(before, after)
@@ -203,7 +203,7 @@ def _counted(slow: bool) -> dict[str, np.ndarray]:
 
 
 def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
-    """The values of the replay view. noise (own,): power of the floor, without what lost rows add."""
+    """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
     base, counts = layout.gather(data.base), data.study.floor.blocks
     known = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}

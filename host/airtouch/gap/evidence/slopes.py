@@ -27,7 +27,7 @@ class SpectraSlopes:
     """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
 
     at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;
-    rises (bins, axes): of the logarithm of the commands' power; powers (own,): of the floor of the torque; bent:
+    rises (bins, axes): of the logarithm of the commands' power; powers (replay,): of the floor of the torque; bent:
     whether it changes the loop, in which nothing is linear. high (k,): largest parameters.
     """
 
@@ -46,7 +46,7 @@ class SpectraSlopes:
         if not len(stale):
             return
         before = active_at(self.mean, x)
-        values, power = self.problem.values(before), self.problem.of_torque(before)
+        values, power = self.problem.values(before), self.problem.torque_power(before)
         for i in stale:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             shifted = x.copy()
@@ -54,8 +54,8 @@ class SpectraSlopes:
             after = active_at(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.of_torque(after) - power) / step
-            self.bent[i] = self.problem.bends(before, after)
+            self.powers[i] = (self.problem.torque_power(after) - power) / step
+            self.bent[i] = self.problem.loops_differ(before, after)
         self.at = x.copy() if anew else self.at
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
@@ -69,7 +69,7 @@ class SpectraSlopes:
         powers = np.array(self.powers)
         if powers.any():
             push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
-                                                              problem.own)
+                                                              problem.replay_count)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

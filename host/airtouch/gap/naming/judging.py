@@ -76,16 +76,18 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
-def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice: float) -> Candidate:
+def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
+            ) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
-    name, terms: the effect, and its variant; choice: nats that the choice among its variants costs. Its gain is that of
-    all effects over none, less what their parameters and the choice of their variants cost. Effects that are seen in
-    the commands alone gain less beside the first random one; it is not charged with that (`_gained_while_certain`).
+    name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs. Its gain is
+    that of all effects over none, less what their parameters and the choice of their variants cost. Effects that are
+    seen in the commands alone gain less beside the first random one; it is not charged with that
+    (`_lost_to_uncertainty`).
     """
     before = chosen.terms if chosen else ()
-    paid = choice + (chosen.choice if chosen else 0.0)
-    beyond = (chosen.beyond if chosen else 0.0) + _gained_while_certain(on, terms, chosen)
+    paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
+    certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(on, terms, chosen)
     if chosen and all(t.kind == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
@@ -94,15 +96,15 @@ def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice
         gain = clock_gains(on.data, before)
         for train, test in ROUND_TRIP:
             gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
-        gain += beyond - price_of(fits[-1].terms) - paid
+        gain += certain - price_of(fits[-1].terms) - paid
     of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.kind == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
-                  covariance=covariance, apart=apart, beyond=beyond)
+    return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice_cost=paid, strength=strength,
+                  covariance=covariance, apart=apart, gained_while_certain=certain)
 
 
-def _gained_while_certain(on: Trial, terms: Terms, chosen: Candidate | None) -> float:
+def _lost_to_uncertainty(on: Trial, terms: Terms, chosen: Candidate | None) -> float:
     """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
 
     Beside a random effect the commands' floor is less certain.
@@ -128,7 +130,7 @@ def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> 
 
 
 def held_out_cell_gains(on: Trial, hypothesis: Candidate) -> np.ndarray:
-    """Nats (GROUPS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
+    """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(on.data, on.parts[test], hypothesis.fits[train].terms) for train, test in ROUND_TRIP],
                   axis=0)
 

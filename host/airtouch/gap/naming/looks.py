@@ -18,11 +18,11 @@ HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer 
 
 
 class PricedVariant(NamedTuple):
-    """A variant of an effect; choice: nats that the choice among the effect's variants costs."""
+    """A variant of an effect; choice_cost: nats that the choice among the effect's variants costs."""
 
     name: str
     terms: Terms
-    choice: float
+    choice_cost: float
 
 
 class RandomLook(NamedTuple):
@@ -113,9 +113,9 @@ def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
     look = first_order(start.on.data, start.halves, terms, start.terms)
-    gain = look.gain + (start.gain - price_of(terms) - variant.choice)
+    gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
     halves = np.array(look.fitted)[:, :k]
-    return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice=variant.choice,
+    return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
                   strength=own.among_all(halves.mean(axis=0)),
                   covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
@@ -160,12 +160,12 @@ def _by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapp
     """
     looks: dict[str, list[RandomLook]] = {}
     for variant in variants:
-        name, terms, choice = variant
+        name, terms, cost = variant
         if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
             continue
         if len(terms) == 1 or terms[0].kind == MEAN:
             gain, strength = random_look(start.halves, random_of(terms)[0])
-            looks.setdefault(name, []).append(RandomLook(gain - choice, strength, variant))
+            looks.setdefault(name, []).append(RandomLook(gain - cost, strength, variant))
     return looks
 
 
@@ -177,8 +177,8 @@ def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[P
 
 def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
-    name, terms, choice = look.variant
-    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
+    name, terms, cost = look.variant
+    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice_cost=cost,
                   strength=strength_term(terms).among_all(look.strength))
 
 

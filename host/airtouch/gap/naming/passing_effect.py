@@ -37,7 +37,7 @@ def _as_judged(on: Trial, effect: GatedEffect) -> Candidate:
     """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
-    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice=effect.cost,
+    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
                   strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
                   key=effect.key)
 

@@ -35,8 +35,9 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     means = _best_variants(looks.means)
     unpromising, random = random_looks(start, looks.random, means, thorough)
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
-    waiting = [*looks.unseen, *random, *(PricedVariant(j.name, j.terms[len(start.terms):], j.choice) for j in to_fit)]
-    fitted = shared(lambda v: crossed(on, v.name, v.terms, chosen, v.choice), waiting)
+    means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
+    waiting = [*looks.unseen, *random, *means_to_fit]
+    fitted = shared(lambda v: crossed(on, v.name, v.terms, chosen, v.choice_cost), waiting)
     best = _best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}

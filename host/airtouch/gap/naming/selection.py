@@ -40,9 +40,9 @@ class Candidate:
     gain: float
     fits: tuple[FittedTerms, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
-    choice: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
+    choice_cost: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
     #: nats of the gain that effects before the first random one gained while the commands' floor was more certain
-    beyond: float = 0.0
+    gained_while_certain: float = 0.0
     strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     apart: np.ndarray | float = 0.0

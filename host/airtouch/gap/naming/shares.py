@@ -29,8 +29,8 @@ def _gain_without(on: Trial, steps: Sequence[Candidate], dropped: Candidate) -> 
         known = _others(last.fits[train].terms, dropped.name)
         refit = fit(on.data, on.parts[train], known, mean_parameters(known))
         gain += gain_of(on, test, refit.terms)
-    cost_of_dropped = dropped.choice - (steps[place - 1].choice if place else 0.0)
-    return gain - price_of(refit.terms) - (last.choice - cost_of_dropped)
+    cost_of_dropped = dropped.choice_cost - (steps[place - 1].choice_cost if place else 0.0)
+    return gain - price_of(refit.terms) - (last.choice_cost - cost_of_dropped)
 
 
 def _others(terms: Sequence[Term], name: str) -> list[Term]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS, sensor_cells
+from airtouch.gap.evidence.cells import CELLS, sensor_cells
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
@@ -62,11 +62,11 @@ def misfit(on: Trial, base: Candidate, more: Candidate, share: float, everywhere
 def gained_where_more_is(base: np.ndarray, more: np.ndarray) -> float:
     """Nats that a hypothesis gains in those cells in which a longer one gains more than CELL_GAIN beyond it.
 
-    base, more (GROUPS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one cell:
+    base, more (CELLS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one cell:
     an effect that pushes forward and one that pushes up act on one body.
     """
     sensor = sensor_cells()
-    before, further = (np.bincount(sensor, gains, GROUPS) for gains in (base, more - base))
+    before, further = (np.bincount(sensor, gains, CELLS) for gains in (base, more - base))
     return float(np.maximum(before[further > CELL_GAIN], 0.0).sum())
 
 

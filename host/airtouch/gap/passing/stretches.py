@@ -91,7 +91,7 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, price: float) -> tuple[i
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.power)[:problem.own]
+    each = problem.likelihood.each(values, power - problem.power)[:problem.replay_count]
     in_air = problem.air.of >= 0
     return np.bincount(problem.air.of[in_air], each[in_air])
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import BANDS_HZ, GROUPS
+from airtouch.gap.evidence.cells import BANDS_HZ, CELLS
 from airtouch.gap.evidence.data import Data, commanded
 from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.signals.channels import TORQUE
@@ -34,7 +34,7 @@ OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate((
 
 @dataclass(frozen=True)
 class UnnamedFloor:
-    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
+    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, CELLS)."""
 
     columns: np.ndarray
     power: np.ndarray
@@ -42,7 +42,7 @@ class UnnamedFloor:
 
 def no_floor() -> UnnamedFloor:
     """The floor where no nominal flight is known: coefficients and powers without scatter."""
-    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))
+    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, CELLS)))
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regresso
 def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
     """See `regressors_of`."""
     out = []
-    channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
+    channel, flight, known = (x[:problem.replay_count] for x in (problem.channel, problem.flight, problem.known))
     for c in range(CHANNELS):
         table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):

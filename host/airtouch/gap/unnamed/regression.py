@@ -29,7 +29,7 @@ class HalfResiduals:
         self.problem = problem = problem_of(data, part)
         self.values, added, _ = problem.modelled(terms)
         self.power = problem.power + added
-        self.groups = problem.groups
+        self.cells = problem.cells
         self.regressors = regressors_of(data, part, problem)
 
     def system(self, one: Regressors, values: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ class HalfResiduals:
         """Powers of the residuals (elements,) whose values are known."""
         known = self.problem.known
         over = squared(residuals[known]) / self.power[known]
-        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.groups[known])
+        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.cells[known])
 
     def without_columns(self, fitted: np.ndarray, floor: UnnamedFloor) -> np.ndarray:
         """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each channel
