@@ -123,7 +123,7 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
     part = random_part_of("ground_effect")
     part = replace(part, values={**part.values, "turbulence": 0.25})
     effect = NamedEffect("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
-                                                                           "turbulence": 0.0}.items()})
+                                                                                 "turbulence": 0.0}.items()})
     reported = {k: q.value for k, q in with_random_part(effect, part).parameters.items()}
     swing = force(part.values) - force({**part.values, "turbulence": 0.0})
     assert np.abs(swing).max() > 1e-4

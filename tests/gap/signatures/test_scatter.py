@@ -15,8 +15,8 @@ from airtouch.simulation.effects import EFFECTS
 
 def draw_strengths(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[ApparentStrengths]:
     return [ApparentStrengths({k: rng.normal(size=len(v)) * v for k, v in rms.items()},
-                     {k: 1e-6 + 0.0 * v for k, v in rms.items()},
-                     float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
+                              {k: 1e-6 + 0.0 * v for k, v in rms.items()},
+                              float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 
 SHARED = {n for confusion in ALIKE for n in confusion.effects}  #: names of one thing, which have one scatter
@@ -131,8 +131,9 @@ def test_an_effect_of_one_sign_scatters_as_the_flights_that_show_it():
     """Half of the flights would have it below none: how far below, nobody knows, and they are no sign of calm."""
     rng = np.random.default_rng(8)
     strengths = 0.3 * rng.normal(size=200)
-    flights = [ApparentStrengths({"ground_effect": np.array([max(x, 0.0)])},
-                        {"ground_effect": np.array([0.02 if x > 0.0 else NOBODY_KNOWS])}, 0.0) for x in strengths]
+    errors = [np.array([0.02 if x > 0.0 else NOBODY_KNOWS]) for x in strengths]
+    flights = [ApparentStrengths({"ground_effect": np.array([max(x, 0.0)])}, {"ground_effect": error}, 0.0)
+               for x, error in zip(strengths, errors, strict=True)]
     assert class_scatter(flights).rms["ground_effect"][0] == pytest.approx(0.3, rel=0.15)
 
 
@@ -140,7 +141,7 @@ def test_flights_that_say_nothing_of_an_effect_leave_it_to_its_gain():
     """Nominal flights high above the floor say nothing of ground effect; a flight close to it may still be news."""
     rng = np.random.default_rng(9)
     flights = [ApparentStrengths({"ground_effect": np.array([rng.uniform(0.0, 3.0)])},
-                        {"ground_effect": np.array([rng.uniform(1.0, 9.0)])}, 0.0) for _ in range(30)]
+                                 {"ground_effect": np.array([rng.uniform(1.0, 9.0)])}, 0.0) for _ in range(30)]
     assert class_scatter(flights).rms["ground_effect"][0] == LEAST
 
 
@@ -268,7 +269,7 @@ def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed(
     """Four flights of another mission, with 0.1 of a ground effect each, where the class knows 0.005."""
     rng, class_rms = np.random.default_rng(8), table()["simulated"].rms
     flights = [ApparentStrengths(nominal.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
-                        nominal.errors | {"ground_effect": np.array([0.02])}, nominal.rate)
+                                 nominal.errors | {"ground_effect": np.array([0.02])}, nominal.rate)
                for nominal in draw_strengths(rng, {k: v for k, v in class_rms.items() if k not in SHARED}, 4)]
     scatter = scatter_of(flights)
     assert scatter.exact and 0.05 < scatter.rms["ground_effect"][0] < 0.2

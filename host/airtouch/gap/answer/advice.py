@@ -24,12 +24,12 @@ def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[st
     if verdict == "effect":
         named = " and ".join(e.name for e in effects)
         said.append(NextStep(f"Switch on {named} with these parameters in the simulator, and fly it again.",
-                         switched_on(effects, vehicle)))
+                             switched_on(effects, vehicle)))
     if verdict == "none":
         said.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not baseline:
         said.append(NextStep("Give flights that are known to be nominal with --baseline: they lower the floor and show "
-                         "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+                             "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
     if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
         said.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(said)
@@ -64,7 +64,7 @@ def _apart(group: tuple[str, ...]) -> NextStep:
     """What tells the effects of a group from one another."""
     among = confusion_among(group)
     return NextStep(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
-                collect(among.mission) if among.mission else "")
+                    collect(among.mission) if among.mission else "")
 
 
 def _open(headline: Cell | None, vehicle: str) -> list[NextStep]:

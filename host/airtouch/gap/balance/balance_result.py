@@ -157,8 +157,8 @@ def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink
         why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
     best = max(chance.values())
     return sorted((RankedCandidate(n, p, shrink[n].share,
-                          "" if n == first
-                          else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
+                                   "" if n == first
+                                   else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
                    for n, p in chance.items()), key=lambda r: (r.name != first, -r.probability))
 
 
@@ -196,7 +196,7 @@ def _found(fit: Fit) -> list[NamedEffect]:
         if name == OFF_CENTRE and not alone and not any(side_is_sure(v, fit.weight) for v in drawn.values()):
             continue
         out.append(NamedEffect(name, {p.name: _posterior(drawn[p.name], fit.weight, p)
-                                for p in get(name).parameters if p.name in drawn}))
+                                      for p in get(name).parameters if p.name in drawn}))
     return out
 
 

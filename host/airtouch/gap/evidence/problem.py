@@ -144,7 +144,7 @@ class Problem:
         return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
 
     def _noise_growth(self, change: Change) -> np.ndarray:
-        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as the floor is noise of the loop."""
+        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
         before, after = change.unexplained
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
@@ -223,7 +223,7 @@ def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
     """Every block of every flight, or of the flights of these numbers."""
     numbers = range(len(data.flights)) if flights is None else flights
     return BlockSet(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
-                      if len(data.first[i][r])))
+                          if len(data.first[i][r])))
 
 
 def problem_of(data: Data, part: BlockSet) -> Problem:

@@ -69,7 +69,7 @@ class SpectraSlopes:
         powers = np.array(self.powers)
         if powers.any():
             push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
-                                                              problem.replay_count)
+                                                           problem.replay_count)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

@@ -101,7 +101,7 @@ def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
     return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice_cost=paid, strength=strength,
-                  covariance=covariance, apart=apart, gained_while_certain=certain)
+                     covariance=covariance, apart=apart, gained_while_certain=certain)
 
 
 def _lost_to_uncertainty(on: Trial, terms: Terms, chosen: Candidate | None) -> float:

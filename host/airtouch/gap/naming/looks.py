@@ -116,8 +116,8 @@ def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
     halves = np.array(look.fitted)[:, :k]
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
-                  strength=own.among_all(halves.mean(axis=0)),
-                  covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
+                     strength=own.among_all(halves.mean(axis=0)),
+                     covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
 
 def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
@@ -179,7 +179,7 @@ def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
     name, terms, cost = look.variant
     return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice_cost=cost,
-                  strength=strength_term(terms).among_all(look.strength))
+                     strength=strength_term(terms).among_all(look.strength))
 
 
 def _same(one: Term, other: Term) -> bool:

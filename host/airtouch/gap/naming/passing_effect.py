@@ -38,8 +38,8 @@ def _as_judged(on: Trial, effect: GatedEffect) -> Candidate:
     terms = effect.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
-                  strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
-                  key=effect.key)
+                     strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
+                     key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:

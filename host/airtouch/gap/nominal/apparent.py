@@ -46,10 +46,9 @@ def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     singles = round_of(on, all_candidates(without), None, thorough=True)
     passing = gated(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
+    sizes = {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0 for n in GATED}
     return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                    nameless(on, None) / seconds(data),
-                    {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
-                     for n in GATED})
+                             nameless(on, None) / seconds(data), sizes)
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:

@@ -86,7 +86,7 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
             offsets = [(x[own], p) for x, p in problem.unit_offsets if np.any(x[own])]
             if len(own):
                 out.append(Regressors(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
-                                 np.array([p for _, p in offsets])))
+                                      np.array([p for _, p in offsets])))
     return out
 
 
