@@ -10,8 +10,9 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.pictures import of as pictures_of
-from airtouch.gap.answer.ranking import alike_of, ranked
+from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
@@ -114,8 +115,10 @@ def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
 
 def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control."""
-    ranking, verdict, effects = ranked(data, selection, gap)
-    is_effect, before = verdict == "effect", gap.named.before
+    verdict, before = verdict_of(data, selection, gap), gap.named.before
+    is_effect = verdict == "effect"
+    effects = named_effects(data, selection) if is_effect else []
+    ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
         where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},

@@ -24,8 +24,8 @@ MODEL_ERROR = 0.1
 LOOP_ERROR = 0.25
 
 
-def chosen_effects(data: Data, selection: Selection) -> list[NamedEffect]:
-    """The effects that the selection chose, fitted anew to all the data, with 90 % intervals.
+def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
+    """The effects that a selection names, fitted anew to all the data, with 90 % intervals.
 
     Their order is that of the selection, so that the first is the first of the ranking.
     """

@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 
-from airtouch.gap.answer.named_effects import chosen_effects
 from airtouch.gap.answer.reasons import why_not
 from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Selection, probabilities
-from airtouch.gap.result import NamedEffect, Quantity, RankedCandidate
+from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
@@ -25,29 +24,32 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no nominal
     flight has odd times. A recorded one had calm air or a poor link.
     """
-    if selection.inference is not None:
-        return "unknown" if not selection.explained else "none" if selection.chosen is None else "effect"
-    outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.named.before <= AT_FLOOR and not outside_the_gap:
-        odd_times = selection.of_times > selection.allowed
-        if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, gap)):
-            return "none"
+    if selection.inference is None and _at_its_floor(data, selection, gap):
+        return "none"
     if not selection.explained:
         return "unknown"
     return "none" if selection.chosen is None else "effect"
 
 
-def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[RankedCandidate], str, list[NamedEffect]]:
-    """Every candidate with probability and shrink, best first; the verdict; the effects named."""
-    verdict = verdict_of(data, selection, gap)
-    effects = chosen_effects(data, selection) if verdict == "effect" else []
-    answer = effects[0].name if effects else verdict
-    chance = agreeing(probabilities(selection, verdict == "none"), answer)
+def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
+    """Whether there is no gap, and nothing that would be outside it or within calmer bands; see `verdict_of`."""
+    outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
+    if gap.named.before > AT_FLOOR or outside_the_gap:
+        return False
+    odd_times = selection.of_times > selection.allowed
+    return not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, gap))
+
+
+def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:
+    """Every candidate with its probability and how far it closes the gap, best first.
+
+    answer: the first effect named, else the verdict.
+    """
     out = []
-    for name, p in chance.items():
+    for name, p in agreeing(probabilities(selection, verdict == "none"), answer).items():
         single = selection.singles.get(name)
         share = Quantity(0.0)
-        if name == answer and effects and len(selection.named) == 1:
+        if name == answer and verdict == "effect" and len(selection.named) == 1:
             share = gap.named.share
         elif single is not None and single.full and single.gain > FIRST_GAIN:
             share = shrink_of(data, selection.parts, single, gap).share
@@ -55,15 +57,15 @@ def ranked(data: Data, selection: Selection, gap: Gap) -> tuple[list[RankedCandi
         out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
-    return out, verdict, effects
+    return out
 
 
-def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
+def agreeing(probability: Mapping[str, float], answer: str) -> dict[str, float]:
     """The probabilities, of which the answer's is the largest: a larger one changes places with it.
 
     The verdict weighs what the ranking of single candidates does not, as effects that come and go.
     """
-    out = {answer: 0.0, **chance}
+    out = {answer: 0.0, **probability}
     best = max(out, key=out.__getitem__)
     out[answer], out[best] = out[best], out[answer]
     return out
