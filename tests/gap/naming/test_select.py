@@ -18,7 +18,7 @@ from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.selection import Candidate, probabilities
-from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
@@ -182,7 +182,7 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
 def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
-    gain = gated(Data(study, flights, slow=True))["downwash"].gain
+    gain = gated_effects(Data(study, flights, slow=True))["downwash"].gain
     monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
     assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
 

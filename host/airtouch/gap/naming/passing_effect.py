@@ -8,7 +8,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
-from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.unnamed.generic import height_gain
 
@@ -25,7 +25,7 @@ def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[s
     if on.data.study.scatter is None:
         return None
     steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
-    passing = [g for g in gated(on.data, without).values()
+    passing = [g for g in gated_effects(on.data, without).values()
                if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None

@@ -16,7 +16,7 @@ from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
-from airtouch.gap.passing.gates import gated
+from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
@@ -44,7 +44,7 @@ def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
     singles = round_of(on, all_candidates(without), None, thorough=True)
-    passing = gated(data, without)
+    passing = gated_effects(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     sizes = {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0 for n in GATED}
     return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},

@@ -62,7 +62,7 @@ def no_effect(data: Data) -> NoEffect | None:
     return NoEffect(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
 
 
-def gated(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
+def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
     """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
 
     without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
@@ -72,28 +72,28 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
     if base is None:
         return {}
     lively, out = bursts(data), {}
-    for name, variants in candidates.gated(without).items():
+    for name, variants in candidates.gated_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
-        tried = [(terms, gate, cost) for variant in variants for terms, gate, cost in (
-            stretches_of(data, base.whole, base.each, variant), (variant, *lively)) if gate]
-        if tried:
-            out[name] = max((_judged(base, name, *candidate) for candidate in tried), key=lambda j: j.gain)
+        where = [tried for v in variants for tried in (stretches_of(data, base.whole, base.each, v), (v, *lively))]
+        acting = [_in_gate(base, name, terms, gate, cost) for terms, gate, cost in where if gate]
+        if acting:
+            out[name] = max(acting, key=lambda effect: effect.gain)
     return out
 
 
 def within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
     """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
     base = no_effect(data)
-    return _best(base, name, candidates.gated()[name], gate) if base is not None else None
+    return _best(base, name, candidates.gated_variants()[name], gate) if base is not None else None
 
 
 def _best(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
     """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
-    return max((_judged(base, name, v, gate, 0.0) for v in variants), key=lambda j: j.gain)
+    return max((_in_gate(base, name, v, gate, 0.0) for v in variants), key=lambda effect: effect.gain)
 
 
-def _judged(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> GatedEffect:
+def _in_gate(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> GatedEffect:
     """An effect fitted within a gate, whose choice costs `cost` nats."""
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(base.data, base.whole, acting)

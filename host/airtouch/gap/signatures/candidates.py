@@ -31,7 +31,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     return out
 
 
-def gated(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
+def gated_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
     without, out = set(without), {}
     for name in GATED:
