@@ -14,10 +14,11 @@ Where each decision is made; a folder imports only those above it:
   set-points make of the commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`, what
   part of a command's torque turns the vehicle: `torque_share`; `command_spectra` of flights, from which `identify`
   finds a `closed_loop`; at edges: `edge_response`.
-- `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
-- `evidence`, how likely the flights are under an effect: `data`, compared with a `study`, of which a `problem` has the
-  blocks in one flat array (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`,
-  `least_squares`, `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
+- `signals`, what is compared: `channels`, `spectra`, `command_view`, with what: a `study`; what raises the floor:
+  `response`, `lost_rows`.
+- `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
+  (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,
+  `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
 - `passing`, what comes and goes: `gates`, of `stretches` of blocks and `bursts`; `overhead` takes its seconds from
   another vehicle's log.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)

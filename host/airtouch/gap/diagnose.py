@@ -17,7 +17,6 @@ from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
@@ -30,6 +29,7 @@ from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where

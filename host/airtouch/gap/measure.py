@@ -10,7 +10,6 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
 from airtouch.gap.loop.command_spectra import block_spectra, frequencies
@@ -20,6 +19,7 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, in_words, overall, part_of, where
 from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights

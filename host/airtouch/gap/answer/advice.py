@@ -17,10 +17,14 @@ MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "swee
 
 def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[str, ...]], headline: Cell | None,
           flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[NextStep, ...]:
-    """What to do next, most useful first."""
-    said = [_apart(group) for group in alike]
+    """What to do next, most useful first.
+
+    effects: those named; alike: sets of names that these logs cannot tell apart; headline: the cell that the answer
+    speaks of; baseline: whether there were nominal flights.
+    """
+    said = [_to_tell_apart(group) for group in alike]
     if verdict == "unknown":
-        said += _open(headline, vehicle)
+        said += _for_an_open_gap(headline, vehicle)
     if verdict == "effect":
         named = " and ".join(e.name for e in effects)
         said.append(NextStep(f"Switch on {named} with these parameters in the simulator, and fly it again.",
@@ -39,15 +43,15 @@ def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
     """The command that flies the named effects in the simulator."""
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
-        given = [f"{k}={_value(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
+        given = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
                  for k, q in e.parameters.items()]
         words += [*(("--effect-file", file) if (file := source_of(e.name)) else ()),
                   "--effect", e.name + (":" + ",".join(given) if given else "")]
     return shlex.join(words)
 
 
-def _value(effect: str, parameter: str, value: float) -> str:
-    """Four digits, and within the parameter's bounds, which rounding may leave."""
+def _argument(effect: str, parameter: str, value: float) -> str:
+    """A value as the command takes it: four digits, and within the parameter's bounds, which rounding may leave."""
     bounds = {p.name: p for p in EFFECTS[effect].parameters}.get(parameter) if effect in EFFECTS else None
     text = f"{value:.4g}"
     if bounds is not None and not bounds.low <= float(text) <= bounds.high:
@@ -60,14 +64,14 @@ def collect(mission: str) -> str:
     return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
 
 
-def _apart(group: tuple[str, ...]) -> NextStep:
+def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
     """What tells the effects of a group from one another."""
     among = confusion_among(group)
     return NextStep(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
                     collect(among.mission) if among.mission else "")
 
 
-def _open(headline: Cell | None, vehicle: str) -> list[NextStep]:
+def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
     said = []
     if headline is not None and headline.phase in MISSIONS:

@@ -10,12 +10,12 @@ import numpy as np
 import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term

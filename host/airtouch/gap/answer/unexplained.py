@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.answer.reasons import nearest
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.motion import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.simulation import signals as at
 

@@ -41,7 +41,7 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unknown":
         near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
         return (f"No known effect explains it (probability {chance})"
-                + (f"; the nearest is {plain(near.name)} with {near.probability:.1%}." if near else "."))
+                + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
     cell = diagnosis.headline
     if cell is not None and cell.after is not None and not summary.closes(cell):
@@ -53,7 +53,7 @@ def _which(diagnosis: Diagnosis) -> str:
 def _named(effect: NamedEffect) -> str:
     """The effect's name, and of which rotor."""
     rotor = effect.parameters.get("rotor")
-    return plain(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+    return name_in_words(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
 
 
 def _how_far(diagnosis: Diagnosis) -> str:
@@ -99,7 +99,7 @@ def band_in_words(cell: Cell) -> str:
     return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
 
-def plain(name: str) -> str:
+def name_in_words(name: str) -> str:
     """An effect's name as a phrase."""
     return name.replace("_", " ")
 
@@ -139,7 +139,8 @@ def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.unexplained:
         return []
     shown = {r.name for r in summary.leading(diagnosis.ranking) if r.why}
-    return [f"{plain(n['name'])}: {n['fails']}" for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
+    near = [n for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
+    return [f"{name_in_words(n['name'])}: {n['fails']}" for n in near]
 
 
 def digits(q: Quantity) -> str:

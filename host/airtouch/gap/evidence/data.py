@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.axis_plant import axis_plant
@@ -20,6 +19,7 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.body import rigid_body

@@ -8,7 +8,6 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.passing_effect import seconds
@@ -18,6 +17,7 @@ from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.second_process import shared
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of

@@ -15,7 +15,6 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
@@ -23,6 +22,7 @@ from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, sp
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.generic import unnamed_floor

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
+from airtouch.gap.signals.study import Study
 from airtouch.robust import deviation
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle

@@ -6,11 +6,11 @@ A wake that is flown through lasts shorter than a block, and the spectra of bloc
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.filters import both_ways, highpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, Gate, best_stretches, price_of_stretches
 from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.study import Study
 
 #: no number here has a source: all were chosen
 PIECE_S = 0.16  #: s, length of the pieces of the force along the thrust in which bursts are sought

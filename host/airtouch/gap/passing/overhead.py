@@ -12,10 +12,10 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, within
 from airtouch.gap.passing.stretches import Gate
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog

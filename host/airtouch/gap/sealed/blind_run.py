@@ -15,8 +15,8 @@ from typing import Any
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.sealed import blind
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog

@@ -20,7 +20,7 @@ from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.evidence.study import Study
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.gap.signatures.signature import CLOCK

@@ -14,11 +14,11 @@ import numpy as np
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.study import Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
