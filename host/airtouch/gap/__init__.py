@@ -32,15 +32,15 @@ Where each decision is made; a folder imports only those above it:
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
   that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the
-  effects: `related`; `selection` has the result with its probabilities; `contradiction` by the flights;
+  effects: `related`; `selection` has the result; `contradiction` by the flights;
   `recorded`: when recorded flights may name an effect.
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; `rotor_speeds`; without a diagnosis:
   `measure`.
-- `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
-  intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
-  `advice`; `words`, `pictures`.
+- `answer`: the verdict and the `ranking` by `probabilities`, with the `reasons` against the others; the
+  `named_effects` with their intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to
+  fly next: `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: the `hover_pattern` of a flight, `hover_hypotheses` drawn from `priors`, their
   evidence by `hover_balance`; `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_run`, `blind_score` with its `intervals`, `blind_severity`; on a

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import shortfall
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import clock_gain
@@ -17,7 +18,7 @@ from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.passing_effect import seconds
-from airtouch.gap.naming.selection import Candidate, probabilities
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST

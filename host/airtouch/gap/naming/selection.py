@@ -1,6 +1,6 @@
-"""The result of a selection of effects: hypotheses judged, the steps, and the probability of each candidate."""
+"""The result of a selection of effects: candidates judged, the steps, and what speaks against the effects named."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,9 +19,6 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
 SAME_MODELS = 0.5  #: of these in flights of this project's simulator: twice what right names left there, 78 flights
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves; chosen
-BEHIND = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
-#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as BEHIND
-BELOW = 0.9
 
 
 @dataclass(frozen=True)
@@ -150,67 +147,3 @@ class Selection:
     def explained(self) -> bool:
         """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
         return self.unlike < 1.0
-
-
-def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
-    """Of every single candidate, `none` and `unknown`; they sum to 1.
-
-    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
-
-    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
-    effect or `none` is the answer it stays below that.
-    """
-    names = list(selection.singles)
-    weight = _weights(selection, names)
-    share = weight / weight.sum()
-    odds = selection.unlike ** 2
-    unknown = odds / (1.0 + odds)
-    if selection.chosen is not None and selection.explained:
-        unknown = _below(unknown, share[names.index(selection.named[0].name)])
-    if at_floor:
-        unknown = _below(unknown, share[-1])
-    known = (1.0 - unknown) * weight / weight.sum()
-    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
-
-
-def _below(unknown: float, share: float) -> float:
-    """Probability of `unknown`, BELOW that of an answer at most, which has this share of all others."""
-    return min(unknown, BELOW * share / (1.0 + BELOW * share))
-
-
-def _weights(selection: Selection, names: Sequence[str]) -> np.ndarray:
-    """Weight (k + 1,) of each of k candidates, and of `none`, beside one another."""
-    if selection.inference is not None:
-        alone = selection.inference.probabilities()
-        return np.array([alone[n] for n in (*names, "none")])
-    score = np.array([*_scores(selection, names), 0.0])
-    return np.exp((score - score.max()) / TEMPERATURE)
-
-
-def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
-    """Score of every single candidate beside 0 for `none`, nats; those that could be named keep the order of gains.
-
-    The first effect named leads them by BEHIND at least.
-    """
-    singles = selection.singles
-    out = [_against_none(singles[n].evidence, selection.least[n], len(names)) for n in names]
-    if not selection.named or selection.named[0].name not in names:
-        return out
-    first = names.index(selection.named[0].name)
-
-    def beside_first(i: int) -> float:
-        """Score of a candidate that could be named, or of the first effect itself."""
-        behind = max(singles[names[first]].gain - singles[names[i]].gain, BEHIND) if i != first else 0.0
-        return max(out[first] - behind, -TEMPERATURE)
-
-    return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
-
-
-def _against_none(gain: float, least: float, many: int = 1) -> float:
-    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
-
-    gain: the evidence, nats, over `none` and over what nominal flights show; least: what is needed.
-    """
-    if gain < least:
-        return TEMPERATURE * (gain - least - np.log(many))
-    return gain - least
