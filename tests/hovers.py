@@ -100,6 +100,6 @@ def own_gain(data, terms, first=None):
         parts = judging.halves(data)
         start = None if first is None else first[train]
         fitted_terms = fit(data, parts[train], terms, start).terms
-        random = any(t.kind == "spectrum" for t in fitted_terms)
+        random = any(t.shows_in == "spectrum" for t in fitted_terms)
         total += judge(data, parts[test], fitted_terms) - judge(data, parts[test], (), random)
     return total

@@ -9,7 +9,7 @@ from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
-TERMS = {name: (SimpleNamespace(name=name, kind="mean"),) for name in EVIDENCE}
+TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
 
 
 def judged(name, gain, evidence=None):

@@ -11,7 +11,7 @@ from airtouch.gap.signatures.candidates import (
     all_candidates,
     gated_variants,
     is_random,
-    kind_of,
+    shows_in,
     strength_term,
     term_of,
     terms,
@@ -21,7 +21,7 @@ from airtouch.simulation.effects import EFFECTS, get
 
 
 def kinds(variant):
-    return [(t.name, t.kind, t.companion) for t in variant]
+    return [(t.name, t.shows_in, t.companion) for t in variant]
 
 
 def test_every_effect_of_the_registry_is_a_candidate_but_those_left_out():
@@ -62,14 +62,14 @@ def test_moving_air_has_drag_beside_it_unless_drag_is_left_out():
         assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + gated_variants()[name])
 
 
-@pytest.mark.parametrize(("name", "kind"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
-def test_an_effect_shows_where_its_record_says(name, kind):
-    assert kind_of(get(name)) == kind and all(t.kind == kind for t in terms(name))
+@pytest.mark.parametrize(("name", "where"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
+def test_an_effect_shows_where_its_record_says(name, where):
+    assert shows_in(get(name)) == where and all(t.shows_in == where for t in terms(name))
 
 
-@pytest.mark.parametrize(("like", "kind"), [("gust", SPECTRUM), ("rotor_drag", MEAN), ("time_jitter", MEAN)])
-def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(like, kind):
-    assert kind_of(replace(get(like), name="of one's own")) == kind
+@pytest.mark.parametrize(("like", "where"), [("gust", SPECTRUM), ("rotor_drag", MEAN), ("time_jitter", MEAN)])
+def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(like, where):
+    assert shows_in(replace(get(like), name="of one's own")) == where
 
 
 def test_mass_and_thrust_are_two_names_of_one_thing():
@@ -82,7 +82,7 @@ def test_a_named_effect_is_its_own_variant_again():
     values = own.quantities(own.scaled({**own.values, "rms": 0.05}))
     again = term_of(NamedEffect("motor_noise", values, (("flight", 1.0, 2.0),)))
     assert again.values == {**own.values, "rms": pytest.approx(0.05)}
-    assert again.gate == (("flight", 1.0, 2.0),) and again.kind == SPECTRUM
+    assert again.gate == (("flight", 1.0, 2.0),) and again.shows_in == SPECTRUM
 
 
 def test_a_gain_that_was_named_alone_is_its_own_term_with_its_values():

@@ -42,7 +42,7 @@ def arms(vehicle: Vehicle, nominal: Sequence[Flight], calibration: Calibration |
     study = (calibration.declared if calibration is not None else None) or declared_study(vehicle, nominal)
     data = Data(study, judged)
     parts = halves(data)
-    terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
+    terms = tuple(t for t in selection.chosen.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.chosen.fits[0].terms if selection.chosen.fits else ())
     fits = tuple(fit(data, part, terms, start) for part in parts)
     gap = gap_of(data, parts, Candidate(selection.chosen.name, terms, 0.0, fits))

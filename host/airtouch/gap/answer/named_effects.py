@@ -33,13 +33,13 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     if whole is None or chosen is None:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}
-    fitted = best_shape(data, whole_of(data), [t for t in whole.terms if t.kind != CLOCK], _mean_of_halves(whole))
+    fitted = best_shape(data, whole_of(data), [t for t in whole.terms if t.shows_in != CLOCK], _mean_of_halves(whole))
     names = {t.name for t in chosen.terms}
     shown = [t for t in fitted.terms if t.name in names]
     effects = [_named(t, *_in_spectra(data, whole, fitted, t, readings), readings) for t in shown if not t.companion]
-    for part in (t for t in shown if t.companion and t.kind == SPECTRUM):
+    for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, part) for e in effects]
-    effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.kind == CLOCK]
+    effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
     order = [s.name for s in selection.named]
     return sorted(effects, key=lambda e: order.index(e.name) if e.name in order else len(order))
 
@@ -56,7 +56,7 @@ def _in_spectra(data: Data, whole: Candidate, fitted: FittedTerms, term: Term, r
 
     The covariance is that of the likelihood, of the difference of the two halves, and of model errors.
     """
-    if term.kind == MEAN:
+    if term.shows_in == MEAN:
         place = fitted.place(term)
         x, covariance = fitted.scaled[place], fitted.covariance[place, place]
     else:
@@ -75,7 +75,7 @@ def _model_error(law: ClosedLoop | None, term: Term, read: bool) -> float:
     error = 0.0
     if law is not None and law.changes_loop((term.active(),)):
         error = LOOP_ERROR if read else MODEL_ERROR
-    elif term.kind == SPECTRUM:
+    elif term.shows_in == SPECTRUM:
         error = MODEL_ERROR
     return max(error, term.signature.own_scatter)
 

@@ -85,7 +85,7 @@ def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effec
     commands = measure.command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
         return Pictures(commands=commands)
-    active = [t.active() for t in effects if t.kind == MEAN]
+    active = [t.active() for t in effects if t.shows_in == MEAN]
     gaps = [FlightGap(f, _residual(study, f), _residual(study, f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]

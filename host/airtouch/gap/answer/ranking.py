@@ -34,11 +34,12 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 
 def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
     """Whether there is no gap, and nothing that would be outside it or within calmer bands; see `verdict_of`."""
-    outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
+    chosen = selection.chosen
+    outside_the_gap = chosen is not None and all(t.shows_in == CLOCK or t.gate for t in chosen.terms)
     if gap.named.before > AT_FLOOR or outside_the_gap:
         return False
     odd_times = selection.of_times > selection.allowed
-    return not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, gap))
+    return not data.study.simulated or not (odd_times or nearer(data, selection.parts, chosen, gap))
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

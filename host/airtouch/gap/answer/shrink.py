@@ -78,7 +78,7 @@ def shrink_of(data: Data, parts: Sequence[BlockSet], judged: Candidate, gap: Gap
 def _only_jitter(judged: Candidate | None) -> bool:
     """Whether a hypothesis moves the logged times and does nothing else."""
     return judged is not None and bool(judged.terms) \
-        and all(t.kind == CLOCK and not t.signature.loses_rows for t in judged.terms)
+        and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in judged.terms)
 
 
 def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:

@@ -31,7 +31,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     the effects that gain most with the reason why they were not named.
     """
     terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
-    active = tuple(t.active() for t in terms if t.kind == MEAN)
+    active = tuple(t.active() for t in terms if t.shows_in == MEAN)
     chosen = [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]
     model = (*study.calibration, *active)
     gaps = [(f, residual(f, study.vehicle, model, study.controller)) for f in flights] if chosen else []

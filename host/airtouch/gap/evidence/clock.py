@@ -47,10 +47,10 @@ def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood that those effects gain that act on the logged times, among others that do not."""
-    return sum(clock_gain(data, t)[1] for t in terms if t.kind == CLOCK)
+    return sum(clock_gain(data, t)[1] for t in terms if t.shows_in == CLOCK)
 
 
 def clock_left(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood of the logged times that effects do not explain."""
-    explained = {t.signature.loses_rows for t in terms if t.kind == CLOCK}
+    explained = {t.signature.loses_rows for t in terms if t.shows_in == CLOCK}
     return (0.0 if False in explained else jitter(data)[1]) + (0.0 if True in explained else loss(data)[1])

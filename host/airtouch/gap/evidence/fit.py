@@ -51,13 +51,13 @@ class FittedTerms:
     def place(self, term: Term) -> slice:
         """Where the parameters of one of its mean effects are among the k."""
         before = itertools.takewhile(lambda t: t is not term, self.terms)
-        first = sum(len(t.free) for t in before if t.kind == MEAN)
+        first = sum(len(t.free) for t in before if t.shows_in == MEAN)
         return slice(first, first + len(term.free))
 
 
 def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
     """Scaled parameters (k,) of the mean effects among terms with values."""
-    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in terms if t.kind == MEAN)])
+    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in terms if t.shows_in == MEAN)])
 
 
 def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
@@ -68,7 +68,7 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     these around neutral. Mean and random effects are fitted in turn until neither moves.
     """
     problem = problem_of(data, part)
-    mean, random = tuple(t for t in terms if t.kind == MEAN), random_of(terms)
+    mean, random = tuple(t for t in terms if t.shows_in == MEAN), random_of(terms)
     x = start_of(problem, mean, start)
     random_power: np.ndarray | float = 0.0
     if random and mean and start is not None:
@@ -93,11 +93,11 @@ def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -
     """The terms with their values: mean ones at scaled parameters x (k,), random ones as fitted, in their order."""
     out, place, fitted = [], 0, iter(random)
     for t in terms:
-        if t.kind == MEAN:
+        if t.shows_in == MEAN:
             out.append(t.fitted(x[place:place + len(t.free)]))
             place += len(t.free)
         else:
-            out.append(next(fitted) if t.kind == SPECTRUM else t)
+            out.append(next(fitted) if t.shows_in == SPECTRUM else t)
     return tuple(out)
 
 

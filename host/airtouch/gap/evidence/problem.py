@@ -116,7 +116,7 @@ class Problem:
         wide: the commands' floor is as uncertain as under random effects, though there are none.
         """
         random = random_of(terms)
-        mean = [t.active() for t in terms if t.kind == MEAN]
+        mean = [t.active() for t in terms if t.shows_in == MEAN]
         command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + command_power, cost
 

@@ -73,7 +73,7 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
 
 def price_of(terms: Sequence[Term]) -> float:
     """Held-out nats that parameters beyond an effect's first must earn."""
-    return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
+    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
 def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
@@ -88,16 +88,16 @@ def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice
     before = chosen.terms if chosen else ()
     paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
     certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(on, terms, chosen)
-    if chosen and all(t.kind == CLOCK for t in terms):  # nothing changes in the spectra
+    if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
-        spectral = [t for t in (*before, *terms) if t.kind != CLOCK]
+        spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(on, half, spectral, chosen) for half in (0, 1))
         gain = clock_gains(on.data, before)
         for train, test in ROUND_TRIP:
             gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
         gain += certain - price_of(fits[-1].terms) - paid
-    of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.kind == CLOCK]
+    of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
     return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice_cost=paid, strength=strength,
@@ -143,12 +143,13 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],
     halves differ by. k: of all parameters that the effect may have free; those that this variant leaves alone are 0,
     and nobody knows how far they lie from it. fitted: the hypothesis' terms; fits: those of its spectra on each half.
     """
-    hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    same = [next(t for t in terms if (t.identity, t.kind) == (term.identity, term.kind)) for terms in hypotheses]
+    hypotheses = [fitted] if term.shows_in == CLOCK or not fits else [f.terms for f in fits]
+    own = term.identity, term.shows_in
+    same = [next(t for t in terms if (t.identity, t.shows_in) == own) for terms in hypotheses]
     k = len(term.free)
     each = np.array([t.scaled(t.values)[:k] for t in same])
     strength = term.among_all(each.mean(axis=0))
-    if term.kind != MEAN:
+    if term.shows_in != MEAN:
         return strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength))
     covariance = np.zeros((k, k))
     for f, t in zip(fits, same, strict=True):
@@ -182,5 +183,5 @@ def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.nda
     if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[half].scaled
-    size = sum(len(t.free) for t in terms if t.kind == MEAN)
+    size = sum(len(t.free) for t in terms if t.shows_in == MEAN)
     return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -99,7 +99,7 @@ def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
     """Add a variant to the looks, where a look can judge it with what that says."""
     if random_of(variant.terms):
         looks.random.append(variant)
-    elif any(t.kind != MEAN or t.signature.commands_only for t in variant.terms):
+    elif any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         looks.unseen.append(variant)
     else:
         look = _mean_look(start, variant)
@@ -163,7 +163,7 @@ def _by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapp
         name, terms, cost = variant
         if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
             continue
-        if len(terms) == 1 or terms[0].kind == MEAN:
+        if len(terms) == 1 or terms[0].shows_in == MEAN:
             gain, strength = random_look(start.halves, random_of(terms)[0])
             looks.setdefault(name, []).append(RandomLook(gain - cost, strength, variant))
     return looks

@@ -52,5 +52,5 @@ def changes_the_loop(data: Data, selection: Selection) -> bool:
     law, chosen = data.study.controller, selection.chosen
     if law is None or chosen is None or len(selection.named) != 1:
         return False
-    terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
+    terms = [t for t in chosen.terms if t.shows_in == MEAN and not t.gate]
     return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.signature.loop_only for t in terms))

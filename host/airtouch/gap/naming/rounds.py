@@ -102,7 +102,7 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], befor
     for n, j in best.items():
         mine = [t for t in j.terms if t.name == n]
         own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
-        stretched = own.kind == MEAN and at_bound(own, j.strength).any()
+        stretched = own.shows_in == MEAN and at_bound(own, j.strength).any()
         rarity = scatter.evidence(n, j.strength, j.covariance, j.apart) if scatter else np.inf
         out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else rarity))
     return out

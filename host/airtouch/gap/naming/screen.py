@@ -61,7 +61,8 @@ def first_order(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
 
     beside: effects chosen before, free to give way a little.
     """
-    mean, other = ([t for t in some if t.kind == MEAN and not t.signature.commands_only] for some in (terms, beside))
+    mean, other = ([t for t in some if t.shows_in == MEAN and not t.signature.commands_only]
+                   for some in (terms, beside))
     tables = [[column(data, half.problem, t, i) for t in (*mean, *other) for i in range(len(t.free))]
               for half in halves]
     n = sum(len(t.free) for t in mean)

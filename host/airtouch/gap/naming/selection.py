@@ -59,7 +59,7 @@ class Candidate:
     @property
     def of_the_log(self) -> bool:
         """Whether the newest effect is one that the log has done to itself."""
-        return any(t.name == self.name and t.kind == CLOCK for t in self.terms)
+        return any(t.name == self.name and t.shows_in == CLOCK for t in self.terms)
 
 
 @dataclass(frozen=True)

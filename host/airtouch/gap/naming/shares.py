@@ -23,7 +23,7 @@ def _gain_without(on: Trial, steps: Sequence[Candidate], dropped: Candidate) -> 
     last, place = steps[-1], [s.name for s in steps].index(dropped.name)
     others = _others(last.terms, dropped.name)
     gain = clock_gains(on.data, others)
-    if all(t.kind == CLOCK for t in others):
+    if all(t.shows_in == CLOCK for t in others):
         return gain
     for train, test in ROUND_TRIP:
         known = _others(last.fits[train].terms, dropped.name)

@@ -78,4 +78,4 @@ def assumes(data: Data, terms: Sequence[Term]) -> bool:
 def changes_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether one of the mean effects, at its values, changes the control loop; False where no loop is modelled."""
     law = data.study.controller
-    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.kind == MEAN)
+    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.shows_in == MEAN)

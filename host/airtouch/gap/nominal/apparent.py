@@ -71,9 +71,9 @@ def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Appare
 def _error(data: Data, judged: Candidate) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
     term = strength_term(judged.terms)
-    if term.kind == CLOCK:
+    if term.shows_in == CLOCK:
         return np.zeros(len(judged.strength))
-    if term.kind == SPECTRUM:
+    if term.shows_in == SPECTRUM:
         return _error_of_random(data, judged, term)
     low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
     pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
@@ -84,6 +84,6 @@ def _error(data: Data, judged: Candidate) -> np.ndarray:
 def _error_of_random(data: Data, judged: Candidate, term: Term) -> np.ndarray:
     """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
-    same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
+    same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
     return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))

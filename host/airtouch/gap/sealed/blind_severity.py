@@ -87,7 +87,7 @@ def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Seq
 def log_ratio(data: Data, active: Active) -> float:
     """Log likelihood of the flights under an effect with these values over that under none."""
     term = term_of(active)
-    if term.kind == CLOCK:
+    if term.shows_in == CLOCK:
         return clock_gain(data, term)[1]
     whole = whole_of(data)
     return judge(data, whole, (term,)) - judge(data, whole, ())

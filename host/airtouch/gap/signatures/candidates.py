@@ -44,13 +44,13 @@ def gated_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
 def terms(name: str) -> list[Term]:
     """The hypotheses of one effect, one for each variant, with all free parameters at neutral."""
     effect = get(name)
-    signature, kind = signature_of(effect), kind_of(effect)
+    signature, where = signature_of(effect), shows_in(effect)
     neutral = effect.scaled(effect.values(), 0.0) | dict(signature.steady or {})
-    together = [Term(effect, kind, signature.free, neutral | dict(v)) for v in signature.variants]
-    return together + ([Term(effect, kind, (p,), neutral) for p in signature.free] if signature.alone_too else [])
+    together = [Term(effect, where, signature.free, neutral | dict(v)) for v in signature.variants]
+    return together + ([Term(effect, where, (p,), neutral) for p in signature.free] if signature.alone_too else [])
 
 
-def kind_of(effect: Effect) -> str:
+def shows_in(effect: Effect) -> str:
     """How an effect shows: as its record says; without one, in the spectrum where its force is random."""
     if effect.name not in SIGNATURES and _random(effect):
         return SPECTRUM
@@ -71,12 +71,12 @@ def strength_term(terms: Sequence[Term]) -> Term:
 
 def random_of(terms: Sequence[Term]) -> list[Term]:
     """The terms that add power, whose phase is not known."""
-    return [t for t in terms if t.kind == SPECTRUM]
+    return [t for t in terms if t.shows_in == SPECTRUM]
 
 
 def is_random(name: str) -> bool:
     """Whether an effect's strength is that of a random force, which no strength below 0 has."""
-    return name in SHAKES or name in EFFECTS and kind_of(get(name)) == SPECTRUM
+    return name in SHAKES or name in EFFECTS and shows_in(get(name)) == SPECTRUM
 
 
 def term_of(effect: NamedEffect) -> Term:

@@ -17,12 +17,12 @@ RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter w
 class Term:
     """An effect as a hypothesis: values of every parameter, those that are free (k of them), and how it shows.
 
-    kind: MEAN, SPECTRUM or CLOCK (`signature`); values: of every parameter, in its unit; companion: in the model
+    shows_in: MEAN, SPECTRUM or CLOCK (`signature`); values: of every parameter, in its unit; companion: in the model
     because another effect implies it, not reported itself; gate: (flight, from_s, to_s) when it acts, none: always.
     """
 
     effect: Effect
-    kind: str
+    shows_in: str
     free: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
     companion: bool = False
@@ -67,7 +67,7 @@ class Term:
     def shaped(self) -> "list[Term]":
         """The term in each shape that all the data may choose among; none where its effect has no shapes."""
         shape = self.signature.shape
-        if shape is None or self.kind != MEAN:
+        if shape is None or self.shows_in != MEAN:
             return []
         return [replace(self, values={**self.values, shape.parameter: v}) for v in shape.values]
 

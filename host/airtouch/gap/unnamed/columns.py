@@ -146,6 +146,6 @@ def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
         out[len(BASIS):] = False
-    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.kind == MEAN]):
+    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.shows_in == MEAN]):
         out[OF_COMMAND[yaw]] = False
     return out

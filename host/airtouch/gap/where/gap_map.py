@@ -165,7 +165,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    active = [t.active() for t in terms if t.kind == MEAN]
+    active = [t.active() for t in terms if t.shows_in == MEAN]
     gap = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
                study.vehicle)
     random = random_of(terms)
