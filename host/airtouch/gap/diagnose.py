@@ -17,7 +17,7 @@ from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import Flight
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.related import signs_not_shown
@@ -170,7 +170,7 @@ def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
 
 def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
     """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
-    seconds = sum(len(f) for f in flights) * 0.01
+    seconds = sum(len(f) for f in flights) * PERIOD_S
     keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 

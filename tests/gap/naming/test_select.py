@@ -17,7 +17,6 @@ from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
-from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
 from airtouch.gap.signals.channels import COUNT
@@ -162,7 +161,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
     selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
     for step in selection.steps:
-        beyond = study.scatter.unusual("downwash", size_of(step.gain / seconds(data), step.strength))
+        beyond = study.scatter.unusual("downwash", size_of(step.gain / data.seconds, step.strength))
         assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
 
 
@@ -195,7 +194,7 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     selection, data = select_from(flights, ("mass",), scattered(), ())
     wake, mass = selection.steps
     assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
-    least, share, gain = (size_of(nats / seconds(data), wake.strength) for nats in (mass.share, wake.share, wake.gain))
+    least, share, gain = (size_of(nats / data.seconds, wake.strength) for nats in (mass.share, wake.share, wake.gain))
 
     def names_where_nominal_flights_have(size):
         """FALSE_SHARE of the nominal flights have a larger one."""
@@ -243,7 +242,7 @@ def test_halves_share_no_block_and_leave_none_out():
 
 
 def test_flights_last_as_long_as_their_samples():
-    assert seconds(Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True)) == pytest.approx(40.0)
+    assert Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True).seconds == pytest.approx(40.0)
 
 
 def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():

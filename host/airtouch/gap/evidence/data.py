@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from airtouch.gap.flights.flight import Flight
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
@@ -38,6 +38,11 @@ class Data:
     quiet: list[np.ndarray] = field(default_factory=list)
     bridging: list[np.ndarray] = field(default_factory=list)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
+
+    @property
+    def seconds(self) -> float:
+        """How long the flights last together, s."""
+        return sum(len(f) for f in self.flights) * PERIOD_S
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]

@@ -4,7 +4,6 @@ White noise of the IMU and the rotors' lines in closed form; random forces by ru
 effect itself on the flight's signals with several seeds.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +22,7 @@ from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term, neutral_of, parameter_of
 from airtouch.simulation.body import rigid_body
+from airtouch.simulation.effects.effect import Gate
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
@@ -46,7 +46,7 @@ def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     return [{r: scale * v for r, v in f.items()} for f in of_unit]
 
 
-def _covered(data: Data, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
+def _covered(data: Data, i: int, regime: str, gate: Gate) -> np.ndarray:
     """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[regime], data.first[i][regime]

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
@@ -54,9 +53,4 @@ def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / seconds(data), strength)))
-
-
-def seconds(data: Data) -> float:
-    """How long the flights last together, s."""
-    return sum(len(f) for f in data.flights) * PERIOD_S
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / data.seconds, strength)))

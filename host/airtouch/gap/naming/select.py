@@ -15,7 +15,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.contradiction import contradicted
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
-from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, seconds
+from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
@@ -117,4 +117,4 @@ def nameless(on: Trial, chosen: Candidate | None) -> float:
 def _nominal_gain(data: Data) -> float:
     """Nats that a model without names gains in nominal flights as long as these."""
     scatter = data.study.scatter
-    return scatter.allowed(seconds(data), UNKNOWN_GAIN) if scatter else 0.0
+    return scatter.allowed(data.seconds, UNKNOWN_GAIN) if scatter else 0.0

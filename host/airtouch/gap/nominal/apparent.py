@@ -10,7 +10,6 @@ from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
-from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Candidate
@@ -46,9 +45,9 @@ def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     singles = round_of(on, all_candidates(without), None, thorough=True)
     passing = gated_effects(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
-    sizes = {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0 for n in GATED}
+    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
     return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                             nameless(on, None) / seconds(data), sizes)
+                             nameless(on, None) / data.seconds, sizes)
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:

@@ -14,11 +14,12 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import bursts
-from airtouch.gap.passing.stretches import LEAST_BLOCKS, Gate, each_block, stretches_of
+from airtouch.gap.passing.stretches import LEAST_BLOCKS, each_block, stretches_of
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Term
+from airtouch.simulation.effects.effect import Gate
 
 KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle is known to be overhead
 

@@ -14,12 +14,12 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, within
-from airtouch.gap.passing.stretches import Gate
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
+from airtouch.simulation.effects.effect import Gate
 
 PLACE = ("x_m", "y_m", "z_m")
 #: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
@@ -90,8 +90,7 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
 def _size(data: Data, gate: Gate) -> float:
     """Size (`size_of`) that what acts overhead seems to have within a gate."""
     wake = within(data, OVERHEAD, gate)
-    long = sum(len(f) for f in data.flights) * PERIOD_S
-    return size_of(wake.gain / long, wake.strength) if wake is not None else 0.0
+    return size_of(wake.gain / data.seconds, wake.strength) if wake is not None else 0.0
 
 
 def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:

@@ -14,6 +14,7 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures.term import Term
 from airtouch.logs.segments import KINDS
+from airtouch.simulation.effects.effect import Gate
 
 #: no number here has a source: all were chosen
 MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
@@ -25,7 +26,6 @@ STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
-Gate = tuple[tuple[str, float, float], ...]  #: stretches (flight, from_s, to_s)
 
 
 def stretches_of(data: Data, whole: BlockSet, off: np.ndarray, terms: Sequence[Term],

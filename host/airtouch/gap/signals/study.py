@@ -8,6 +8,7 @@ from airtouch.gap.signals.response import Response
 from airtouch.gap.signals.spectra import Floor
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation.effects import Active
+from airtouch.simulation.effects.effect import Gate
 from airtouch.vehicle import Vehicle
 
 
@@ -19,8 +20,8 @@ class Study:
     the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; unnamed_floor:
     scatter of nominal flights in a model without names (`unnamed.columns.UnnamedFloor`); nominal: how many nominal
     flights there are; scatter: how strong effects seem to be in them, None without any; relations: what was learned of
-    such flights (`relations.library.Library`), if anything; overhead: stretches (flight, from_s, to_s) in which another
-    vehicle is known to be overhead, none where nobody knows.
+    such flights (`relations.library.Library`), if anything; overhead: when another vehicle is known to be overhead,
+    none where nobody knows.
     """
 
     vehicle: Vehicle
@@ -32,7 +33,7 @@ class Study:
     nominal: int = 0
     scatter: Scatter | None = None
     relations: Any = None
-    overhead: tuple[tuple[str, float, float], ...] = ()
+    overhead: Gate = ()
 
     @property
     def simulated(self) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.signature import MEAN, Signature, free_of, signature_of
 from airtouch.simulation.effects import Active, Effect, Parameter
+from airtouch.simulation.effects.effect import Gate
 
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
 RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter whose default is neutral; chosen
@@ -18,7 +19,7 @@ class Term:
     """An effect as a hypothesis: values of every parameter, those that are free (k of them), and how it shows.
 
     shows_in: MEAN, SPECTRUM or CLOCK (`signature`); values: of every parameter, in its unit; companion: in the model
-    because another effect implies it, not reported itself; gate: (flight, from_s, to_s) when it acts, none: always.
+    because another effect implies it, not reported itself; gate: when it acts, none: always.
     """
 
     effect: Effect
@@ -26,7 +27,7 @@ class Term:
     free: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
     companion: bool = False
-    gate: tuple[tuple[str, float, float], ...] = ()
+    gate: Gate = ()
 
     @property
     def name(self) -> str:
