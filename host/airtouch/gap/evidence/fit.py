@@ -21,7 +21,7 @@ from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation.effects import Active
 
 #: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
@@ -38,15 +38,12 @@ CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelih
 class FittedTerms:
     """A hypothesis fitted.
 
-    terms: with their values; scaled (k,), covariance (k, k): of the free parameters of its mean effects; offsets (m,):
-    of channels of flights, in the order of `Problem.offsets`; gained: log likelihood of the blocks fitted.
+    terms: with their values; scaled (k,), covariance (k, k): of the free parameters of its mean effects.
     """
 
-    terms: tuple[Term, ...]
+    terms: Terms
     scaled: np.ndarray
     covariance: np.ndarray
-    offsets: np.ndarray
-    gained: float
 
     def place(self, term: Term) -> slice:
         """Where the parameters of one of its mean effects are among the k."""
@@ -74,22 +71,21 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     if random and mean and start is not None:
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
-    for _ in range(TURNS if random and mean else 1):
+    for _ in range(TURNS):
         solution = gauss_newton(problem, mean, x, random_power, prior, bool(random))
         x, active = solution.x, active_at(mean, solution.x)
-        command_power, cost = problem.loop_power(active, bool(random))
-        random_power = _random_power(problem, random, solution.values, active) if random else 0.0
+        if not random:
+            break
+        command_power, cost = problem.loop_power(active, True)
+        random_power = _random_power(problem, random, solution.values, active)
         level = problem.likelihood(solution.values, random_power + command_power) - cost
-        if level < last_level + SETTLED:
+        if not mean or level < last_level + SETTLED:
             break
         last_level = level
-    if random:
-        command_power, cost = problem.loop_power([*active, *(t.active() for t in random)], True)
-    gained = problem.likelihood(solution.values, random_power + command_power) - cost
-    return FittedTerms(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
+    return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
 
 
-def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> tuple[Term, ...]:
+def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> Terms:
     """The terms with their values: mean ones at scaled parameters x (k,), random ones as fitted, in their order."""
     out, place, fitted = [], 0, iter(random)
     for t in terms:

@@ -23,10 +23,9 @@ GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,) with their covariance (k, k), offsets (m,) of flights, and the residual (n,)."""
+    """Scaled parameters x (k,) with their covariance (k, k), and the residual (n,)."""
 
     x: np.ndarray
-    offsets: np.ndarray
     covariance: np.ndarray
     values: np.ndarray
 
@@ -78,7 +77,7 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
     low, high = limits(mean)
     x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.unit_offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.unit_offsets:
-        return MeanFit(x, offsets, covariance, problem.base)
+        return MeanFit(x, covariance, problem.base)
     posterior = _Posterior(problem, mean, added, spread, wide)
     now = posterior.at(x, offsets)
     slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
@@ -90,7 +89,7 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
         if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
             break
         stuck = gain == 0.0
-    return MeanFit(now.x, now.offsets, covariance, now.values)
+    return MeanFit(now.x, covariance, now.values)
 
 
 def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],

@@ -22,7 +22,7 @@ from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import OVERHEAD, SHAKES
+from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
 from airtouch.gap.signatures.term import Terms
 from airtouch.gap.unnamed.generic import generic_gain
 from airtouch.simulation import effects
@@ -71,7 +71,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
         return answer
     state = forward(search, passing)
     first = next(iter(state.named), "")
-    if first not in (*SHAKES, inference.likeliest):
+    if first not in (*ALWAYS_RANDOM, inference.likeliest):
         return answer
     return _by_replay(search, state, passing)
 
@@ -85,7 +85,7 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True
     most = inference.evidence.get(inference.likeliest, 0.0)
-    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
+    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in ALWAYS_RANDOM)
 
 
 def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:

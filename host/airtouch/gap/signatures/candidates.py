@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.result import NamedEffect
-from airtouch.gap.signatures.signature import COMPANIONS, GATED, SHAKES, SIGNATURES, SPECTRUM, signature_of
+from airtouch.gap.signatures.signature import ALWAYS_RANDOM, COMPANIONS, GATED, SIGNATURES, SPECTRUM, signature_of
 from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
@@ -23,7 +23,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     for name, signature in SIGNATURES.items():
         if name in out and signature.steady is not None:
             random: list[Terms] = [(*v, random_part_of(name)) for v in out[name]]
-            out[name] = random if name in SHAKES else out[name] + random
+            out[name] = random if name in ALWAYS_RANDOM else out[name] + random
     for name, companion in COMPANIONS.items():
         if name in out and companion not in without:
             beside = [replace(t, companion=True) for t in terms(companion)]
@@ -65,8 +65,8 @@ def random_part_of(name: str) -> Term:
 
 
 def strength_term(terms: Sequence[Term]) -> Term:
-    """The term whose strength is that of the effect: the random part of an effect that SHAKES, else the first."""
-    return terms[-1] if terms[0].name in SHAKES else terms[0]
+    """The term whose strength is that of the effect: the random part of one that is ALWAYS_RANDOM, else the first."""
+    return terms[-1] if terms[0].name in ALWAYS_RANDOM else terms[0]
 
 
 def random_of(terms: Sequence[Term]) -> list[Term]:
@@ -76,7 +76,7 @@ def random_of(terms: Sequence[Term]) -> list[Term]:
 
 def is_random(name: str) -> bool:
     """Whether an effect's strength is that of a random force, which no strength below 0 has."""
-    return name in SHAKES or name in EFFECTS and shows_in(get(name)) == SPECTRUM
+    return name in ALWAYS_RANDOM or name in EFFECTS and shows_in(get(name)) == SPECTRUM
 
 
 def term_of(effect: NamedEffect) -> Term:

@@ -160,7 +160,7 @@ SIGNATURES: dict[str, Signature] = {
 #: effects that may come and go within a flight
 GATED = tuple(name for name, s in SIGNATURES.items() if s.comes_and_goes)
 #: effects that are only tried with their random part
-SHAKES = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
+ALWAYS_RANDOM = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
 #: effects with a variant that has another effect beside it, and that other
 COMPANIONS = {name: s.companion for name, s in SIGNATURES.items() if s.companion}
 
