@@ -40,7 +40,7 @@ def test_where_nothing_is_nothing_is_found():
     assert selection.steps == () and selection.chosen is None and selection.explained
     assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least)
     assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
-    assert selection.free_before == selection.free_after < 12.0
+    assert selection.nameless_alone == selection.nameless_beside < 12.0
     assert not any(j.full for j in selection.singles.values())
     assert not selection.assumed and selection.nominal_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
@@ -65,7 +65,7 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert 0.5 * true < np.sqrt(bias.variance[2]) < 4.0 * true
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
-    assert selection.free_before > 0.9 * step.gain and selection.free_after < 12.0 and selection.explained
+    assert selection.nameless_alone > 0.9 * step.gain and selection.nameless_beside < 12.0 and selection.explained
     assert selection.chosen.terms == step.terms
 
 
@@ -288,7 +288,8 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0
     assert selection.contradicted == (0.0, ""), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
-    exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,), free_after=1.0)
+    exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,),
+                    nameless_beside=1.0)
     assert exact.unlike == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
     assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
@@ -323,7 +324,7 @@ def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_our
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
-    assert recorded.free_before < 12.0 and exact.free_before > nominal.free_before + 100.0
+    assert recorded.nameless_alone < 12.0 and exact.nameless_alone > nominal.nameless_alone + 100.0
     other = replace(exact, nominal=6, steps=(Candidate("mass", (), 1000.0),))
     same_models = replace(other, same_models=True)
     assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)

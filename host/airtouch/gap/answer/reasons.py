@@ -46,7 +46,7 @@ def shortfall(selection: Selection, judged: Candidate) -> str:
     if selection.chosen:
         return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+    return f"gains {judged.gain:.0f} of the {selection.nameless_alone:.0f} nats that a model without names gains"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -68,7 +68,7 @@ def against(selection: Selection) -> str:
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.least_left:.0f} may be chance")
-    return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
+    return (f"a model without names gains {max(selection.nameless_beside, 0.0):.0f} nats beside it, up to "
             f"{selection.allowed:.0f} may be left")
 
 
@@ -85,15 +85,15 @@ def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not selection.explained:
         return "the gap as a whole is at its floor"
-    return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} "
+    return (f"a model without names adds {max(selection.nameless_beside, 0.0):.0f} nats, up to {selection.allowed:.0f} "
             "may be left")
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.chosen is None:
-        return (f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
-                "left")
+        return (f"a model without names gains {selection.nameless_beside:.0f} nats, up to {selection.allowed:.0f} "
+                "may be left")
     first = selection.named[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
     return f"{first} gains {gain:.0f} nats over it"

@@ -38,7 +38,7 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
 
 def without_names(selection: Selection) -> Selection:
     """The same flights with no effect named; what a model without names gains is that of none."""
-    return replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+    return replace(selection, steps=(), nameless_beside=selection.nameless_alone, assumed=False)
 
 
 def comes_and_goes(selection: Selection) -> bool:

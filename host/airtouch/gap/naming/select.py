@@ -104,7 +104,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
         state.singles, state.steps, before, after, on.parts, state.least, study.nominal,
         assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
         nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
-        of_times=clock_left(on.data, last))
+        left_of_times=clock_left(on.data, last))
     return replace(selection, contradicted=contradicted(on, selection.chosen)) if study.simulated else selection
 
 

@@ -66,27 +66,31 @@ class Candidate:
 class Selection:
     """The result of a selection of effects; gains are in held-out nats.
 
-    singles: the best variant of every candidate; steps: effects added one after another. free_before, free_after: gain
-    of the nameless model over no effect and over the last step; of_times: of the latter, what the logged times hold;
-    contradicted: what the effects named lose in cells where they say what the flights do not show, and the worst of
-    these cells. parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
-    assumed: whether a chosen effect is random, or changes the loop in recorded flights.
+    singles: the best variant of every candidate; steps: effects added one after another. nameless_alone,
+    nameless_beside: gain of a model without names over no effect and over the last step; left_of_times: of the latter,
+    what the logged times hold; contradicted: what the effects named lose in cells where they say what the flights do
+    not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: evidence
+    that each candidate needs as the first; inference: what named the effects, where the relations of signals did.
+
+    Of the study: nominal: how many flights gave the floor; nominal_gain: what a model without names gains in nominal
+    flights as long as these; assumed: whether a chosen effect is random, or changes the loop in recorded flights;
+    simulated, same_models: as the study has them.
     """
 
     singles: Mapping[str, Candidate]
     steps: tuple[Candidate, ...]
-    free_before: float
-    free_after: float
+    nameless_alone: float
+    nameless_beside: float
     parts: tuple[BlockSet, BlockSet]
-    least: Mapping[str, float]  #: evidence that each candidate needs as the first
+    least: Mapping[str, float]
     nominal: int
     assumed: bool
-    nominal_gain: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+    nominal_gain: float
     simulated: bool = False
-    same_models: bool = False  #: whether the flights come from the models that effects are fitted with
-    of_times: float = 0.0
+    same_models: bool = False
+    left_of_times: float = 0.0
     contradicted: tuple[float, str] = (0.0, "")
-    inference: Inference | None = None  #: what named the effects, where the relations of signals did
+    inference: Inference | None = None
 
     @property
     def whole(self) -> Candidate | None:
@@ -123,7 +127,7 @@ class Selection:
         if self.inference is not None:
             return self.inference.limit
         if self.nominal < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.nominal_gain)
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless_alone, self.nominal_gain)
         gained = self.whole.gain if self.whole else 0.0
         share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.same_models else 1.0)
         return max(self.least_left, share * gained, 0.0 if self.simulated else self.nominal_gain)
@@ -136,7 +140,7 @@ class Selection:
     @property
     def unlike(self) -> float:
         """How much speaks against the effects named, of what may: what is left, or what they lose; 1 is the limit."""
-        return max(float(np.logaddexp(self.free_after, 0.0)) / self.allowed, self.loss)
+        return max(float(np.logaddexp(self.nameless_beside, 0.0)) / self.allowed, self.loss)
 
     @property
     def loss(self) -> float:
