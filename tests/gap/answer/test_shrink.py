@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.shrink import LEAST_JITTER_S, share_closed, shrink_of_jitter
+from airtouch.gap.answer.shrink import share_closed, shrink_of_jitter
+from airtouch.gap.evidence.clock import LEAST_CLOCK_S
 
 
 @pytest.mark.parametrize(("before", "after", "share"), [
@@ -38,4 +39,4 @@ def test_what_the_halves_differ_by_stays():
 
 
 def test_the_floor_of_a_jitter_is_never_that_of_perfect_times():
-    assert shrink_of_jitter(jittered([0.002] * 8)).before == pytest.approx(0.002 / LEAST_JITTER_S)
+    assert shrink_of_jitter(jittered([0.002] * 8)).before == pytest.approx(0.002 / LEAST_CLOCK_S)

@@ -31,22 +31,22 @@ def nearest(selection: Selection) -> list[dict[str, str]]:
     return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
 
 
-def shortfall(selection: Selection, judged: Candidate) -> str:
+def shortfall(selection: Selection, candidate: Candidate) -> str:
     """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
-        return shortfall_by_relations(selection, selection.inference, judged.name)
-    least = selection.least[judged.name]
-    if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
+        return shortfall_by_relations(selection, selection.inference, candidate.name)
+    least = selection.least[candidate.name]
+    if candidate.name in {s.name for s in selection.named}:  # the best there is, and not enough
         return against(selection)
-    if judged.gain < least:
-        return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
-    if judged.evidence < least:
-        return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
-                f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+    if candidate.gain < least:
+        return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
+    if candidate.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
+                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
     if selection.chosen:
-        return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
+        return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {judged.gain:.0f} of the {selection.nameless_alone:.0f} nats that a model without names gains"
+    return f"gains {candidate.gain:.0f} of the {selection.nameless_alone:.0f} nats that a model without names gains"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS
+from airtouch.gap.evidence.clock import LEAST_CLOCK_S
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
@@ -30,7 +31,6 @@ SEED = 0  #: of the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
 LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
 LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
-LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least; chosen
 JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
 
 
@@ -68,17 +68,17 @@ def gap_of(data: Data, parts: Sequence[BlockSet], named: Candidate | None) -> Ga
     return Gap(cells, calm, before, shrink_of_jitter(data) if _only_jitter(named) else _shrink(before, calm + after))
 
 
-def shrink_of(data: Data, parts: Sequence[BlockSet], judged: Candidate, gap: Gap) -> Shrink:
+def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:
     """How far another hypothesis than the effects named closes the gap of two halves."""
-    if _only_jitter(judged):
+    if _only_jitter(candidate):
         return shrink_of_jitter(data)
-    return _shrink(gap.before, gap.calm + _energies(data, parts, _terms(judged), gap.cells))
+    return _shrink(gap.before, gap.calm + _energies(data, parts, _terms(candidate), gap.cells))
 
 
-def _only_jitter(judged: Candidate | None) -> bool:
+def _only_jitter(candidate: Candidate | None) -> bool:
     """Whether a hypothesis moves the logged times and does nothing else."""
-    return judged is not None and bool(judged.terms) \
-        and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in judged.terms)
+    return candidate is not None and bool(candidate.terms) \
+        and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in candidate.terms)
 
 
 def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:
@@ -95,7 +95,7 @@ def shrink_of_jitter(data: Data) -> Shrink:
     Gap is the rms of the logged times around regular ones, over that of nominal flights. After: the floor and what the
     halves differ by.
     """
-    floor = max(data.study.floor.clock_s, LEAST_JITTER_S)
+    floor = max(data.study.floor.clock_s, LEAST_CLOCK_S)
     rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
                                                  np.array_split(f.clock_s, JITTER_PIECES)[half::2]]) ** 2)))
            for half in (0, 1)]
@@ -125,12 +125,12 @@ def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def nearer(data: Data, parts: Sequence[BlockSet], judged: Candidate | None, gap: Gap) -> bool:
+def nearer(data: Data, parts: Sequence[BlockSet], candidate: Candidate | None, gap: Gap) -> bool:
     """Whether the cells of a gap lie nearer to the floor with a hypothesis than without, on held-out blocks.
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
     """
-    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (((), ()), _terms(judged)))
+    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (((), ()), _terms(candidate)))
     return within < without
 
 
@@ -144,9 +144,9 @@ def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[T
     return float(np.abs(total - count).sum())
 
 
-def _terms(judged: Candidate | None) -> Sequence[Sequence[Term]]:
+def _terms(candidate: Candidate | None) -> Sequence[Sequence[Term]]:
     """The terms of a hypothesis as fitted to each half; none where there is no hypothesis."""
-    return [f.terms for f in judged.fits] if judged and judged.fits else ((), ())
+    return [f.terms for f in candidate.fits] if candidate and candidate.fits else ((), ())
 
 
 def _energies(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
