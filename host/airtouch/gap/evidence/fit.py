@@ -4,7 +4,6 @@ Mean effects are fitted by Gauss-Newton on the whitened spectra, random ones by 
 strength; what differs from flight to flight (offsets) has a prior.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,7 +20,7 @@ from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
-from airtouch.gap.signatures.term import Term, Terms
+from airtouch.gap.signatures.term import Term, Terms, mean_places
 from airtouch.simulation.effects import Active
 
 #: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
@@ -47,9 +46,7 @@ class FittedTerms:
 
     def place(self, term: Term) -> slice:
         """Where the parameters of one of its mean effects are among the k."""
-        before = itertools.takewhile(lambda t: t is not term, self.terms)
-        first = sum(len(t.free) for t in before if t.shows_in == MEAN)
-        return slice(first, first + len(term.free))
+        return next(place for t, place in mean_places(self.terms) if t is term)
 
 
 def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
@@ -87,14 +84,8 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
 
 def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> Terms:
     """The terms with their values: mean ones at scaled parameters x (k,), random ones as fitted, in their order."""
-    out, place, fitted = [], 0, iter(random)
-    for t in terms:
-        if t.shows_in == MEAN:
-            out.append(t.fitted(x[place:place + len(t.free)]))
-            place += len(t.free)
-        else:
-            out.append(next(fitted) if t.shows_in == SPECTRUM else t)
-    return tuple(out)
+    fitted = {MEAN: iter([t.fitted(x[own]) for t, own in mean_places(terms)]), SPECTRUM: iter(random)}
+    return tuple(next(fitted[t.shows_in]) if t.shows_in in fitted else t for t in terms)
 
 
 def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False) -> float:

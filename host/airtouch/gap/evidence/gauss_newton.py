@@ -9,7 +9,7 @@ import numpy as np
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, mean_places
 
 ITERATIONS = 8  #: steps at most; chosen
 ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
@@ -120,12 +120,9 @@ def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -
     size = sum(len(t.free) for t in mean)
     known = np.full(size, np.nan) if known is None else known
     x = np.where(np.isnan(known), CLOSE, known)
-    place = 0
-    for t in mean:
-        own = range(place, place + len(t.free))
-        place += len(t.free)
+    for t, own in mean_places(mean):
         if t.signature.loop_only and len(problem.commands) and np.isnan(known[own]).all():
-            x = _best_on_grid(problem, mean, x, own)
+            x = _best_on_grid(problem, mean, x, range(own.start, own.stop))
     return x
 
 

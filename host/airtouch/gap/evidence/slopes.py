@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, mean_places
 from airtouch.simulation.effects import Active
 
 STEP = 0.02  #: change of a scaled parameter over which slopes are taken; chosen
@@ -14,13 +14,7 @@ FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slop
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     """Mean effects at scaled parameters x (k,), without those that are neutral there."""
-    out, place = [], 0
-    for t in mean:
-        own = x[place:place + len(t.free)]
-        place += len(t.free)
-        if own.any() or t.acts_when_neutral:
-            out.append(t.active(own))
-    return out
+    return [t.active(x[own]) for t, own in mean_places(mean) if x[own].any() or t.acts_when_neutral]
 
 
 class SpectraSlopes:

@@ -1,6 +1,7 @@
 """A term of a hypothesis: one effect with its parameters, scaled so that 0 is neutral and 1 a natural step."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -130,6 +131,13 @@ class Term:
 
 
 Terms = tuple[Term, ...]  #: a hypothesis: effects that act together, each with its random part and its companion
+
+
+def mean_places(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
+    """The mean effects among terms, each with the place of its free parameters among those of all of them."""
+    mean = [t for t in terms if t.shows_in == MEAN]
+    ends = itertools.accumulate(len(t.free) for t in mean)
+    return [(t, slice(end - len(t.free), end)) for t, end in zip(mean, ends, strict=True)]
 
 def parameter_of(effect: Effect, name: str) -> Parameter:
     """The parameter of an effect with a name."""
