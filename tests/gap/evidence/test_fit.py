@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge
 from airtouch.gap.evidence.problem import whole_of
@@ -32,7 +33,7 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
     chosen = judging.crossed(on, "controller_gain", (gain,), None, 0.0)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
-                              for train, test in judging.ROUND_TRIP) for wide in (False, True))
+                              for train, test in problem.ROUND_TRIP) for wide in (False, True))
     assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
     both = judging.crossed(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)

@@ -23,6 +23,7 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
+ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
 DOUBT = 0.25

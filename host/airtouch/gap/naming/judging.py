@@ -11,8 +11,7 @@ import numpy as np
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
-from airtouch.gap.evidence.problem import BlockSet
-from airtouch.gap.naming.screen import ROUND_TRIP
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term

@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data, spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, left_over, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import BlockSet, Problem
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -20,7 +20,6 @@ STEP = 0.25  #: of a parameter's natural step, at which the change is taken; cho
 ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen
 NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none; chosen, far above rounding
 UNBOUNDED = 1e6  #: scaled parameter up to which the effects beside may give way: any
-ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 
 
 @dataclass(frozen=True)

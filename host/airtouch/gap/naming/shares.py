@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import fit, mean_parameters
-from airtouch.gap.naming.judging import ROUND_TRIP, Trial, gain_of, price_of
+from airtouch.gap.evidence.problem import ROUND_TRIP
+from airtouch.gap.naming.judging import Trial, gain_of, price_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Term

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import BlockSet, whole_of
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, UnnamedFloor, answerable, no_floor
@@ -30,7 +30,7 @@ def generic_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence
     """
     floor = data.study.unnamed_floor or no_floor()
     linear = power = 0.0
-    for train, test in ((0, 1), (1, 0)):
+    for train, test in ROUND_TRIP:
         trained, held_out = (HalfResiduals(data, parts[half], terms[train]) for half in (train, test))
         fitted = np.array([coefficients(trained, channel, floor, answerable(data, terms[train], channel))
                            for channel in range(CHANNELS)])
@@ -47,7 +47,7 @@ def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
     halves = [HalfResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
     return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
-               for train, test in ((0, 1), (1, 0)))
+               for train, test in ROUND_TRIP)
 
 
 def unnamed_floor(data: Data) -> UnnamedFloor:
