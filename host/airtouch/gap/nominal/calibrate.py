@@ -126,11 +126,10 @@ def _scaled(term: Term, calibration: Sequence[Active]) -> np.ndarray:
 
 def _quantities(fitted: FittedTerms) -> dict[str, Quantity]:
     """The calibrated parameters with unit and interval, by effect, rotor and parameter: `weak_motor 3 thrust_loss`."""
-    out, first = {}, 0
+    out = {}
     for term in fitted.terms:
-        part = slice(first, first + len(term.free))
-        first = part.stop
-        rotor = f" {int(term.values['rotor'])}" if term.name == "weak_motor" else ""
+        part = fitted.place(term)
+        rotor = "" if term.identity[1] is None else f" {term.identity[1]:.0f}"
         quantities = term.quantities(fitted.scaled[part], fitted.covariance[part, part])
         out |= {f"{term.name}{rotor} {p}": q for p, q in quantities.items() if p in term.free}
     return out
