@@ -25,8 +25,8 @@ CHANNELS = 9  #: that are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
 TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
 LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
-LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
-WIDEST = len(BASIS) + LOOP
+LOOP_COLUMNS = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
+WIDEST = len(BASIS) + LOOP_COLUMNS
 NOTHING = 1e-9  #: variance that a coefficient or a power without scatter is given; chosen
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
@@ -103,7 +103,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
 
 
 def _loop_columns(data: Data) -> list[np.ndarray]:
-    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight.
+    """Spectra (blocks, bins, 2, LOOP_COLUMNS) in the air of the torque that the model makes of the commands, by flight.
 
     Each band's alone, weighted as what is left of the torque is; made once.
     """
@@ -111,7 +111,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
         f, response = frequencies(AIR), data.study.response
         bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
         bands[:FIRST_BIN] = False
-        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP)
+        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP_COLUMNS)
         out = []
         for i, torque in enumerate(commanded(data)):
             weighted = torque if response is None else response.weighted(data.quiet[i], torque)
@@ -128,7 +128,7 @@ def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.nda
     for i, r, chosen in part.pieces:
         columns = spectra[i][axis][r][chosen]
         if channel in ROLL_PITCH:
-            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
+            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP_COLUMNS))
             columns = np.concatenate([columns, loop], axis=2)
         rows.append(columns[:, problem.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
