@@ -190,7 +190,7 @@ class Problem:
 
 def _beside_edges(active: Sequence[Active]) -> list[Active]:
     """The effects that show beside edges: in the replay, or in the loop that is part of it."""
-    return [a for a in active if signature_of(a.effect).loop_only or not signature_of(a.effect).commands_only]
+    return [a for a in active if not signature_of(a.effect).edges_only]
 
 
 def _counted(slow: bool) -> dict[str, np.ndarray]:

@@ -90,6 +90,11 @@ class Signature:
         return self.commands_only and not self.at_edges
 
     @property
+    def edges_only(self) -> bool:
+        """Whether what a flight does at edges alone shows it."""
+        return self.commands_only and self.at_edges
+
+    @property
     def loses_rows(self) -> bool:
         """Whether it takes rows from the log; what else shows in the logged times moves them."""
         return self.bursts is not None
