@@ -255,10 +255,10 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
     for candidate in beside.values():
         assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
         assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
-    dearer = judging.crossed(on, "mass", mass.terms, None, 0.5)
+    dearer = judging.cross_validated(on, "mass", mass.terms, None, 0.5)
     assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice_cost == 0.5
     motor = candidates_of(["weak_motor"])["weak_motor"][0]
-    both = judging.crossed(on, "weak_motor", motor, dearer, 0.25)
+    both = judging.cross_validated(on, "weak_motor", motor, dearer, 0.25)
     assert both.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)

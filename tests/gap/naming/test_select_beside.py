@@ -117,7 +117,7 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     _, *variants = all_candidates()["controller_gain"]
     assert together.strength.shape == together.variance.shape == (len(variants),) == (4,)
     for i, terms in enumerate(variants):
-        single = judging.crossed(on, "controller_gain", terms, None, np.log(len(variants)))
+        single = judging.cross_validated(on, "controller_gain", terms, None, np.log(len(variants)))
         assert together.strength[i] == single.strength[i] and together.variance[i] == single.variance[i]
         assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.strength, i).any()
     assert together.gain < judging.FIRST_GAIN, "a nominal flight"
@@ -162,7 +162,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
     data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
-    packet_loss = judging.crossed(on, "packet_loss", (term,), None, 0.0)
+    packet_loss = judging.cross_validated(on, "packet_loss", (term,), None, 0.0)
     assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
     assert nameless(on, None) - nameless(on, packet_loss) == pytest.approx(packet_loss.gain)
 
@@ -179,14 +179,14 @@ def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcome
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
-    late = judging.crossed(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
-    both = judging.crossed(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
+    late = judging.cross_validated(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
+    both = judging.cross_validated(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
     assert sure - unsure > 5.0 and late.gained_while_certain == 0.0 and both.choice_cost == 0.5
     assert both.gained_while_certain == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
-    third = judging.crossed(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
+    third = judging.cross_validated(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
     assert third.gained_while_certain == both.gained_while_certain, "paid once"
 
 

@@ -75,8 +75,7 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def crossed(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
-            ) -> Candidate:
+def cross_validated(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs. Its gain is

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, crossed
+from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, cross_validated
 from airtouch.gap.naming.looks import PricedVariant, first_looks, random_looks, start_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.second_process import shared
@@ -37,7 +37,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
     waiting = [*looks.unseen, *random, *means_to_fit]
-    fitted = shared(lambda v: crossed(on, v.name, v.terms, chosen, v.choice_cost), waiting)
+    fitted = shared(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
     best = _best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
