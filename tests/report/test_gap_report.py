@@ -16,7 +16,7 @@ from airtouch.gap.answer.pictures import of_measurement
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
@@ -151,7 +151,7 @@ def test_the_report_computes_nothing():
 
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_any_effect_can_be_shown(pushed_flights, name):
-    term = term_of(Found(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
+    term = term_of(NamedEffect(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
     assert dict(term.values) == EFFECTS[name].values()
     study, flight = declared_study(VEHICLE, ()), ready(pushed_flights[0], VEHICLE)
     cells_map = gap_map(study, [flight], terms=[term])

@@ -7,16 +7,16 @@ Where each decision is made; a folder imports only those above it:
 
 - `flights`, a log made ready: a `flight`, where it has the `fitness`, on a regular `clock`, without `missing` samples
   and moments of `contact`; its `attitude` and `heights`, by `filters`; its `blocks`; how hard it is flown: `hardness`.
-- `signatures`, what is known of each effect: its `signature` says how it is fitted, as a `term` of a hypothesis, of
-  which `candidates` has all; names `alike`; `nominal_scatter` says how strong it seems where there is none, by
-  `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how
-  simulated flights with it are drawn.
+- `signatures`, what is known of each effect: its `signature` says how it is fitted and where it shows, as a `term` of a
+  hypothesis, of which `candidates` has all; names `alike`; `scatter` says how strong it seems where there is none, by
+  `scatter_estimates` (a `posterior` of the baseline flights), `random_draws` how simulated flights with it are drawn.
 - `edges`, what flights do at the edges of a platform: the `edge_response`, and what `edge_effects` add to it.
 - `loop`, the closed loop: `axis_plant` and `controller`, their transfer functions `loop_model`; what noise makes of the
   commands, `noise_spectra`, and steps of a set-point, `set_point_steps`; how the vehicle turns upon a command,
   `command_response`, and what part of its torque that is, `torque_share`; what a torque from outside leaves:
   `disturbed`; `command_spectra` of flights, from which `identify` finds a `closed_loop`.
-- `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
+- `signals`, what is compared: `channels`, `spectra`, `command_view`, with what: a `study`; what raises the floor:
+  `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, of which a `problem` has the blocks in one flat array
   (their `layout`, their `cells`), its `likelihood`; `fit` with `gauss_newton`, `slopes`, `least_squares`,
   `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
@@ -34,16 +34,16 @@ Where each decision is made; a folder imports only those above it:
 - `naming`, which effect: `looks` are first looks by a `screen`, `judging` fits on one half and judges on the other,
   `rounds` do both for every candidate; `forward` adds effects one by one, each by its `thresholds`, with the `shares`
   that they add; `passing_effect` is tried first; `select` puts these together, unless the relations of signals name the
-  effects: `related`; `selection` holds what was found, with its probabilities; `contradiction` by the flights;
+  effects: `related`; `selection` has the result; `contradiction` by the flights;
   `recorded`: when recorded flights may name an effect.
 - `nominal`, what the baseline flights say: their `consistency`; `build_study` measures floor, loop and response,
   `calibrate` fits the vehicle; `apparent` strengths of effects where there are none.
 - `where` the gap lies: `band_sums` of a `filter_bank`, in `regimes` of a flight; of these `cell_tables`, a `gap_map`
   and its `summary`, a cell in words: `cell_words`; beside it `rotor_speeds` and `command_power`; without a diagnosis:
   `measure`.
-- `answer`: the verdict and the `ranking`, with the `reasons` against the others; the `named_effects` with their
-  intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to fly next:
-  `advice`; `words`, `pictures`.
+- `answer`: the verdict and the `ranking` by `probabilities`, with the `reasons` against the others; the
+  `named_effects` with their intervals; how far: `shrink`, against `controls`; what stays open: `unexplained`; what to
+  fly next: `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: the `hover_pattern` of a flight, `hover_hypotheses` drawn from `priors`, their
   evidence by `hover_balance`, what it says: `hover_posterior`; `balance_result`.
 - `sealed`, withheld effects: a set is made by `blind`, with effects as strong as `blind_severity` says, its `blind_key`

@@ -151,7 +151,7 @@ def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
 def test_after_an_effect_that_is_right_little_is_left(name, values, force, band):
     term = terms(name)[0]
     true_term = term.fitted(np.zeros(len(term.free)))
-    true_term = type(term)(term.effect, term.kind, term.free, {**true_term.values, **values})
+    true_term = type(term)(term.effect, term.shows_in, term.free, {**true_term.values, **values})
     c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[true_term]), "force_x", band)
     assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
 
@@ -160,7 +160,7 @@ def test_of_several_effects_each_cell_names_the_one_that_takes_most():
     chosen = []
     for name, values in (("imu_bias", {"acc_x": 0.9}), ("imu_noise", {"factor": 4.0})):
         term = terms(name)[0]
-        chosen.append(type(term)(term.effect, term.kind, term.free, {**term.values, **values}))
+        chosen.append(type(term)(term.effect, term.shows_in, term.free, {**term.values, **values}))
     force = noise(40.0, 4.0 * NOISE, 3) + np.array([0.9, 0.0, 0.0])
     gap_map = maps.gap_map(study(), [flight(40.0, force)], terms=chosen)
     assert cell(gap_map, "force_x", 0).by == "imu_bias" and cell(gap_map, "force_z", 5).by == "imu_noise"

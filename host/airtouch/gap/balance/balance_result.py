@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 import airtouch.gap.measure as measure
-from airtouch.gap.answer.advice import advice as advice_text
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.pictures import of as pictures_of
 from airtouch.gap.answer.shrink import Shrink
@@ -31,7 +30,7 @@ from airtouch.gap.balance.hover_posterior import (
 )
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, Quantity, Ranked
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, Quantity, RankedCandidate
 from airtouch.gap.where import summary
 from airtouch.vehicle import Vehicle
 
@@ -79,7 +78,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
         control=_control(total, first, shrink) if verdict == "effect" else {},
-        advice=advice_text(steps), notes=_notes(voltage, notes),
+        notes=_notes(voltage, notes),
         cannot=measure.cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -128,7 +127,7 @@ def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink
             "shrink": shrink[wrong].share.plain()}
 
 
-def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[Ranked]:
+def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     chance = dict(total)
     weight = OFF_CENTRE if first == WEIGHT else WEIGHT
@@ -138,9 +137,9 @@ def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink
     if chance.get(weight) == 0.0:
         why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
     best = max(chance.values())
-    return sorted((Ranked(n, p, shrink[n].share,
-                          "" if n == first
-                          else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
+    return sorted((RankedCandidate(n, p, shrink[n].share,
+                                   "" if n == first
+                                   else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
                    for n, p in chance.items()), key=lambda r: (r.name != first, -r.probability))
 
 

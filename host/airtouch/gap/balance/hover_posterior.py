@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.balance.hover_hypotheses import Hypothesis
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.simulation.effects import Parameter, get
 
@@ -73,15 +73,15 @@ def alike(effects: Iterable[str], total: Mapping[str, float], first: str, probab
     return tuple(dict.fromkeys(sets))
 
 
-def effects_of(likeliest: Likeliest) -> list[Found]:
+def effects_of(likeliest: Likeliest) -> list[NamedEffect]:
     """The effects, posterior means with 90 % intervals; a weight's com_offset only where its side is sure."""
     out = []
     for name, drawn in likeliest.hypothesis.effects:
         alone = len(likeliest.hypothesis.effects) == 1
         if name == OFF_CENTRE and not alone and not any(side_is_sure(v, likeliest.weight) for v in drawn.values()):
             continue
-        out.append(Found(name, {p.name: _quantity(drawn[p.name], likeliest.weight, p)
-                                for p in get(name).parameters if p.name in drawn}))
+        out.append(NamedEffect(name, {p.name: _quantity(drawn[p.name], likeliest.weight, p)
+                                      for p in get(name).parameters if p.name in drawn}))
     return out
 
 

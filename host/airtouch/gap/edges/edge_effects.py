@@ -13,6 +13,7 @@ from airtouch.gap.edges.edge_response import AFTER, BEFORE, COUNT, KINDS, EdgeFl
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.logs.segments import PLATFORM_STEP_M
@@ -21,7 +22,6 @@ from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges are simulated
 #: speed (m/s) and seconds of a crossing where a log does not show them; chosen
 USUAL_MPS, USUAL_S = 0.3, 2.5
 SPEEDS_MPS, LENGTHS_M = (0.1, 0.9), (0.4, 2.0)  #: of simulated crossings: what such missions can fly; chosen
@@ -60,7 +60,7 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
     """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
     total = np.zeros(COUNT)
     for a in active:
-        if a.effect.name not in SHOWN:
+        if not signature_of(a.effect).at_edges:
             continue
         term = terms(a.effect.name)[0]
         for name, amount in zip(term.free, term.scaled(a.values), strict=True):

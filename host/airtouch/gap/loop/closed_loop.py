@@ -45,8 +45,6 @@ LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "
 PLANTS = 500  #: hypotheses whose plant is cached, chosen by memory: about 2 kB each
 LEAST_NOISE_RADPS = 1e-9  #: rad/s, of a gyro that another is divided by
 LOOPS = 1000  #: spectra of an axis that are cached, chosen by memory: about 10 kB each
-#: effects that change the commands alone: replayed motor commands hold nothing of them
-COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
 
 
 class Hypothesis(NamedTuple):

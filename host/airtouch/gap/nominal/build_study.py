@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.disturbed import disturbed
@@ -15,6 +14,7 @@ from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
+from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle

@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.signals.study import Study
 from airtouch.robust import deviation
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle

@@ -9,11 +9,12 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge, left_over
 from airtouch.gap.evidence.layout import AirBlocks
-from airtouch.gap.evidence.problem import Part, problem_of
+from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures.term import Term
 from airtouch.logs.segments import KINDS
+from airtouch.simulation.effects.effect import Gate
 
 #: no number here has a source: all were chosen
 MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
@@ -25,10 +26,9 @@ STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
-Gate = tuple[tuple[str, float, float], ...]  #: stretches (flight, from_s, to_s)
 
 
-def stretches_of(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term],
+def stretches_of(data: Data, whole: BlockSet, off: np.ndarray, terms: Sequence[Term],
                  ) -> tuple[Sequence[Term], Gate, float]:
     """An effect as fitted where it acts, the stretches of blocks in which it does, and nats that their choice costs.
 
@@ -88,10 +88,10 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, price: float) -> tuple[i
     return stretch
 
 
-def each_block(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
+def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.power)[:problem.own]
+    each = problem.likelihood.each(values, power - problem.power)[:problem.replay_count]
     in_air = problem.air.of >= 0
     return np.bincount(problem.air.of[in_air], each[in_air])
 
@@ -111,14 +111,14 @@ def _at_the_ends(data: Data, air: AirBlocks) -> np.ndarray:
     return np.array(ends, bool)
 
 
-def _part(whole: Part, on: np.ndarray) -> Part:
+def _part(whole: BlockSet, on: np.ndarray) -> BlockSet:
     """Those blocks in the air that are on (b,)."""
     pieces, place = [], 0
     for flight, regime, chosen in whole.pieces:
         if regime == AIR:
             pieces.append((flight, regime, on[place:place + len(chosen)]))
             place += len(chosen)
-    return Part(tuple(pieces))
+    return BlockSet(tuple(pieces))
 
 
 def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
     return float((air.begin[first] + quarter) * PERIOD_S), float((air.begin[last] + LENGTH[AIR] - quarter) * PERIOD_S)
 
 
-def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
+def _sharpened(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
 
     def level(tried: Gate) -> float:

@@ -15,10 +15,11 @@ import numpy as np
 
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_key import OPENED, SEALED, key_of, seal
 from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.logs.files import write, write_bytes

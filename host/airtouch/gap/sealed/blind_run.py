@@ -14,10 +14,10 @@ from typing import Any
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.sealed.blind import Say
 from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog

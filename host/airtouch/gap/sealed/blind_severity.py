@@ -17,9 +17,10 @@ from scipy.stats import norm
 
 import airtouch.gap.measure as measure
 from airtouch.gap.evidence.clock import clock_gain
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.gap.signatures.signature import CLOCK
@@ -95,7 +96,7 @@ def told_apart(yes: np.ndarray, no: np.ndarray) -> bool:
 def log_ratio(data: Data, active: Active) -> float:
     """Log likelihood of the flights under an effect with these values over that under none."""
     term = term_of(active)
-    if term.kind == CLOCK:
+    if term.shows_in == CLOCK:
         return clock_gain(data, term)[1]
     whole = whole_of(data)
     return judge(data, whole, (term,)) - judge(data, whole, ())

@@ -26,6 +26,7 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.channels import COMMAND
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge
 from airtouch.simulation.effects import Active
@@ -150,7 +151,7 @@ class CommandView:
 
     def moved(self, active: Sequence[Active]) -> np.ndarray:
         """Values (elements,) less what effects add to the responses at edges."""
-        if not self.edges or not any(a.effect.name in edge_effects.SHOWN for a in active):
+        if not self.edges or not any(signature_of(a.effect).at_edges for a in active):
             return self.values
         out = self.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT

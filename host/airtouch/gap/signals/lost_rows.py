@@ -16,6 +16,7 @@ from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, blocks, squared
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -58,13 +59,14 @@ def _in_flight(flight: Flight, begin: np.ndarray) -> np.ndarray:
     return room
 
 
-def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], kept: dict | None = None,
-                     ) -> np.ndarray:
+def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
+                     workspace: Workspace | None = None) -> np.ndarray:
     """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor.
 
-    kept: see `residual`.
+    workspace: see `residual`.
     """
-    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active, kept=kept)))
+    known = residual(flight, vehicle, active, workspace=workspace)
+    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, known))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

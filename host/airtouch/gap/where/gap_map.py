@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
@@ -139,7 +140,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    active = [t.active() for t in terms if t.kind == MEAN]
+    active = [t.active() for t in terms if t.shows_in == MEAN]
     gap = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
                study.vehicle)
     random = random_of(terms)
