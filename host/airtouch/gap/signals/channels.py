@@ -32,6 +32,8 @@ class Channel:
     high_hz: float = 50.0
 
 
+#: Of the rates only what is slower than any turn that is flown says something of the gyro; commands are judged above
+#: the high-pass of `loop.command_spectra`; both limits and the upper one of commands are chosen.
 CHANNELS = (
     *(Channel(f"force_{a}", "m/s^2") for a in "xyz"),
     *(Channel(f"torque_{a}", "rad/s^2") for a in "xyz"),
