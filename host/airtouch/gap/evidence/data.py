@@ -49,7 +49,7 @@ class Data:
         self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
                         for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
-            self.quiet = [self.study.response.quiet(w) for w in commanded(self)]
+            self.quiet = [self.study.response.quiet(w) for w in command_torque(self)]
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
@@ -65,24 +65,24 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     response = data.study.response
     replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
-        with_all = _replayed(data, replayed)
-        return _without_means(data, replayed, with_all) if data.slow else with_all
-    return _cached(data, "applied", active, lambda: _applied(data, response, active, replayed))
+        with_all = _replay_spectra(data, replayed)
+        return _without_scaling(data, replayed, with_all) if data.slow else with_all
+    return _cached(data, "by response", active, lambda: _by_response(data, response, active, replayed))
 
 
-def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
-             ) -> list[dict[str, np.ndarray]]:
+def _by_response(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
+                 ) -> list[dict[str, np.ndarray]]:
     """Spectra of the gap, torque compared with what the commands lead to expect.
 
     replayed: the effects that do not show in the commands alone.
     """
-    with_all = _replayed(data, replayed)
+    with_all = _replay_spectra(data, replayed)
     law = data.study.controller
     assert law is not None  # a response is known of nominal flights, and so is their loop
     not_loop = [a for a in replayed if not law.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
     change = law.torque_change(active, frequencies(AIR))
-    nominal, driven, disturbed = (_replayed(data, some) for some in ((), by_command, not_loop))
+    nominal, driven, disturbed = (_replay_spectra(data, some) for some in ((), by_command, not_loop))
     out = []
     for i, gap in enumerate(with_all):
         if data.flights[i].rates is not None:
@@ -105,10 +105,10 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
     return TorqueSpectra(measured, residual, by_command, disturbance)
 
 
-def commanded(data: Data) -> list[np.ndarray]:
+def command_torque(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
     return [measured - residual[AIR][:, :, TORQUE]
-            for measured, residual in zip(data.turning, _replayed(data, ()), strict=True)]
+            for measured, residual in zip(data.turning, _replay_spectra(data, ()), strict=True)]
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
@@ -121,7 +121,7 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     if response is None or change is None or not change.cut.any():
         return None
     out = []
-    for f, q, torque, base in zip(data.flights, data.quiet, commanded(data), data.base, strict=True):
+    for f, q, torque, base in zip(data.flights, data.quiet, command_torque(data), data.base, strict=True):
         power = {r: np.zeros(x.shape) for r, x in base.items()}
         if f.rates is not None:
             doubt = response.doubt(q, torque, change)
@@ -130,26 +130,26 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     return out
 
 
-def _without_means(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
-                   ) -> list[dict[str, np.ndarray]]:
+def _without_scaling(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
+                     ) -> list[dict[str, np.ndarray]]:
     """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
     unscaled = [a for a in active if not signature_of(a.effect).scales_torque]
     if len(unscaled) == len(active):
         return with_all
     out = [{r: v.copy() for r, v in e.items()} for e in with_all]
-    for spectra_of_all, spectra_without in zip(out, _replayed(data, unscaled), strict=True):
+    for spectra_of_all, spectra_without in zip(out, _replay_spectra(data, unscaled), strict=True):
         for r, v in spectra_of_all.items():
             v[:, :, TORQUE] = spectra_without[r][:, :, TORQUE]
     return out
 
 
-def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    return _cached(data, "spectra", active, lambda: [_replay(data, i, active) for i in range(len(data.flights))])
+    return _cached(data, "spectra", active, lambda: [_flight_replay(data, i, active) for i in range(len(data.flights))])
 
 
-def _replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
-    """`_replayed` of flight i, by regime."""
+def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
+    """`_replay_spectra` of flight i, by regime."""
     bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
                                data.workspace.once("residuals", i, Workspace))
     out = {}

@@ -123,10 +123,10 @@ def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = F
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
     """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
-    commanded, _ = problem.loop_power(mean, True)
+    command_power, _ = problem.loop_power(mean, True)
     for _ in range(ROUNDS if len(random) > 1 else 1):
         for i in range(len(random)):
-            random[i] = _strength(problem, random, i, values, commanded)
+            random[i] = _strength(problem, random, i, values, command_power)
     return problem.random_power(random)
 
 

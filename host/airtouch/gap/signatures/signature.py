@@ -40,26 +40,31 @@ class Bursts(NamedTuple):
 
 @dataclass(frozen=True)
 class Signature:
-    """How one effect is fitted, and how it shows; values in the units of the effect's parameters.
+    """How one effect is fitted, and where it shows; values in the units of the effect's parameters.
 
+    How it is fitted:
     free: parameters that a fit frees; the others have the same effect in most logs.
-    shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
     variants: values of parameters that are tried one by one.
     free_later: parameters that are freed once a fit of the others is close.
     shape: a shape that all the data choose in the end; None for an effect without.
     alone_too: whether each free parameter is also tried alone.
-    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; none
-    for an effect without a random part.
-    always_random: whether the effect is only tried with its random part, because the mean alone has other names.
-    comes_and_goes: whether it may act in a part of a flight only.
-    companion: the effect that a variant has beside it; "" without one.
+    factors: whether its parameters are factors, neutral at 1, of which the logarithm is known.
     own_scatter: relative standard deviation of its strength from flight to flight that no likelihood shows.
-    bursts: for what is counted in bursts, the parameters that say so.
+
+    Where it shows:
+    shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
     commands_only: whether it changes what the controller commands and nothing of what the logged commands lead to.
     at_edges: whether it shows in what a flight does at edges.
     scales_torque: whether it only multiplies torque, and would shrink any trim.
-    factors: whether its parameters are factors, neutral at 1, of which the logarithm is known.
     spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
+    bursts: for what is counted in bursts, the parameters that say so.
+    comes_and_goes: whether it may act in a part of a flight only.
+
+    What is beside it:
+    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; None
+    for an effect without a random part.
+    always_random: whether the effect is only tried with its random part, because the mean alone has other names.
+    companion: the effect that a variant has beside it; "" without one.
     several_by: parameter of which each value is an effect of its own, several of which may act together; "" for none.
     class_by: parameter of which each value of the variants is a class of its own in the relations of signals.
     """
@@ -70,17 +75,17 @@ class Signature:
     free_later: tuple[str, ...] = ()
     shape: Shape | None = None
     alone_too: bool = False
-    steady: Mapping[str, float] | None = None
-    always_random: bool = False
-    comes_and_goes: bool = False
-    companion: str = ""
+    factors: bool = False
     own_scatter: float = 0.0
-    bursts: Bursts | None = None
     commands_only: bool = False
     at_edges: bool = False
     scales_torque: bool = False
-    factors: bool = False
     spectrum: str = ""
+    bursts: Bursts | None = None
+    comes_and_goes: bool = False
+    steady: Mapping[str, float] | None = None
+    always_random: bool = False
+    companion: str = ""
     several_by: str = ""
     class_by: str = ""
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from airtouch.gap.evidence.cells import BANDS_HZ, CELLS
-from airtouch.gap.evidence.data import Data, commanded
+from airtouch.gap.evidence.data import Data, command_torque
 from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
@@ -113,7 +113,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
         bands[:FIRST_BIN] = False
         shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP_COLUMNS)
         out = []
-        for i, torque in enumerate(commanded(data)):
+        for i, torque in enumerate(command_torque(data)):
             weighted = torque if response is None else response.weighted(data.quiet[i], torque)
             out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
         return out
