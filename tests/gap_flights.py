@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import Floor
+from airtouch.gap.signals.study import Study
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import batch, replay, scenario

@@ -12,7 +12,7 @@ from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import signals
 from gap_flights import VEHICLE, flight, noise
 
@@ -100,6 +100,6 @@ def own_gain(data, terms, first=None):
         parts = judging.halves(data)
         start = None if first is None else first[train]
         fitted_terms = fit(data, parts[train], terms, start).terms
-        random = any(t.kind == "spectrum" for t in fitted_terms)
+        random = any(t.shows_in == "spectrum" for t in fitted_terms)
         total += judge(data, parts[test], fitted_terms) - judge(data, parts[test], (), random)
     return total

@@ -7,13 +7,13 @@ from airtouch import vehicle
 from airtouch.gap.answer.pictures import of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked, Step
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")
-FOUND = Found("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
+FOUND = NamedEffect("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
 
 
 def fly_pushed():
@@ -27,19 +27,19 @@ def cell(channel, phase, gap, floor=0.1, after=None, blocks=10, **more):
 
 
 def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **more):
-    rejected = [Ranked(n, p, Quantity(0.0), "another fits better")
+    rejected = [RankedCandidate(n, p, Quantity(0.0), "another fits better")
                 for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
     answer = effects[0].name if effects else verdict
-    ranking = [Ranked(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
+    ranking = [RankedCandidate(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
     whole = GapMap(tuple(cells), BASELINE, ("one.csv", "two.csv"))
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),
         {"before": 4.0, "after": 1.3, "floor": 1.0}, Quantity(0.9, 0.8, 0.95) if effects else None,
         {"name": "wind", "before": 4.0, "after": 3.9, "floor": 1.0, "shrink": Quantity(0.03, -0.05, 0.1)},
-        "Weigh the <vehicle>.", {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
+        {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
         map=whole, headline=headline or summary.headline(cells, bool(effects)),
-        next=(Step("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
+        next=(NextStep("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
 
 
 def of_flights(logs, effects=(FOUND,), **more):

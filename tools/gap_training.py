@@ -67,7 +67,7 @@ def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
         craft = vehicle.load(VEHICLE)
         whole, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
         write_bytes(json.dumps({"all": whole.plain(), "close": near.plain(), "calibration": [
-            [a.effect.name, dict(a.values)] for a in near.held[1].active]}, indent=1).encode(), store, force=True)
+            [a.effect.name, dict(a.values)] for a in near.calibrated[1].active]}, indent=1).encode(), store, force=True)
     return json.loads(store.read_text())
 
 

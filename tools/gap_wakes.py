@@ -133,7 +133,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
         for seconds in seconds_of.get(kind[name], []):
             data = Data(overhead.with_overhead(study, flight, seconds), [flight])
-            wake = gates.gated(data).get(gates.TOLD)
+            wake = gates.gated_effects(data).get(gates.KNOWN_OVERHEAD)
             trials += 1
             if wake is not None and news(data, wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
                 alarms.append(name)

@@ -32,8 +32,8 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.sealed import blind
 from airtouch.gap.signatures import scatter_estimates
-from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter
-from airtouch.gap.signatures.scatter_estimates import measured
+from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter
+from airtouch.gap.signatures.scatter_estimates import class_scatter
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as simulated
@@ -94,7 +94,8 @@ def _read(path: Path) -> Log:
     return path.name, lambda: read(path)
 
 
-def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None) -> Iterator[tuple[str, Apparent]]:
+def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
+             ) -> Iterator[tuple[str, ApparentStrengths]]:
     """Each flight against others of its group, or against those given."""
     ready = _ready(logs, vehicle)
     if others is not None:
@@ -186,10 +187,10 @@ def main() -> None:
         for others in (False, True):
             for row in (row_of[key] for name, _ in files if (key := _name(name, others)) in row_of):
                 strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
-                cases[of].append(Apparent(strengths, errors, row["rate"], row["passing"]))
+                cases[of].append(ApparentStrengths(strengths, errors, row["rate"], row["passing"]))
                 if not others:
                     alike[of].append(cases[of][-1])
-    classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
+    classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
     counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups"
               for of, flights in cases.items()}
     new = args.out.with_suffix(".new")

@@ -13,7 +13,7 @@ from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.named_effects import with_random_part
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import random_part_of
 from airtouch.logs.flight_log import PWM
 from airtouch.simulation import batch, effects, replay, scenario
@@ -122,8 +122,8 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
 
     part = random_part_of("ground_effect")
     part = replace(part, values={**part.values, "turbulence": 0.25})
-    effect = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
-                                                                           "turbulence": 0.0}.items()})
+    effect = NamedEffect("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
+                                                                                 "turbulence": 0.0}.items()})
     reported = {k: q.value for k, q in with_random_part(effect, part).parameters.items()}
     swing = force(part.values) - force({**part.values, "turbulence": 0.0})
     assert np.abs(swing).max() > 1e-4

@@ -16,7 +16,7 @@ from airtouch.gap.answer.pictures import of_measurement
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
@@ -142,7 +142,7 @@ def test_the_report_computes_nothing():
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
-        allowed = ("measure", "result", "where.gap_map", "where.summary", "answer.advice", "answer.pictures",
+        allowed = ("measure", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
                    "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)
@@ -151,7 +151,7 @@ def test_the_report_computes_nothing():
 
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_any_effect_can_be_shown(pushed_flights, name):
-    term = term_of(Found(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
+    term = term_of(NamedEffect(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
     assert dict(term.values) == EFFECTS[name].values()
     study, flight = declared_study(VEHICLE, ()), ready(pushed_flights[0], VEHICLE)
     cells_map = gap_map(study, [flight], terms=[term])

@@ -8,16 +8,16 @@ import numpy as np
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.answer.advice import advice as advice_text
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.pictures import of as pictures_of
-from airtouch.gap.answer.ranking import alike_of, ranked
-from airtouch.gap.answer.shrink import Cells, cells_of, shrink_of
+from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
+from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
-from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.flights.flight import Flight
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.related import signs_not_shown
@@ -25,10 +25,11 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.nominal.consistency import differences
+from airtouch.gap.nominal.consistency import differences, flown_unlike
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map, where
@@ -43,7 +44,7 @@ NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torqu
 
 @dataclass(frozen=True)
 class Case:
-    """What is diagnosed: flights made ready, held against the study of a vehicle.
+    """What is diagnosed: flights made ready, compared with the study of a vehicle.
 
     usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
     without a baseline.
@@ -82,18 +83,18 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if balance_result.applies(usable, nominal, vehicle):
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
-    held = before.held if before is not None and before.held is not None else _calibrated(vehicle, nominal, without)
-    study, calibration = held
+    known = None if before is None else before.calibrated
+    study, calibration = calibrated = known or _calibrated(vehicle, nominal, without)
     if partner:
         study, note = _with_partner(study, usable[0], seconds)
         notes.append(note)
     case = Case(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, case.judged)
-    selection, gap_cells = _selected(data, without, say)
+    selection, gap = _selected(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
-    result = _answer(data, selection, gap_cells)
-    return replace(_explained(result, case, selection, pictures), notes=_notes(case, notes), held=held)
+    result = _answer(data, selection, gap)
+    return replace(_explained(result, case, selection, pictures), notes=_notes(case, notes), calibrated=calibrated)
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -106,28 +107,26 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
 
 
 def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
-    """The study told in which seconds another vehicle is overhead, and a note on how many these are."""
+    """The study with the seconds in which another vehicle is overhead, and a note on how many these are."""
     long = sum(end - begin for begin, end in seconds)
     note = f"the other vehicle was overhead for {long:.1f} s" if seconds else "the other vehicle was never overhead"
     return with_overhead(study, flight, seconds), note
 
 
-def _answer(data: Data, selection: Selection, gap_cells: Cells) -> Diagnosis:
-    """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control.
-
-    gap_cells: in which the gap is measured.
-    """
-    ranking, overall, verdict, effects = ranked(data, selection, gap_cells)
+def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
+    """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control."""
+    verdict, before = verdict_of(data, selection, gap), gap.named.before
     is_effect = verdict == "effect"
+    effects = named_effects(data, selection) if is_effect else []
+    ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
-        where=(), gap={"before": overall.before, "after": overall.after if is_effect else overall.before, "floor": 1.0},
-        shrink=overall.share if is_effect else None, control=control(data, selection, gap_cells) if is_effect else {},
-        advice="")
+        where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},
+        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
 
 
 def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
-    """The answer with what it is held against: the map and its largest cells, arms, what stays open, what to fly next.
+    """The answer with what it is compared with: the map and its largest cells, arms, what stays open, what to fly next.
 
     pictures: whether to keep the curves that a report shows.
     """
@@ -143,7 +142,7 @@ def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bo
         result, where=cells, map=whole_map, headline=headline,
         arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
-        next=steps, advice=advice_text(steps),
+        next=steps,
         cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=case.calibration.parameters if case.calibration else {},
@@ -163,7 +162,7 @@ def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
     notes = [note for f in case.usable for note in f.notes] + [*of_logs]
     notes += list(case.calibration.notes) if case.calibration else [NO_BASELINE]
     notes += differences(case.study, case.nominal)
-    notes += measure.flown_unlike(case.study, case.usable)
+    notes += flown_unlike(case.study, case.usable)
     if len(case.judged) < len(case.usable):
         notes.append(f"candidates were judged on {len(case.judged)} of {len(case.usable)} flights, evenly chosen")
     return tuple(dict.fromkeys(notes))
@@ -171,7 +170,7 @@ def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
 
 def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
     """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
-    seconds = sum(len(f) for f in flights) * 0.01
+    seconds = sum(len(f) for f in flights) * PERIOD_S
     keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
@@ -186,19 +185,18 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
 
 
 def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
-              ) -> tuple[Selection, Cells]:
-    """What is chosen among the candidates, and the cells in which the gap is measured.
+              ) -> tuple[Selection, Gap]:
+    """What is chosen among the candidates, and the gap that it closes.
 
     In recorded flights some effects must close a part of the gap to be named: see `naming.recorded`.
     """
     selection = select(data, candidates.all_candidates(without), say, without)
-    cells = cells_of(data, selection.parts, selection.chosen)
-    if recorded.must_close_the_gap(data, selection):
-        gap = shrink_of(data, selection.parts, selection.chosen, cells)
-        if recorded.closes_too_little(data, selection, gap.before, gap.share.value):
-            selection = recorded.without_names(selection)
-            cells = cells_of(data, selection.parts, None)
-    return selection, cells
+    gap = gap_of(data, selection.parts, selection.chosen)
+    if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
+            data, selection, gap.named.before, gap.named.share.value):
+        selection = recorded.without_names(selection)
+        gap = gap_of(data, selection.parts, None)
+    return selection, gap
 
 
 callable_module(__name__)

@@ -10,18 +10,16 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import callable_module
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import Flight, ready
-from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
-from airtouch.gap.loop.command_spectra import block_spectra, frequencies
-from airtouch.gap.loop.controller import AXES
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
-from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import GapMap, Part, assemble, in_words, overall, part_of, where
+from airtouch.gap.where.cell_words import in_words
+from airtouch.gap.where.command_power import CommandPower, command_power, mean_spectra
+from airtouch.gap.where.gap_map import GapMap, Part, assemble, overall, part_of, where
 from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
@@ -31,9 +29,10 @@ from airtouch.vehicle import Vehicle
 class Measurement:
     """The gap map with its largest cells, and what these logs cannot say.
 
-    gap: rms over the floor of all cells in the air, for the vehicle as declared and, with
-    baseline flights, as calibrated on them; spectra: of the commands, as flown and as
-    nominal flights have them (command view), N^2/Hz.
+    gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
+    calibrated on them; calibration: those parameters; spectra: of the commands, as flown and as nominal flights have
+    them (`command_power`), N^2/Hz; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
+    flights were not used.
     """
 
     vehicle: str
@@ -44,7 +43,7 @@ class Measurement:
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)
     spectra: Mapping[str, Any] = field(default_factory=dict)
-    rotors: tuple[Mapping[str, float], ...] = ()  #: speeds as logged and as modelled, in the air, 1/min
+    rotors: tuple[Mapping[str, float], ...] = ()
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -66,12 +65,12 @@ class Measurement:
 class MeasuredFlight:
     """One flight held against the model of each study.
 
-    parts: of the map of each study; power (bins, 4): `_command_power`; speeds (2, 4): `rotor_speeds`, 1/min; notes,
-    cannot: of the `Flight`.
+    parts: of the map of each study; power: of its commands; speeds (2, 4): `rotor_speeds`, 1/min; notes, cannot: of the
+    `Flight`.
     """
 
     parts: tuple[Part, ...]
-    power: np.ndarray
+    power: CommandPower
     speeds: np.ndarray | None
     notes: tuple[str, ...]
     cannot: tuple[str, ...]
@@ -106,11 +105,13 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
-        vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap,
-        maps[0].flights, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        _spectra([m.power for m in measured], [_command_power(f, vehicle) for f in nominal]),
-        speeds_over_flights([m.speeds for m in measured]), tuple(notes),
-        cannot_of([m.cannot for m in measured]), tuple(left_out))
+        vehicle=vehicle.name, map=maps[0], gap=gap,
+        where=tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))),
+        flights=maps[0].flights, baseline=tuple(f.name for f in nominal),
+        calibration=fitted.parameters if fitted else {},
+        spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
+        rotors=speeds_over_flights([m.speeds for m in measured]), notes=tuple(notes),
+        cannot=cannot_of([m.cannot for m in measured]), left_out=tuple(left_out))
 
 
 def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], run: Callable, progress: Callable[[str], None],
@@ -138,8 +139,8 @@ def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight 
         flight = ready(log, studies[0].vehicle)
     except AirTouchError as error:
         return str(error)
-    return MeasuredFlight(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
-                rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
+    return MeasuredFlight(tuple(part_of(s, flight) for s in studies), command_power(flight, studies[0].vehicle),
+                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
 
 
 def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> Iterator[Flight]:
@@ -151,59 +152,13 @@ def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> 
             left_out.append(str(error))
 
 
-def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
-    """In words, which flights are flown harder or calmer than every baseline flight: their floor is extrapolated."""
-    slopes = study.floor.slopes
-    if slopes is None:
-        return []
-    notes = []
-    for f in flights:
-        hardness = hardness_of(f, starts(f, AIR), LENGTH[AIR])
-        middle = float(np.median(hardness)) if len(hardness) else slopes.usual
-        if not slopes.calmest <= middle <= slopes.hardest:
-            word, end = ("harder", slopes.hardest) if middle > slopes.hardest else ("calmer", slopes.calmest)
-            own, theirs = (np.degrees(STILL_RAD * np.sqrt(np.expm1(2.0 * max(x, 0.0)))) for x in (middle, end))
-            notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, "
-                         "theirs by "
-                         f"{'at most' if word == 'harder' else 'at least'} {theirs:.1f}): the floor is extrapolated; "
-                         "fly the baseline like the test")
-    return notes
-
-
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """What logs cannot say, each reason once, with the number of flights where it is not all. flights: reasons of each.
+    """What logs cannot say, each reason once, with the number of flights where it is not all.
+
+    flights: reasons of each flight.
     """
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
-
-
-def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:
-    """The command view: mean spectra of the commands, as flown and as nominal flights have them."""
-    return _spectra(*([_command_power(f, vehicle) for f in some] for some in (flights, nominal)))
-
-
-def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:
-    """Sum of the commands' spectra over blocks and their number, (bins, 4): three axes and the count."""
-    blocks = block_spectra(flight, vehicle)[1]
-    power = (np.abs(blocks) ** 2).sum(axis=0)
-    return np.column_stack([power, np.full(len(power), float(len(blocks)))])
-
-
-def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict[str, Any]:
-    """The command view: mean spectra of the commands, empty without a steady stretch in flight.
-
-    flown, nominal: `_command_power` (bins, 4) of each flight.
-    """
-    total = np.sum(flown, axis=0)
-    if not len(flown) or not total[0, -1]:
-        return {}
-    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
-    of_nominal = np.sum(nominal, axis=0) if len(nominal) else None
-    for i, axis in enumerate(AXES):
-        made[axis] = {"flown": (total[:, i] / total[0, -1]).tolist()}
-        if of_nominal is not None and of_nominal[0, -1]:
-            made[axis]["nominal"] = (of_nominal[:, i] / of_nominal[0, -1]).tolist()
-    return made
 
 
 callable_module(__name__)

@@ -21,7 +21,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Found:
+class NamedEffect:
     """An effect that the diagnosis names, with its fitted parameters.
 
     seconds: stretches (flight, from_s, to_s) in which it acts; empty where it always does.
@@ -33,7 +33,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedCandidate:
     """A candidate: its probability, the share of the gap that it takes away on held-out data, why it is not the
     answer, and the log likelihood (nats) that held-out data gain by it alone."""
 
@@ -85,7 +85,7 @@ class GapMap:
 
 
 @dataclass(frozen=True)
-class Step:
+class NextStep:
     """What to do next: a sentence, the command that does it, the heading of a page that says how;
     "" where there is none."""
 
@@ -108,14 +108,13 @@ class Diagnosis:
     """
 
     verdict: str
-    effects: tuple[Found, ...]
-    ranking: tuple[Ranked, ...]
+    effects: tuple[NamedEffect, ...]
+    ranking: tuple[RankedCandidate, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     where: tuple[Cell, ...]
     gap: Mapping[str, float]
     shrink: Quantity | None
     control: Mapping[str, Any]
-    advice: str
     arms: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
@@ -123,14 +122,14 @@ class Diagnosis:
     unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
     map: GapMap | None = None  #: every cell, of which `where` has the largest
     headline: Cell | None = None  #: the cell that the answer speaks of
-    next: tuple[Step, ...] = ()  #: what to do next; `advice` is their text
+    next: tuple[NextStep, ...] = ()  #: what to do next
     vehicle: str = ""
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
     #: `gap.answer.pictures.Pictures`, where they were asked for
     pictures: Any = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
-    held: Any = field(default=None, repr=False, compare=False)
+    calibrated: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""
@@ -138,6 +137,11 @@ class Diagnosis:
         answer = (named or ["effect"])[0] if self.verdict == "effect" else self.verdict
         if self.ranking and (answer != self.ranking[0].name or bool(named) != (self.verdict == "effect")):
             raise ValueError(f"the ranking begins with {self.ranking[0].name}, the verdict is {self.verdict} {named}")
+
+    @property
+    def advice(self) -> str:
+        """What to do next, as text."""
+        return " ".join(step.text for step in self.next)
 
     def __repr__(self) -> str:
         """One line: verdict, effects, the answer's probability, gap before and after; `plain` has everything."""

@@ -7,7 +7,7 @@ from airtouch.gap.answer.words import digits, quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, interval, ratio, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, ratio, short
 
 #: (least ratio of gap to floor, background colour, text colour)
 SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),

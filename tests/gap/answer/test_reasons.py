@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
-TERMS = {name: (SimpleNamespace(name=name, kind="mean"),) for name in EVIDENCE}
+TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
 
 
 def judged(name, gain, evidence=None):
-    return Judged(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
+    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
 def selection(named=("mass",), inference=False, **more):
@@ -24,7 +24,8 @@ def selection(named=("mass",), inference=False, **more):
         total += EVIDENCE[n]
         steps.append(judged(n, total))
     evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0) if inference else None
-    settings = {"free_before": 150.0, "free_after": 4.0, "parts": (None, None), "least": dict.fromkeys(EVIDENCE, 8.0),
+    settings = {"nameless_alone": 150.0, "nameless_beside": 4.0, "parts": (None, None),
+                "least": dict.fromkeys(EVIDENCE, 8.0),
                 "nominal": 5, "assumed": False, "nominal_gain": 0.0, **more}
     return Selection(singles, tuple(steps), inference=evidence, **settings)
 
@@ -63,11 +64,11 @@ def test_a_second_effect_is_told_apart_from_one_that_acts_alone():
 
 
 def test_where_nothing_is_named():
-    nothing = selection((), free_after=40.0)
+    nothing = selection((), nameless_beside=40.0)
     assert not nothing.explained
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
     assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 of the 150 nats that a model without names gains"
-    related = selection((), inference=True, free_after=40.0)
+    related = selection((), inference=True, nameless_beside=40.0)
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")
     assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
@@ -75,7 +76,7 @@ def test_where_nothing_is_named():
 
 def test_what_is_named_and_not_enough_is_held_against_itself():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
-    left = selection(free_after=70.0)
+    left = selection(nameless_beside=70.0)
     assert why_not(left, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
     contradicted = selection(contradicted=(60.0, "yaw torque"))
     assert why_not(contradicted, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.shrink import LEAST_JITTER_S, share_closed, shrink_of_jitter
+from airtouch.gap.answer.shrink import share_closed, shrink_of_jitter
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 
 
 @pytest.mark.parametrize(("before", "after", "share"), [

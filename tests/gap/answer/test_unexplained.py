@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.answer.unexplained import followed_signals, over_floor, unexplained, worst_stretch
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.signals.channels import COLUMN
+from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, starts
 from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
@@ -24,15 +24,20 @@ def hover(strength, seed=1, **more):
     return flight(SECONDS, force, **more)
 
 
+def ratio_of(one):
+    """Rms over the floor of CELL in each block of a flight."""
+    return over_floor(STUDY, one, residual(one, VEHICLE), CELL)
+
+
 def test_the_ratio_is_the_rms_over_the_floor_of_the_cell():
     """White noise of 0.5 m/s^2 at 100 Hz has 0.5^2 / 50 in each Hz."""
     f = frequencies(AIR)
     band = (f >= 2.0) & (f <= 8.0)
     floor = STUDY.floor.power[AIR][band, COLUMN["force_x"]].mean()
-    ratio = over_floor(STUDY, hover(0.5), (), CELL)
+    ratio = ratio_of(hover(0.5))
     assert len(ratio) == len(starts(hover(0.5), AIR))
     assert np.sqrt(np.mean(ratio ** 2)) == pytest.approx(np.sqrt(0.5 ** 2 / 50.0 / floor), rel=0.1)
-    assert not len(over_floor(STUDY, flight(1.0), (), CELL))
+    assert not len(ratio_of(flight(1.0)))
 
 
 def test_the_worst_stretch_ends_where_the_gap_is_half_way_to_its_median():
@@ -60,9 +65,9 @@ def test_five_cells_are_told_at_most():
 def test_the_signal_is_named_that_the_power_follows():
     """A gap that grows with time; the height, which does not change, and signals of the made hover say nothing."""
     growing = hover(np.linspace(0.1, 3.0, 4000))
-    assert followed_signals(STUDY, [(growing, over_floor(STUDY, growing, (), CELL))]) == ["time"]
+    assert followed_signals(STUDY, [(growing, ratio_of(growing))]) == ["time"]
     steady = hover(1.0)
-    assert not followed_signals(STUDY, [(steady, over_floor(STUDY, steady, (), CELL))])
+    assert not followed_signals(STUDY, [(steady, ratio_of(steady))])
 
 
 def test_a_signal_that_one_flight_lacks_is_not_named():
@@ -74,7 +79,7 @@ def test_a_signal_that_one_flight_lacks_is_not_named():
         if with_height:
             one.log.columns["z_m"] = climbing
         one.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = climbing[:, None]
-        pair.append((one, over_floor(STUDY, one, (), CELL)))
+        pair.append((one, ratio_of(one)))
     assert "height" in followed_signals(STUDY, pair[:1])
     assert "height" not in followed_signals(STUDY, pair)
 

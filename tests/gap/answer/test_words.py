@@ -9,7 +9,8 @@ from airtouch.cli.gap import show as gap_show
 from airtouch.cli.shared import scores
 from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.ranking import agreeing
-from airtouch.gap.result import Found, Quantity
+from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
 from airtouch.gap.where import summary
 from airtouch.report import gap_report, gap_tables
 from airtouch.simulation import effects as registry
@@ -24,13 +25,13 @@ def pushed_flights():
 
 def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
     cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
-    sentences = words.sentences(diagnosis(cells, effects=(Found("motor_noise", {}),)))
+    sentences = words.sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
     assert sentences[1] == "The effect named, motor noise (probability 93%), does not close this cell."
     assert "500 to 475 times the floor" in sentences[2].replace("  ", " ")
 
 
 def test_rotors_are_told_apart():
-    weak = [Found("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
+    weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
     assert sentence == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
 
@@ -47,7 +48,7 @@ def test_what_got_worse_is_said():
 
 
 def test_headline_and_ranking_cannot_disagree():
-    first, beside = Found("motor_noise", {}), Found("weak_motor", {})
+    first, beside = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
     sentences = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],
                                           effects=(first, beside)))
     assert sentences[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
@@ -60,7 +61,7 @@ def test_headline_and_ranking_cannot_disagree():
 
 def test_a_diagnosis_prints_as_one_line():
     cells = [cell("force_z", "hover", 1.0, after=0.1)]
-    two_effects = diagnosis(cells, effects=(Found("motor_noise", {}), Found("weak_motor", {})))
+    two_effects = diagnosis(cells, effects=(NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})))
     assert repr(two_effects) == str(two_effects) == ("Diagnosis(effect; motor_noise, weak_motor; probability 93%; "
                                                      "gap 4 before, 1.3 after (floor 1))")
     none = replace(diagnosis(cells, "none", ()), ranking=(), gap={})
@@ -117,11 +118,11 @@ def test_advised_commands_can_be_given():
     for name, effect in EFFECTS.items():
         values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high
                                    and not p.integer else p.default, unit=p.unit) for p in effect.parameters}
-        line = advice.switched_on([Found(name, values)], VEHICLE.name)
+        line = advice.switched_on([NamedEffect(name, values)], VEHICLE.name)
         parsed_effect = registry.parse(line.split("--effect ")[1].strip("'"))
         expected = {k: q.value for k, q in values.items()}
         assert parsed_effect[0] == name and parsed_effect[1] == pytest.approx(expected, rel=1e-3)
-    for name in (*advice.MISSIONS.values(), *(m for _, m in advice.SEPARATES.values() if m)):
+    for name in (*advice.MISSIONS.values(), *(c.mission for c in (*ALIKE, *CONFUSED) if c.mission), MISSION):
         assert mission.load(name).legs
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.balance.balance_result import side_is_sure
 from airtouch.gap.balance.hover_hypotheses import commanded_change
 from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, hovers, mean_pattern
+from airtouch.gap.balance.hover_posterior import side_is_sure
 from airtouch.logs.flight_log import VELOCITY
 from gap_flights import VEHICLE, flight, noise
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from airtouch.gap.evidence import clock
+from airtouch.gap.signatures.candidates import terms
 
 
 def test_clock_and_losses_count_as_unknown_only_where_they_are_not_named():
@@ -18,4 +19,5 @@ def test_clock_and_losses_count_as_unknown_only_where_they_are_not_named():
     share, loss_gain = clock.loss(data)
     np.testing.assert_allclose(share, 0.05, rtol=0.3)
     assert clock.clock_left(data, ()) == gain + loss_gain
-    assert clock.clock_left(data, ("time_jitter", "packet_loss")) == 0.0
+    assert clock.clock_left(data, terms("time_jitter")) == loss_gain
+    assert clock.clock_left(data, [*terms("time_jitter"), *terms("packet_loss")]) == 0.0

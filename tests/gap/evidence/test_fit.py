@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.fit import fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures import candidates
 from gap_flights import fly
 
@@ -20,7 +21,7 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
     terms = (mean, candidates.random_part_of("ground_effect"))
     blocks = whole_of(data)
     free, begun = fit(data, blocks, terms), fit(data, blocks, terms, np.array([start]))
-    assert begun.gained == pytest.approx(free.gained, abs=1.0)
+    assert judge(data, blocks, begun.terms) == pytest.approx(judge(data, blocks, free.terms), abs=1.0)
     assert begun.scaled == pytest.approx(free.scaled, rel=0.03)
     assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
 
@@ -30,10 +31,10 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     data = Data(study, fly(1, 54, {"controller_gain": {"height": 0.5}}))
     on = judging.trial_of(data)
     gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
-    chosen = judging.crossed(on, "controller_gain", (gain,), None, 0.0)
+    chosen = judging.cross_validated(on, "controller_gain", (gain,), None, 0.0)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
-                              for train, test in judging.ROUND_TRIP) for wide in (False, True))
-    assert isinstance(chosen, Judged) and certain > uncertain + 10.0
-    both = judging.crossed(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
+                              for train, test in problem.ROUND_TRIP) for wide in (False, True))
+    assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
+    both = judging.cross_validated(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
-    assert both.beyond == pytest.approx(certain - uncertain)
+    assert both.gained_while_certain == pytest.approx(certain - uncertain)

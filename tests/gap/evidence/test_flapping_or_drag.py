@@ -57,7 +57,7 @@ def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, most_nats):
                       for name in ("blade_flapping", "rotor_drag"))
     assert min(flapping, drag) > 40.0
     assert abs(flapping - drag) < most_nats
-    assert names_alike("rotor_drag")[0] == names_alike("blade_flapping")[0]
+    assert names_alike("rotor_drag") == names_alike("blade_flapping") is not None
 
 
 def test_gusts_have_no_drag_of_their_own_when_drag_is_left_out():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.cells import (
+    CELLS,
     COMMAND_VIEW,
-    GROUPS,
     REPLAY_VIEW,
     REST_VIEW,
     above_means,
@@ -89,4 +89,4 @@ def test_all_bands_of_a_channel_have_one_number_and_no_other_has_it():
             numbers = {channel_cells()[cell_numbers(view, band, channel)] for band in range(7)}
             assert len(numbers) == 1
             seen[view, channel] = numbers.pop()
-    assert len(set(seen.values())) == 3 * COUNT and len(channel_cells()) == GROUPS
+    assert len(set(seen.values())) == 3 * COUNT and len(channel_cells()) == CELLS

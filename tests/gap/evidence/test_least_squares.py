@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from airtouch.gap.evidence.least_squares import bounded_step
+from airtouch.gap.evidence.least_squares import bounded_step, normal_equations
 
-NOTHING = (np.zeros(3), np.zeros((3, 3)))
+FREE = np.full(3, -9.0), np.full(3, 9.0)
 
 
 @pytest.fixture
@@ -26,11 +26,9 @@ def system():
 def test_a_step_is_the_weighted_ridge_regression(system, offset):
     columns, values, weights, prior, rows, aim = system
     at = np.array([0.2, -0.1, 0.3])
-    x, offsets = (at[:2], at[2:]) if offset else (at, np.zeros(0))
-    n = len(x)
-    commands = NOTHING[0][:n], NOTHING[1][:n, :n]
-    free = np.full(n, -9.0), np.full(n, 9.0)
-    step, covariance = bounded_step(columns, prior, values, weights, x, offsets, *free, commands)
+    n = 2 if offset else 3
+    equations = normal_equations(columns, prior, values, weights, at)
+    step, covariance = bounded_step(equations, at[:n], (FREE[0][:n], FREE[1][:n]))
     expected = np.linalg.lstsq(rows, np.concatenate([aim, -at / prior]), rcond=None)[0]
     np.testing.assert_allclose(step, expected, rtol=1e-9)
     np.testing.assert_allclose(covariance, np.linalg.inv(rows.T @ rows)[:n, :n], rtol=1e-9)
@@ -39,18 +37,18 @@ def test_a_step_is_the_weighted_ridge_regression(system, offset):
 def test_a_parameter_at_its_bound_stays_and_the_others_are_best_beside_it(system):
     columns, values, weights, prior, rows, aim = system
     x, low, high = np.zeros(3), np.full(3, -9.0), np.array([0.0, 9.0, 9.0])  # the first would rise to 1
-    step, covariance = bounded_step(columns, prior, values, weights, x, np.zeros(0), low, high, NOTHING)
+    equations = normal_equations(columns, prior, values, weights, x)
+    step, covariance = bounded_step(equations, x, (low, high))
     expected = lsq_linear(rows, np.concatenate([aim, np.zeros(3)]), (low, np.maximum(high, 1e-300)), tol=1e-12).x
     assert step[0] == 0.0
     np.testing.assert_allclose(step, expected, atol=1e-6)
     np.testing.assert_allclose(covariance[1:, 1:], np.linalg.inv((rows.T @ rows)[1:, 1:]), rtol=1e-9)
-    down, _ = bounded_step(columns, prior, values, weights, x, np.zeros(0), np.array([-9.0, 0.0, -9.0]),
-                           np.full(3, 9.0), NOTHING)
+    down, _ = bounded_step(equations, x, (np.array([-9.0, 0.0, -9.0]), FREE[1]))
     assert down[1] == 0.0 < down[0]
-    away, _ = bounded_step(columns, prior, -values, weights, x, np.zeros(0), low, high, NOTHING)
+    away, _ = bounded_step(normal_equations(columns, prior, -values, weights, x), x, (low, high))
     assert away[0] < 0.0, "away from its bound it is free"
-    none, all_known = bounded_step(columns[:1], prior[:1], values, weights, x[:1], np.zeros(0), low[:1], high[:1],
-                                   (np.zeros(1), np.zeros((1, 1))))
+    none, all_known = bounded_step(normal_equations(columns[:1], prior[:1], values, weights, x[:1]), x[:1],
+                                   (low[:1], high[:1]))
     assert none.tolist() == [0.0] and all_known.shape == (1, 1)
 
 
@@ -58,12 +56,11 @@ def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(sy
     columns, values, weights, prior, rows, aim = system
     rng = np.random.default_rng(1)
     jacobian, misfit = rng.normal(size=(8, 3)), rng.normal(size=8)
-    free = np.full(3, -9.0), np.full(3, 9.0)
-    step, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free,
-                           (jacobian.T @ misfit, jacobian.T @ jacobian))
+    equations = normal_equations(columns, prior, values, weights, np.zeros(3))
+    step, _ = bounded_step(equations.with_power(jacobian.T @ misfit, jacobian.T @ jacobian), np.zeros(3), FREE)
     both = np.linalg.lstsq(np.vstack([rows, jacobian]), np.concatenate([aim, np.zeros(3), misfit]), rcond=None)[0]
     np.testing.assert_allclose(step, both, rtol=1e-9)
-    damped, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free, NOTHING, damping=1.0)
+    damped, _ = bounded_step(equations, np.zeros(3), FREE, damping=1.0)
     normal = rows.T @ rows
     doubled = normal + np.diag(np.diag(normal))
     np.testing.assert_allclose(doubled @ damped, rows.T @ np.concatenate([aim, np.zeros(3)]))

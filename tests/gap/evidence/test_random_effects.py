@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.answer.named_effects import chosen_effects
+from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.evidence import random_effects, vibration_lines
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
@@ -130,7 +130,7 @@ def test_power_of_lines_is_that_of_simulated_flights(study_apart, amplitude):
 def select_from(study, flights):
     data = Data(study, flights)
     selection = select(data, all_candidates())
-    return [s.name for s in selection.steps], {e.name: e.parameters for e in chosen_effects(data, selection)}, data
+    return [s.name for s in selection.steps], {e.name: e.parameters for e in named_effects(data, selection)}, data
 
 
 @pytest.mark.parametrize(("amplitude", "seed"), [(0.3, 41), (3.0, 43)])

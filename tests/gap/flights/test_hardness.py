@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import airtouch.gap.measure as measure
 from airtouch.gap.flights.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
+from airtouch.gap.nominal.consistency import flown_unlike
 
 FIRST = np.array([0, 128, 256])
 FREQUENCY = np.fft.rfftfreq(256, 0.01)
@@ -72,7 +72,7 @@ def test_a_flight_flown_unlike_its_baseline_is_said_so():
     study = SimpleNamespace(floor=SimpleNamespace(slopes=slopes))
     for name, flight in (calm, hard, nominal):
         flight.name = name
-        notes = measure.flown_unlike(study, [flight])
+        notes = flown_unlike(study, [flight])
         assert bool(notes) == (name != "usual")
         assert name == "usual" or {"calm": "calmer", "hard": "harder"}[name] in notes[0]
 

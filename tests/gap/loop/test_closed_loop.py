@@ -7,11 +7,14 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
+from airtouch.gap.edges import edge_response
 from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
-from airtouch.gap.loop import command_spectra, controller, edge_response, identify, loop_model, noise_spectra, turning
+from airtouch.gap.loop import command_spectra, controller, identify, loop_model, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
+from airtouch.gap.loop.command_response import accelerations_per_command
+from airtouch.gap.loop.set_point_steps import NO_STEP
 from airtouch.gap.naming import judging
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import terms
@@ -78,7 +81,8 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, with_effects = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
     measured = spectrum(effects)
     for i, axis in enumerate(controller.AXES):
-        strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), axis_plant(row, axis), nominal[:, i])
+        strengths = identify.noise_strengths(
+            controller.firmware(row, axis), axis_plant(row, axis), nominal[:, i]).strengths
         f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
         expected = command_spectra.through_window(strengths @ noise_spectra.noise_power(
             controller.firmware(with_effects, axis), axis_plant(with_effects, axis), fine))
@@ -176,7 +180,7 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
         part = axis_plant(row, axis)
         spectra = [noise_spectra.noise_power(c, part, f), loop_model.excess_phase(c, part)]
         if axis != "thrust":
-            spectra += [turning.turning_per_command(c, part, strengths, f),
+            spectra += [*accelerations_per_command(c, part, strengths, f, 0.0, [NO_STEP]),
                         loop_model.torque_per_command(c, part, f)]
         return (c, part), np.concatenate([np.ravel(x) for x in spectra])
 

@@ -10,9 +10,9 @@ import airtouch.gap.diagnose as diagnose
 import airtouch.gap.measure as measure
 import gap_flights
 from airtouch import vehicle as vehicles
+from airtouch.gap.edges.edge_effects import exact_sensors
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
-from airtouch.gap.loop.edge_response import calm
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
@@ -124,7 +124,7 @@ def test_what_the_commands_do_not_tell_of_the_torque_is_noise_of_the_loop():
 def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     """Share of the roll commands' power that noise of the gyro makes: flights with that noise alone."""
     vehicle = vehicles.load(VEHICLE)
-    gyro_only = replace(calm(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
+    gyro_only = replace(exact_sensors(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
     spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in fly([], BASELINE, v)])
                for v in (vehicle, gyro_only)]
     all_sensors, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)

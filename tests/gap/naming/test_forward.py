@@ -5,7 +5,7 @@ import pytest
 from airtouch.gap.naming import forward as module
 from airtouch.gap.naming.forward import MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN, Search, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def select(monkeypatch):
     def run(candidates, passing=None, looked_at=(), left=()):
         def judged(name, so_far=0.0):
             gain, evidence = candidates[name]
-            return Judged(name, (), so_far + gain, full=name not in looked_at, evidence=evidence)
+            return Candidate(name, (), so_far + gain, full=name not in looked_at, evidence=evidence)
 
         def round_of(on, worth, chosen, progress, promising):
             names = [n for n in worth if n not in added]
@@ -90,7 +90,7 @@ def test_beside_a_deviation_only_those_are_judged_again_that_gained_something(se
 
 
 def test_an_effect_that_comes_and_goes_is_the_first_step(select):
-    passing = Judged("wake", (), 60.0, evidence=30.0)
+    passing = Candidate("wake", (), 60.0, evidence=30.0)
     state, _ = select({"a": (100.0, 20.0)}, passing)
     assert names(state) == [("wake", True), ("a", True)]
     assert state.singles["wake"] is passing and state.least["wake"] == LEAST_GAIN

@@ -1,4 +1,4 @@
-"""Which variants may stand beside the effects that are held, and what their choice costs."""
+"""Which variants may stand beside the effects that are chosen, and what their choice costs."""
 
 import numpy as np
 import pytest
@@ -14,16 +14,16 @@ def held(name, number=0):
 
 
 def test_a_variant_pays_for_the_choice_among_those_of_as_many_terms():
-    costs = {(len(v.terms), v.choice) for v in addable("gust", CANDIDATES["gust"], ())}
+    costs = {(len(v.terms), v.choice_cost) for v in addable("gust", CANDIDATES["gust"], ())}
     assert costs == {(1, np.log(3.0)), (2, np.log(3.0))}, "three lengths, without and with drag"
-    assert [v.choice for v in addable("mass", CANDIDATES["mass"], ())] == [0.0]
+    assert [v.choice_cost for v in addable("mass", CANDIDATES["mass"], ())] == [0.0]
 
 
 def test_what_is_held_is_not_added_again_but_for_another_rotor():
     assert addable("mass", CANDIDATES["mass"], held("mass")) == []
     others = addable("weak_motor", CANDIDATES["weak_motor"], held("weak_motor", 2))
     assert [v.terms[0].values["rotor"] for v in others] == [1.0, 2.0, 4.0]
-    assert {v.choice for v in others} == {np.log(4.0)}
+    assert {v.choice_cost for v in others} == {np.log(4.0)}
 
 
 @pytest.mark.parametrize(("name", "beside", "some"), [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import airtouch.gap.diagnose as diagnose
-from airtouch.gap.answer.shrink import Shrink
+from airtouch.gap.answer.shrink import Shrink, gap_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.result import Quantity
@@ -27,7 +27,7 @@ def test_both_effects_are_named_and_nothing_else(study, effects):
     """Each was missed beside the other once: by the fit, by the first look, by what the first must leave."""
     chosen = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
     assert {s.name for s in chosen.named} == set(effects)
-    assert chosen.free_after < chosen.allowed
+    assert chosen.nameless_beside < chosen.allowed
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,8 @@ def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(delayed,
     requests = []
     monkeypatch.setattr(diagnose, "select", lambda *of, **_: requests.append(of[0]) or selection)  # it looks at no gap
     if not closes:
-        monkeypatch.setattr(diagnose, "shrink_of", lambda *_: Shrink(1.4, 1.36, Quantity(0.1)))
+        little = Shrink(1.4, 1.36, Quantity(0.1))
+        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), named=little))
     diagnosis = diagnose.brief(recorded, data.flights, data=data)
     assert requests == [data]
     assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])

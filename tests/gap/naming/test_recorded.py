@@ -1,29 +1,30 @@
 """Which effects must close a part of the gap of recorded flights to be named, and how much of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from airtouch.gap.naming.recorded import LEAST_CLOSED, STANDS_OUT, closes_too_little, must_close_the_gap
-from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import terms
 
 
 def named(name, gate=(), key=None):
     """A selection that names one effect."""
-    term = SimpleNamespace(name=name, kind=terms(name)[0].kind, gate=gate, active=lambda: name)
+    term = replace(terms(name)[0], gate=gate)
     return SimpleNamespace(chosen=SimpleNamespace(terms=(term,)), named=(SimpleNamespace(key=key or name),))
 
 
 def flights(recorded):
     """Data whose loop model knows that a delay of the motors changes the loop."""
-    law = SimpleNamespace(changes_loop=lambda active: "actuator_delay" in active)
+    law = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator_delay" for a in active))
     return SimpleNamespace(study=SimpleNamespace(recorded=recorded, controller=law))
 
 
 @pytest.mark.parametrize(("selection", "must"), [
     (named("actuator_delay"), True), (named("mass"), False), (named("wind", gate=((0, 1),)), True),
-    (named("downwash", gate=((0, 1),), key=TOLD), False), (SimpleNamespace(chosen=None, named=()), False)])
+    (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), False), (SimpleNamespace(chosen=None, named=()), False)])
 def test_recorded_flights_hold_effects_of_the_loop_and_passing_ones_against_the_gap(selection, must):
     assert must_close_the_gap(flights(recorded=True), selection) == must
     assert not must_close_the_gap(flights(recorded=False), selection)

@@ -8,10 +8,10 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, select
-from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, crossed
+from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, cross_validated
 from airtouch.gap.naming.looks import HOPELESS
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, with_a_push
@@ -24,9 +24,10 @@ def trial(*flights):
 def test_of_variants_with_as_many_terms_the_best_is_taken():
     on = trial(weak(r3=0.005))
     best = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
-    by_rotor = [crossed(on, "weak_motor", variant, None, np.log(4.0)) for variant in all_candidates()["weak_motor"]]
+    by_rotor = [cross_validated(on, "weak_motor", variant, None, np.log(4.0))
+                for variant in all_candidates()["weak_motor"]]
     assert best.full and best.terms[0].values["rotor"] == 3.0
-    assert best.gain == max(j.gain for j in by_rotor) and best.choice == np.log(4.0)
+    assert best.gain == max(j.gain for j in by_rotor) and best.choice_cost == np.log(4.0)
     assert best.evidence == best.gain, "nothing is known of nominal flights"
 
 
@@ -36,7 +37,7 @@ def test_a_companion_must_earn_its_place_beside_the_effect(drag, names):
     on = trial(swaying(drag, 0.02))
     best = round_of(on, candidates_of(["gust"]), None)["gust"]
     length = best.terms[0].values["length"]
-    alone, both = (crossed(on, "gust", variant, None, np.log(3.0)) for variant in all_candidates()["gust"]
+    alone, both = (cross_validated(on, "gust", variant, None, np.log(3.0)) for variant in all_candidates()["gust"]
                    if variant[0].values["length"] == length)
     assert both.gain > alone.gain and (both.gain - alone.gain > LEAST_GAIN) == (len(names) == 2)
     assert [t.name for t in best.terms] == names and best.gain == (both if len(names) == 2 else alone).gain
@@ -80,7 +81,7 @@ def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are(
 def test_each_half_is_looked_at_as_the_hypothesis_fitted_on_the_other_leaves_it():
     """Of a push in one half of the flights the other half's fit leaves something in both, and its own nothing."""
     on = trial(*(hover(20 + k, (0.0, 0.0, 0.0 if k % 2 else -DOWN), length_s=10.0) for k in range(4)))
-    mass = crossed(on, "mass", terms("mass"), None, 0.0)
+    mass = cross_validated(on, "mass", terms("mass"), None, 0.0)
     with_own_fits = replace(mass, fits=mass.fits[::-1])
     crosswise, own = (round_of(on, candidates_of(["imu_bias"]), before)["imu_bias"] for before in (mass, with_own_fits))
     assert crosswise.gain < mass.gain - 100.0 < mass.gain - 20.0 < own.gain
@@ -125,7 +126,7 @@ def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatc
     data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
     assert select.select(data, candidates_of(["mass"])) is answer
     (judged_alone,) = judgements
-    assert isinstance(judged_alone["mass"], Judged) and judged_alone["mass"].gain > 100.0
+    assert isinstance(judged_alone["mass"], Candidate) and judged_alone["mass"].gain > 100.0
 
 
 def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import shortfall
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.contradiction import contradicted, losses
 from airtouch.gap.naming.forward import MOST_EFFECTS
-from airtouch.gap.naming.passing_effect import seconds
-from airtouch.gap.naming.selection import Judged, probabilities
-from airtouch.gap.passing.gates import TOLD, gated
+from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Scatter, size_of
+from airtouch.gap.signatures.scatter import FALSE_SHARE, Scatter, size_of
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
@@ -40,14 +40,14 @@ def test_where_nothing_is_nothing_is_found():
     assert selection.steps == () and selection.chosen is None and selection.explained
     assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least)
     assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
-    assert selection.free_before == selection.free_after < 12.0
+    assert selection.nameless_alone == selection.nameless_beside < 12.0
     assert not any(j.full for j in selection.singles.values())
     assert not selection.assumed and selection.nominal_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
-    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice == 0.0
-    assert motor.choice == pytest.approx(np.log(4.0)), "one of four rotors"
-    assert selection.singles["wind"].choice == pytest.approx(np.log(2.0))
+    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice_cost == 0.0
+    assert motor.choice_cost == pytest.approx(np.log(4.0)), "one of four rotors"
+    assert selection.singles["wind"].choice_cost == pytest.approx(np.log(2.0))
 
 
 def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
@@ -65,7 +65,7 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert 0.5 * true < np.sqrt(bias.variance[2]) < 4.0 * true
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
-    assert selection.free_before > 0.9 * step.gain and selection.free_after < 12.0 and selection.explained
+    assert selection.nameless_alone > 0.9 * step.gain and selection.nameless_beside < 12.0 and selection.explained
     assert selection.chosen.terms == step.terms
 
 
@@ -146,7 +146,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
     single = selection.singles["downwash"]
     without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
-    assert single.choice > 0.0 and single.gain == pytest.approx(without_price - single.choice)
+    assert single.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.choice_cost)
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
@@ -161,7 +161,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
     selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
     for step in selection.steps:
-        beyond = study.scatter.unusual("downwash", size_of(step.gain / seconds(data), step.strength))
+        beyond = study.scatter.unusual("downwash", size_of(step.gain / data.seconds, step.strength))
         assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
 
 
@@ -182,7 +182,7 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
 def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
-    gain = gated(Data(study, flights, slow=True))["downwash"].gain
+    gain = gated_effects(Data(study, flights, slow=True))["downwash"].gain
     monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
     assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
 
@@ -194,7 +194,7 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     selection, data = select_from(flights, ("mass",), scattered(), ())
     wake, mass = selection.steps
     assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
-    least, share, gain = (size_of(nats / seconds(data), wake.strength) for nats in (mass.share, wake.share, wake.gain))
+    least, share, gain = (size_of(nats / data.seconds, wake.strength) for nats in (mass.share, wake.share, wake.gain))
 
     def names_where_nominal_flights_have(size):
         """FALSE_SHARE of the nominal flights have a larger one."""
@@ -207,14 +207,15 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     assert names_where_nominal_flights_have(0.5 * (least + share)) == {"mass", "downwash"}
 
 
-@pytest.mark.parametrize(("overhead", "key", "since_s"), [((9.0, 12.0), TOLD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
+@pytest.mark.parametrize(("overhead", "key", "since_s"), [
+    ((9.0, 12.0), KNOWN_OVERHEAD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
 def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
     """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
     study = replace(scattered(), overhead=(("pushed", *overhead),))
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
     assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
-    assert (step.choice == 0.0) == (key == TOLD)
+    assert (step.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
 
 
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
@@ -241,7 +242,7 @@ def test_halves_share_no_block_and_leave_none_out():
 
 
 def test_flights_last_as_long_as_their_samples():
-    assert seconds(Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True)) == pytest.approx(40.0)
+    assert Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True).seconds == pytest.approx(40.0)
 
 
 def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
@@ -254,11 +255,11 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
     for candidate in beside.values():
         assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
         assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
-    dearer = judging.crossed(on, "mass", mass.terms, None, 0.5)
-    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice == 0.5
+    dearer = judging.cross_validated(on, "mass", mass.terms, None, 0.5)
+    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice_cost == 0.5
     motor = candidates_of(["weak_motor"])["weak_motor"][0]
-    both = judging.crossed(on, "weak_motor", motor, dearer, 0.25)
-    assert both.choice == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
+    both = judging.cross_validated(on, "weak_motor", motor, dearer, 0.25)
+    assert both.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
 
@@ -281,13 +282,14 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     on = judging.trial_of(data)
     loss, worst = contradicted(on, selection.chosen)
     assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
-    resting = [Part(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
+    resting = [BlockSet(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
     by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
                   for train, test in ((0, 1), (1, 0)))
     assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0
     assert selection.contradicted == (0.0, ""), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
-    exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,), free_after=1.0)
+    exact = replace(selection, simulated=True, nominal=6, contradicted=(loss, worst), steps=(weaker,),
+                    nameless_beside=1.0)
     assert exact.unlike == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
     assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
@@ -300,7 +302,7 @@ def test_a_right_effect_is_not_contradicted():
 
 
 def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():
-    gains = np.zeros(GROUPS)
+    gains = np.zeros(CELLS)
     lift, forward, at_rest = 2, 0, 1000
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
@@ -322,8 +324,8 @@ def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_our
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
-    assert recorded.free_before < 12.0 and exact.free_before > nominal.free_before + 100.0
-    other = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
+    assert recorded.nameless_alone < 12.0 and exact.nameless_alone > nominal.nameless_alone + 100.0
+    other = replace(exact, nominal=6, steps=(Candidate("mass", (), 1000.0),))
     same_models = replace(other, same_models=True)
     assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)

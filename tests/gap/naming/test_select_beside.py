@@ -12,7 +12,7 @@ from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import nameless, select
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, fly, noise
 from hovers import (
@@ -78,7 +78,7 @@ def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
     selection, _ = select_from([flight], ("motor_noise",))
     (step,) = selection.steps
     assert step.terms[0].values["time"] == time_s and selection.assumed
-    assert step.choice == pytest.approx(np.log(3.0)), "one of three times"
+    assert step.choice_cost == pytest.approx(np.log(3.0)), "one of three times"
     # four motors of their own, each with a quarter of the weight
     assert step.terms[0].values["rms"] == pytest.approx(0.6 / VEHICLE.gravity_mps2 * 2.0, rel=0.25)
 
@@ -93,7 +93,8 @@ def test_an_effect_of_the_loop_is_chosen_by_what_it_gains_in_the_commands(flying
     assert set(selection.least.values()) == {judging.FIRST_GAIN}
     assert step.evidence == step.gain  # nothing is known of nominal flights' scatter
     free = len(step.terms[0].free)
-    assert step.gain == pytest.approx(own_gain(data, step.terms) - (free - 1) * judging.PRICE - step.choice, rel=0.05)
+    price = (free - 1) * judging.PRICE + step.choice_cost
+    assert step.gain == pytest.approx(own_gain(data, step.terms) - price, rel=0.05)
 
 
 def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(flying, tmp_path):
@@ -105,7 +106,7 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
     finally:
         effects.unregister("stiff_climb")
     (step,) = selection.steps
-    assert step.name == "stiff_climb" and step.full and step.choice == 0.0
+    assert step.name == "stiff_climb" and step.full and step.choice_cost == 0.0
     assert step.terms[0].values["factor"] == pytest.approx(2.5, rel=0.35)
 
 
@@ -116,7 +117,7 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     _, *variants = all_candidates()["controller_gain"]
     assert together.strength.shape == together.variance.shape == (len(variants),) == (4,)
     for i, terms in enumerate(variants):
-        single = judging.crossed(on, "controller_gain", terms, None, np.log(len(variants)))
+        single = judging.cross_validated(on, "controller_gain", terms, None, np.log(len(variants)))
         assert together.strength[i] == single.strength[i] and together.variance[i] == single.variance[i]
         assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.strength, i).any()
     assert together.gain < judging.FIRST_GAIN, "a nominal flight"
@@ -161,7 +162,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
     data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
-    packet_loss = judging.crossed(on, "packet_loss", (term,), None, 0.0)
+    packet_loss = judging.cross_validated(on, "packet_loss", (term,), None, 0.0)
     assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
     assert nameless(on, None) - nameless(on, packet_loss) == pytest.approx(packet_loss.gain)
 
@@ -178,15 +179,15 @@ def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcome
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
-    late = judging.crossed(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
-    both = judging.crossed(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
+    late = judging.cross_validated(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
+    both = judging.cross_validated(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
-    assert sure - unsure > 5.0 and late.beyond == 0.0 and both.choice == 0.5
-    assert both.beyond == pytest.approx(sure - unsure)
+    assert sure - unsure > 5.0 and late.gained_while_certain == 0.0 and both.choice_cost == 0.5
+    assert both.gained_while_certain == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
-    third = judging.crossed(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
-    assert third.beyond == both.beyond, "paid once"
+    third = judging.cross_validated(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
+    assert third.gained_while_certain == both.gained_while_certain, "paid once"
 
 
 @pytest.mark.parametrize("simulated", [True, False])

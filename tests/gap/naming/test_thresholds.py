@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.cells import COMMAND_VIEW, GROUPS, REPLAY_VIEW, REST_VIEW, cell_numbers
+from airtouch.gap.evidence.cells import CELLS, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.naming import thresholds
 from airtouch.gap.naming.judging import LEAST_GAIN
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signals.channels import CHANNELS
 
 FORCE_X, FORCE_Z, TORQUE_X, RATE_Y = (
@@ -33,8 +33,8 @@ ELSEWHERE = [
 
 
 def gains(*cells):
-    """Gains (GROUPS,) of so many nats in cells (view, band, channel), and 0 in the others."""
-    out = np.zeros(GROUPS)
+    """Gains (CELLS,) of so many nats in cells (view, band, channel), and 0 in the others."""
+    out = np.zeros(CELLS)
     for place, nats in cells:
         out[cell_numbers(*place)] += nats
     return out
@@ -64,7 +64,7 @@ def trial(recorded=False, same_models=True):
 
 
 def fitted(gain, full=True):
-    return Judged("mass", (), gain, fits=(SimpleNamespace(), SimpleNamespace()), full=full)
+    return Candidate("mass", (), gain, fits=(SimpleNamespace(), SimpleNamespace()), full=full)
 
 
 @pytest.fixture

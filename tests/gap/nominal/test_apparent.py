@@ -1,4 +1,4 @@
-"""Apparent strengths of effects in a simulated flight that has none."""
+"""ApparentStrengths strengths of effects in a simulated flight that has none."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
     pressed = free = 0
     for name, hypotheses in all_candidates(()).items():
         term = strength_term(hypotheses[0])
-        if name not in nominal.strengths or term.kind != MEAN:
+        if name not in nominal.strengths or term.shows_in != MEAN:
             continue
         low = term.among_all(term.bounds()[0], -np.inf)
         for strength, error, least in zip(nominal.strengths[name], nominal.errors[name], low, strict=True):

@@ -10,7 +10,7 @@ from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import is_recorded
 from airtouch.gap.nominal.calibrate import calibrated
-from airtouch.gap.signatures.nominal_scatter import Apparent, table
+from airtouch.gap.signatures.scatter import ApparentStrengths, table
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from gap_flights import VEHICLE, fly
 
@@ -28,9 +28,9 @@ def without_fits(monkeypatch):
     still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
 
     def scatter(study, flights, without=()):
-        return scatter_of([Apparent(still, still, 0.0)] * len(flights), any(is_recorded(f) for f in flights))
+        return scatter_of([ApparentStrengths(still, still, 0.0)] * len(flights), any(is_recorded(f) for f in flights))
 
-    monkeypatch.setattr(calibrate, "nominal_scatter", scatter)
+    monkeypatch.setattr(calibrate, "baseline_scatter", scatter)
 
 
 def with_a_push(flight, metres_per_second2):

@@ -14,7 +14,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.passing import gates, overhead
-from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
@@ -56,7 +56,7 @@ def nominal_flight():
 def evidence(study, one):
     """Size of a wake in SECONDS beyond its limit, and its gain."""
     known = overhead.with_overhead(study, one, SECONDS)
-    wake = gates.gated(Data(known, [one]))[gates.TOLD]
+    wake = gates.gated_effects(Data(known, [one]))[gates.KNOWN_OVERHEAD]
     size = size_of(wake.gain / (len(one) * PERIOD_S), wake.strength)
     return known.scatter.unusual(wake.key, size), wake.gain
 
@@ -80,14 +80,14 @@ def test_a_flight_that_shakes_all_along_has_no_wake_in_told_seconds(study, nomin
 
 
 def test_the_rest_of_a_flight_is_apart_from_the_told_seconds(study, nominal_flight):
-    """A shake in the told seconds and a fifth of a second around them is none of the rest's, one elsewhere is."""
+    """A shake in the known seconds and a fifth of a second around them is none of the rest's, one elsewhere is."""
     t = np.arange(len(nominal_flight)) * PERIOD_S
     shake = 0.5 * np.random.default_rng(3).normal(size=len(t))
 
     def size(acts):
         force = nominal_flight.acceleration + np.where(acts, shake, 0.0)[:, None] * [0.0, 0.0, 1.0]
         flight = replace(nominal_flight, acceleration=force)
-        return overhead.with_overhead(study, flight, ((8.0, 18.0),)).scatter.passing[gates.TOLD][0]
+        return overhead.with_overhead(study, flight, ((8.0, 18.0),)).scatter.passing[gates.KNOWN_OVERHEAD][0]
 
     near_overhead = (t >= 7.8) & (t < 18.2)
     assert size(near_overhead) == size(np.zeros(len(t), bool)) < size(~near_overhead) - 0.02
@@ -95,9 +95,10 @@ def test_the_rest_of_a_flight_is_apart_from_the_told_seconds(study, nominal_flig
 
 def test_sizes_scatter_as_those_that_are_looked_for(study, nominal_flight):
     looked_for = study.scatter.passing[OVERHEAD]
-    assert overhead.with_overhead(study, nominal_flight, SECONDS).scatter.passing[gates.TOLD][1] == looked_for[1]
+    known = overhead.with_overhead(study, nominal_flight, SECONDS).scatter.passing[gates.KNOWN_OVERHEAD]
+    assert known[1] == looked_for[1]
     nearly_all = ((0.0, 0.9 * len(nominal_flight) * PERIOD_S),)  # so that the rest is too short to be a yardstick
-    assert overhead.with_overhead(study, nominal_flight, nearly_all).scatter.passing[gates.TOLD] == looked_for
+    assert overhead.with_overhead(study, nominal_flight, nearly_all).scatter.passing[gates.KNOWN_OVERHEAD] == looked_for
 
 
 def test_no_seconds_change_nothing(study, nominal_flight):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from airtouch.gap.features.feature_space import Standard, directions
 from airtouch.gap.relations.build import CLEAR_NAMELESS, PairedFlights, Whitening, _beyond_noise, _scatter_of_nameless
-from airtouch.gap.relations.feature_space import Standard, directions
 from airtouch.gap.relations.learning import drawings
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
-from airtouch.gap.relations.density import coordinates_of, fit, log_density, unchanged
+from airtouch.gap.relations.density import fit, log_density, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 Q = 6
@@ -59,12 +59,12 @@ def test_scatter_about_the_curve_widens_the_density(way):
     assert result.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
 
 
-def test_coordinates_turn_a_covariance_into_one():
+def test_a_rescaling_turns_a_covariance_into_one():
     rng = np.random.default_rng(6)
     factors, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
-    coordinates = coordinates_of(factors)
+    rescaling = rescaling_of(factors)
     exact = multivariate_normal(np.zeros(Q), np.eye(Q) + factors @ factors.T).logpdf(values)
-    assert coordinates.level + log_density(coordinates(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
+    assert rescaling.level + log_density(rescaling(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
 
 
 def test_several_parameters_are_solved_interaction():

@@ -92,3 +92,33 @@ def test_scatter_is_that_beyond_nominal_flights():
     flights = shift + rng.normal(size=(4000, Q)) + 1.5 * rng.normal(size=(4000, 1)) * np.eye(Q)[2]
     effect_class = learn_class("one", "one", None, strength, shift, flights)
     assert np.sqrt(effect_class.variances) == pytest.approx([1.5 / 5.0], rel=0.08)
+
+
+def test_a_curve_has_a_knot_for_every_factor_of_three():
+    """Strengths over a factor of 3^6, but for the weakest hundredth: six stretches, each of nearly that factor."""
+    strength = np.geomspace(1.0, 3.0 ** 6, N)
+    shift = strength[:, None] * np.eye(Q)[0]
+    knots = learn_class("one", "one", None, strength[:, None], shift, shift).knots
+    assert len(knots) == 7
+    assert np.diff(knots) == pytest.approx(np.log(3.0), rel=0.02)
+
+
+def test_no_more_than_the_sixteen_widest_directions_of_scatter_are_learned():
+    """Shifts have length 50 and flights scatter in 20 directions, by 0.2 to 0.6 of it."""
+    rng = np.random.default_rng(7)
+    many, dimensions = 3000, 30
+    spread = np.linspace(0.6, 0.2, 20)
+    shift = 50.0 * np.exp(0.01 * rng.normal(size=(many, 1))) * np.eye(dimensions)[0]
+    flights = shift + rng.normal(size=(many, dimensions))
+    flights[:, 1:21] += 50.0 * spread * rng.normal(size=(many, 20))
+    learned = learn_class("one", "one", None, shift[:, :1], shift, flights)
+    assert np.sqrt(learned.variances) == pytest.approx(spread[:16], rel=0.15)
+
+
+@pytest.mark.parametrize(("negative", "signed"), [(32, False), (48, True)])
+def test_a_class_has_two_signs_from_a_tenth_of_negative_strengths_on(negative, signed):
+    """Of 400 flights; a few that hit something may lie on the other side."""
+    strength = np.geomspace(3.0, 50.0, N) * np.where(np.arange(N) % (N // negative) == 0, -1.0, 1.0)
+    strength[np.flatnonzero(strength < 0.0)[negative:]] *= -1.0
+    shift = strength[:, None] * np.eye(Q)[0]
+    assert learn_class("one", "one", None, np.abs(strength[:, None]), shift, shift).signed is signed

@@ -7,10 +7,10 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
+from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.feature_space import Standard
-from airtouch.gap.relations.hypotheses import SIZES, FlightFeatures, LearnedModel
+from airtouch.gap.relations.hypotheses import SIZES, FlightHypotheses, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
@@ -34,7 +34,7 @@ def noise(seed=1):
 
 
 def test_evidence_of_two_effects_that_do_not_meet_is_the_sum_of_each():
-    features = FlightFeatures(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().model)
+    features = FlightHypotheses(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().model)
     single = {h.names[0]: h for h in features.single_effects()}
     both = next(h for h in features.with_one_more(single["mass"], lambda c, _: c.name == "wind"))
     assert both.evidence == pytest.approx(single["mass"].evidence + single["wind"].evidence, abs=0.05)
@@ -44,7 +44,7 @@ def test_something_without_a_name_is_a_mixture_of_normal_densities():
     of, values = library().model, 5.0 * noise(2)
     exact = logsumexp([multivariate_normal(np.zeros(Q), np.eye(Q) + s * s * of.nameless @ of.nameless.T).logpdf(values)
                        for s in SIZES]) - np.log(len(SIZES))
-    features = FlightFeatures(values, of)
+    features = FlightHypotheses(values, of)
     none = multivariate_normal(np.zeros(Q), np.eye(Q)).logpdf(values)
     assert features.nameless_evidence(features.none) == pytest.approx(exact - none)
 
@@ -121,7 +121,7 @@ def test_scatter_between_flights_averages_out():
     ("mass again", "mass", True)])
 def test_what_may_stand_beside_a_mass(other, effect, may):
     """Another name of it may not, another parameter of the same effect may if each has a class of its own."""
-    mass = FlightFeatures(noise() + 45.0 * np.eye(Q)[0], library().model).with_class(library().model.classes[0])
+    mass = FlightHypotheses(noise() + 45.0 * np.eye(Q)[0], library().model).with_class(library().model.classes[0])
     assert inference.may_stand_beside(replace(mass.fits[0].of, name=other, effect=effect), mass) is may
 
 
@@ -146,7 +146,7 @@ def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_t
     for true, share in (((45.0,), 0.01), ((45.0, 30.0), 0.02)):
         values = noise(4) + sum(size * np.eye(Q)[i] for i, size in enumerate(true))
         values[60:] *= 2.5
-        flight = FlightFeatures(values, wide.model)
+        flight = FlightHypotheses(values, wide.model)
         best = flight.with_class(wide.model.classes[0])
         if len(true) == 2:
             best = flight.with_two(*wide.model.classes[:2])
@@ -173,12 +173,12 @@ def test_two_parameters_of_one_effect_have_no_readings():
 def test_two_effects_are_no_sum_by_a_share_of_the_smaller_one():
     interaction = 0.5 * np.eye(Q)[:, 5:6]
     model = replace(library().model, interaction=interaction)
-    features = FlightFeatures(noise() + 40.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], model)
+    features = FlightHypotheses(noise() + 40.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], model)
     both = features.with_two(*model.classes[:2])
     smaller = np.linalg.norm(both.fits[1].shift)
     assert smaller == pytest.approx(10.0, abs=2.0)
-    assert features.coordinates(both.fits)(np.eye(Q)[5])[5] == pytest.approx((1.0 + (0.5 * smaller) ** 2) ** -0.5)
-    assert features.coordinates(both.fits[:1])(np.eye(Q)[5])[5] == pytest.approx(1.0)
+    assert features.rescaling(both.fits)(np.eye(Q)[5])[5] == pytest.approx((1.0 + (0.5 * smaller) ** 2) ** -0.5)
+    assert features.rescaling(both.fits[:1])(np.eye(Q)[5])[5] == pytest.approx(1.0)
 
 
 def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
@@ -205,3 +205,32 @@ def test_another_name_of_the_likeliest_effect_is_not_added_to_it():
     of = replace(library(), model=replace(library().model, classes=classes), nameless_share=np.zeros(2),
                  second_share=np.zeros(2), distance_scatter=np.zeros(2))
     assert len(infer(of, (noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1])[None]).classes) == 1
+
+
+def two_ways(cosine):
+    """Two classes whose directions have this cosine, and a flight without noise that has 30 and 20 of them."""
+    classes = library().model.classes[:2]
+    ways = np.eye(Q)[0], cosine * np.eye(Q)[0] + np.sqrt(1.0 - cosine ** 2) * np.eye(Q)[1]
+    model = LearnedModel(tuple(replace(c, table=np.tile(w, (1, 3, 1))) for c, w in zip(classes, ways, strict=True)),
+                         np.zeros((Q, 0)), np.zeros((Q, 0)))
+    return model, FlightHypotheses(30.0 * ways[0] + 20.0 * ways[1], model)
+
+
+def test_effects_fitted_in_turn_come_near_the_two_that_are_there():
+    """Each round leaves a share cosine^2 = 1/4 of the error of 15 and 7.5: three leave a 32nd and a 64th of 15."""
+    model, flight = two_ways(0.5)
+    start = flight.at_fits([flight.with_class(c).fits[0] for c in model.classes])  # projections: 40 and 35
+    assert [f.strength[0] for f in start.fits] == pytest.approx([40.0, 35.0], rel=5e-3)  # the grid is that fine
+    refitted = flight.refitted(start)
+    errors = [abs(f.strength[0] - true) for f, true in zip(refitted.fits, (30.0, 20.0), strict=True)]
+    assert errors == pytest.approx([15.0 / 32.0, 15.0 / 64.0], abs=0.08)
+
+
+def test_effects_are_not_refitted_to_something_less_likely():
+    """Classes flown up to 50: strengths of 60 and 40 explain the flight whole, and a fit would cut the first."""
+    model, flight = two_ways(0.0)
+    flight = FlightHypotheses(2.0 * flight.values, model)
+    whole = flight.at_fits([replace(flight.with_class(c).fits[0], strength=np.array([s]))
+                            for c, s in zip(model.classes, (60.0, 40.0), strict=True)])
+    assert flight.refitted(whole) is whole
+    assert flight.with_two(*model.classes).level == pytest.approx(whole.level - 0.5 * 10.0 ** 2, abs=0.5)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.features.flight_features import features, table
 from airtouch.gap.naming.related import inference_of
 from airtouch.gap.naming.select import select
 from airtouch.gap.relations import library
-from airtouch.gap.relations.features import features, names
 from airtouch.gap.relations.learning import drawings
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.simulation import batch
@@ -46,7 +46,7 @@ def test_a_file_holds_what_was_saved(tmp_path):
 def test_the_file_is_of_todays_features_and_effects():
     """Else `python -m airtouch.gap.relations.build` makes a new one."""
     shipped = library.shipped()
-    assert len(shipped.standard.middle) == len(names())
+    assert len(shipped.standard.middle) == len(table())
     assert {(c.name, c.shape) for c in shipped.model.classes} \
         == {(d.name, d.shape) for e in NAMES for d in drawings(e)}
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from airtouch.gap.relations import calibration, library, own_effect
-from airtouch.gap.relations.hypotheses import FlightFeatures
+from airtouch.gap.relations.hypotheses import FlightHypotheses
 from airtouch.gap.relations.learning import Scene, fly
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
@@ -59,13 +59,13 @@ def test_a_gyro_that_reads_too_much_is_the_likeliest_class_of_its_flights_and_si
         learned.model.classes)
     own, scene = learned.model.classes[-1], Scene(shipped.scenario, VEHICLE)
     for number, share in ((7001, 0.06), (7002, 0.12)):  # not of the flights that it was learned from
-        flight = FlightFeatures(learned.coordinates(fly(scene, number, [Active(effect, {"share": share})])[None])[0],
-                                learned.model)
+        flight = FlightHypotheses(learned.coordinates(fly(scene, number, [Active(effect, {"share": share})])[None])[0],
+                                  learned.model)
         first = flight.single_effects()[0]
         assert first.effects == {effect.name}
         (amount,), (deviation,) = own.readout(first.fits[0].strength)
         assert 0.05 * amount == pytest.approx(share, rel=0.4) and abs(0.05 * amount - share) < 3.0 * 0.05 * deviation
-    nothing = FlightFeatures(learned.coordinates(fly(scene, 7003)[None])[0], learned.model)
+    nothing = FlightHypotheses(learned.coordinates(fly(scene, 7003)[None])[0], learned.model)
     assert nothing.with_class(own).evidence < 3.0
 
 

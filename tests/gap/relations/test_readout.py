@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from airtouch.gap.relations import readout as readout_module
 from airtouch.gap.relations.readout import Readout, amount_of, read_out
 from airtouch.simulation.effects import get
 
@@ -86,3 +87,20 @@ def test_a_strength_of_which_both_signs_come_is_read_as_a_size():
     sign = np.where(np.arange(40) == 20, 1.0, -1.0)
     clear = Readout(("share",), size[:, None], (2.0 * size * sign)[:, None])
     assert clear.shows_sign(np.array([10.0])) and clear(np.array([10.0]))[0] == pytest.approx([-20.0], rel=1e-3)
+
+
+def test_weights_fall_as_a_normal_density_from_the_nearest_flight_or_from_one_width_away():
+    """Distances in units of the width: within the calibration as they are, beyond it less the way to it."""
+    width = readout_module.WIDTH
+    for distances, counted in (([-0.5, 1.0, 2.0], [0.5, 1.0, 2.0]), ([3.0, 4.0, 5.0], [1.0, 2.0, 3.0]),
+                               ([-3.0, -4.0, -5.0], [1.0, 2.0, 3.0])):
+        assert readout_module._weights(width * np.array(distances)) == pytest.approx(
+            np.exp(-0.5 * np.array(counted) ** 2))
+
+
+def test_the_deviation_is_that_of_flights_less_the_two_that_a_line_uses_up():
+    residual = np.random.default_rng(4).normal(size=(10, 1))
+    exact = np.sqrt((residual ** 2).sum() / (10.0 - 2.0))
+    assert readout_module._deviation(residual, np.ones(10)) == pytest.approx([exact])
+    twice = np.concatenate([residual, residual])  # half the weight: as many flights (Kish 1965)
+    assert readout_module._deviation(twice, np.repeat([1.0, 0.0], 10)) == pytest.approx([exact])

@@ -18,7 +18,7 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
-from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity, intervals
+from airtouch.gap.sealed import blind, blind_key, blind_run, blind_score, blind_severity, intervals
 from airtouch.gap.sealed.blind_severity import three_severities
 from airtouch.gap.signatures.random_draws import KINDS
 
@@ -100,7 +100,7 @@ def test_processes_that_die_again_and_again_are_told(blind_check, tmp_path, monk
 
 def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path):
     folder, _, study = blind_check
-    key = json.loads(blind.key_of(folder).read_text())["answers"]
+    key = json.loads(blind_key.key_of(folder).read_text())["answers"]
     name = next(n for n in sorted(key) if len(key[n]["effects"]) == 1)  # two take longer
     jobs = []
 
@@ -152,22 +152,22 @@ def test_flights_say_nothing_of_their_effect(blind_check):
 
 def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_check, tmp_path):
     folder, *_ = blind_check
-    key = blind.key_of(folder)
-    rescored = blind.score(folder, folder / "answers")  # the same answers may be scored once more
+    key = blind_key.key_of(folder)
+    rescored = blind_score.score(folder, folder / "answers")  # the same answers may be scored once more
     assert rescored["top_1"]["n"] == 4
     other = tmp_path / "other.json"
     other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
                                             "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))
     with pytest.raises(AirTouchError, match="opened for other answers"):
-        blind.score(folder, other)
+        blind_score.score(folder, other)
     edited_key = tmp_path / "key.json"
     edited_key.write_bytes(key.read_bytes() + b" ")
     with pytest.raises(AirTouchError, match="not the key that was sealed"):
-        blind.score(folder, folder / "answers", edited_key)
+        blind_score.score(folder, folder / "answers", edited_key)
     with pytest.raises(AirTouchError, match="--force"):
         blind.make(folder, 3)
     with pytest.raises(AirTouchError, match="no sealed.json"):
-        blind.open_key(tmp_path, "")
+        blind_key.open_key(tmp_path, "")
 
 
 def test_command_writes_figures(blind_check, tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.named_effects import chosen_effects
+from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.signals.lost_rows import bridging_power
@@ -49,5 +49,5 @@ def test_lost_rows_alone_are_named_alone(pairs, study):
         data = Data(study, [flight])
         selection = select(data, all_candidates())
         assert [s.name for s in selection.steps if s.named] == ["packet_loss"]
-        share = chosen_effects(data, selection)[0].parameters["share"]
+        share = named_effects(data, selection)[0].parameters["share"]
         assert share.high > 1.2 * share.value, "48 rows in 12 bursts say the share to a quarter at best"

@@ -4,9 +4,11 @@ import numpy as np
 
 import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
-from airtouch.gap.loop import controller, loop_model, turning
+from airtouch.gap.loop import controller, loop_model
 from airtouch.gap.loop.axis_plant import axis_plant
+from airtouch.gap.loop.command_response import accelerations_per_command
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
+from airtouch.gap.loop.set_point_steps import NO_STEP
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
@@ -92,15 +94,15 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
 
 
 def test_turning_under_an_outside_torque_is_the_closed_loop_s():
-    """No gyro noise, no steps, no folds: u = -(whole / s) d / (1 + L), the vehicle turns by d / (1 + L)."""
+    """No gyro noise, no steps, no folds: u = -(K / s) d / (1 + P K), the vehicle turns by d / (1 + P K)."""
     row = prepare(vehicles.load("crazyflie-2.1-flow"), ())[0][0]
     c = controller.Controller(0.01, 6.0, 0.4)
     f = np.geomspace(0.8, 20.0, 12)
     s = 2j * np.pi * f
-    plant, *_, open_loop = loop_model.loop_parts(c, axis_plant(row, "roll"), f)
+    roll = axis_plant(row, "roll")
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    expected = turning.turning_per_command(c, axis_plant(row, "roll"), strengths, f)
-    np.testing.assert_allclose(expected, -s / open_loop, rtol=1e-9)
+    (expected,) = accelerations_per_command(c, roll, strengths, f, 0.0, [NO_STEP])
+    np.testing.assert_allclose(expected, -s / loop_model.loop_parts(c, roll, f).controller, rtol=1e-9)
 
 
 def test_more_inertia_leaves_more_of_an_outside_torque():
@@ -135,12 +137,12 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     vehicle, f = vehicles.load("crazyflie-2.1-flow"), frequencies(AIR)
     late = Active(get("sensor_latency"), {"delay": 0.003})
     simulated = empirical([late]) / empirical([])
-    noise_alone = np.eye(5)[:1]
+    noise_alone = np.eye(5)[0]
     predicted = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        roll = axis_plant(row, "roll")
-        predicted.append(turning.turning_per_command(controller.firmware(row, "roll"), roll, noise_alone, f)[0])
+        predicted += accelerations_per_command(
+            controller.firmware(row, "roll"), axis_plant(row, "roll"), noise_alone, f, 0.0, [NO_STEP])
     band = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
     ratio = (simulated / (predicted[1] / predicted[0]))[band].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)

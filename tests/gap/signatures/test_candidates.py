@@ -5,15 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.result import Found
+from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.alike import interchangeable, names_alike
-from airtouch.gap.signatures.candidates import all_candidates, gated, is_random, kind_of, strength_term, term_of, terms
+from airtouch.gap.signatures.candidates import (
+    all_candidates,
+    gated_variants,
+    is_random,
+    shows_in,
+    strength_term,
+    term_of,
+    terms,
+)
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.simulation.effects import EFFECTS, get
 
 
 def kinds(variant):
-    return [(t.name, t.kind, t.companion) for t in variant]
+    return [(t.name, t.shows_in, t.companion) for t in variant]
 
 
 def test_every_effect_of_the_registry_is_a_candidate_but_those_left_out():
@@ -40,7 +48,7 @@ def test_a_ground_effect_is_tried_without_and_with_its_random_part():
 
 
 def test_a_wake_is_never_tried_without_its_random_part():
-    for variants in (all_candidates()["downwash"], gated()["downwash"]):
+    for variants in (all_candidates()["downwash"], gated_variants()["downwash"]):
         assert [kinds(v) for v in variants] == [[("downwash", MEAN, False), ("downwash", SPECTRUM, True)]]
     assert strength_term(variants[0]) is variants[0][1]
     assert is_random("downwash") and not is_random("ground_effect")
@@ -51,17 +59,17 @@ def test_moving_air_has_drag_beside_it_unless_drag_is_left_out():
         variants = all_candidates()[name]
         assert [len(v) for v in variants] == [1] * len(terms(name)) + [2] * len(terms(name))
         assert kinds(variants[-1])[1] == ("rotor_drag", MEAN, True)
-        assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + gated()[name])
+        assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + gated_variants()[name])
 
 
-@pytest.mark.parametrize(("name", "kind"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
-def test_an_effect_shows_where_its_record_says(name, kind):
-    assert kind_of(get(name)) == kind and all(t.kind == kind for t in terms(name))
+@pytest.mark.parametrize(("name", "where"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
+def test_an_effect_shows_where_its_record_says(name, where):
+    assert shows_in(get(name)) == where and all(t.shows_in == where for t in terms(name))
 
 
-@pytest.mark.parametrize(("like", "kind"), [("gust", SPECTRUM), ("rotor_drag", MEAN), ("time_jitter", MEAN)])
-def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(like, kind):
-    assert kind_of(replace(get(like), name="of one's own")) == kind
+@pytest.mark.parametrize(("like", "where"), [("gust", SPECTRUM), ("rotor_drag", MEAN), ("time_jitter", MEAN)])
+def test_an_effect_without_a_record_is_random_where_two_seeds_give_two_forces(like, where):
+    assert shows_in(replace(get(like), name="of one's own")) == where
 
 
 def test_mass_and_thrust_are_two_names_of_one_thing():
@@ -72,12 +80,18 @@ def test_mass_and_thrust_are_two_names_of_one_thing():
 def test_a_named_effect_is_its_own_variant_again():
     (own,) = (t for t in terms("motor_noise") if t.values["time"] == 0.02)
     values = own.quantities(own.scaled({**own.values, "rms": 0.05}))
-    again = term_of(Found("motor_noise", values, (("flight", 1.0, 2.0),)))
+    again = term_of(NamedEffect("motor_noise", values, (("flight", 1.0, 2.0),)))
     assert again.values == {**own.values, "rms": pytest.approx(0.05)}
-    assert again.gate == (("flight", 1.0, 2.0),) and again.kind == SPECTRUM
+    assert again.gate == (("flight", 1.0, 2.0),) and again.shows_in == SPECTRUM
 
 
 def test_a_gain_that_was_named_alone_is_its_own_term_with_its_values():
     alone = terms("controller_gain")[3]
-    found = Found("controller_gain", alone.quantities(np.array([0.4])))
+    found = NamedEffect("controller_gain", alone.quantities(np.array([0.4])))
     assert term_of(found).values == alone.at(np.array([0.4]))
+
+
+def test_several_gains_are_the_term_in_which_all_of_them_are_free():
+    together = terms("controller_gain")[0]
+    lower = together.quantities(together.scaled({"rate": 0.9, "attitude": 0.7, "position": 0.8, "height": 0.95}))
+    assert term_of(NamedEffect("controller_gain", lower)).free == together.free

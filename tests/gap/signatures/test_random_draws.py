@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.signatures.random_draws import KINDS, SHAPED, STEPS, kinds_of, log_uniform
-from airtouch.gap.signatures.signature import free_of
+from airtouch.gap.signatures.random_draws import KINDS, STEPS, kinds_of, log_uniform
+from airtouch.gap.signatures.signature import SIGNATURES, free_of
 from airtouch.gap.signatures.term import neutral_of, unit
 from airtouch.simulation.effects import EFFECTS, get
 from airtouch.simulation.effects.effect import Effect, Parameter
@@ -26,8 +26,15 @@ def test_a_stronger_effect_is_farther_from_neutral_and_within_its_bounds(name):
         assert 0.0 < sizes[0] < sizes[1] < sizes[2]
 
 
-def test_what_shapes_a_kind_is_a_parameter_that_does_not_scale_it():
-    assert all(SHAPED[n] not in free_of(get(n)) and SHAPED[n] in get(n).values() for n in SHAPED)
+def test_what_gives_an_effect_several_classes_is_a_parameter_that_does_not_scale_it():
+    by = {name: s.class_by for name, s in SIGNATURES.items() if s.class_by}
+    assert by and all(by[n] not in free_of(get(n)) and by[n] in get(n).values() for n in by)
+
+
+def test_an_effect_is_drawn_in_each_of_the_classes_that_the_diagnosis_tries():
+    signature, rng = SIGNATURES["weak_motor"], np.random.default_rng(2)
+    drawn = {KINDS["weak_motor"].make(0.1, rng)["rotor"] for _ in range(60)}
+    assert drawn == set(signature.class_values) == {1.0, 2.0, 3.0, 4.0}
 
 
 def test_a_logarithm_is_as_likely_anywhere():

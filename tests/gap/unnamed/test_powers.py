@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signals.channels import COUNT
@@ -22,7 +22,7 @@ def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_be
     measured = Powers(power, np.full(n, 1e6), np.full(n, 1e6), groups)
     free, level = powers.power_factors(measured, *powers.NO_PRIOR)
     np.testing.assert_allclose(free[[3, 7]], np.log([2.5, 0.4]), atol=4.0 / np.sqrt(2000))
-    still, at_rest = powers.power_factors(measured, np.zeros(GROUPS), np.full(GROUPS, 1e-6))
+    still, at_rest = powers.power_factors(measured, np.zeros(CELLS), np.full(CELLS, 1e-6))
     np.testing.assert_allclose(still[[3, 7]], 0.0, atol=1e-3)
     expected = [0.5 * 2000 * (f - 1.0 - np.log(f)) for f in (2.5, 0.4)]  # Kullback-Leibler, half overlapping blocks
     np.testing.assert_allclose((level - at_rest)[[3, 7]], expected, rtol=0.15)
@@ -40,10 +40,10 @@ def test_information_is_that_of_a_real_value_under_students_law(nu):
 
 @pytest.mark.parametrize(("simulated", "counted"), [(True, [False, True]), (False, [False, False])])
 def test_less_power_counts_above_the_means_of_simulated_flights(simulated, counted):
-    gained, weaker = np.full(GROUPS, 2.0 * powers.CHANCE), np.zeros(GROUPS, bool)
-    above = powers._above_chance(gained, weaker, np.arange(GROUPS), simulated)
+    gained, weaker = np.full(CELLS, 2.0 * powers.CHANCE), np.zeros(CELLS, bool)
+    above = powers._above_chance(gained, weaker, np.arange(CELLS), simulated)
     assert above[[0, COUNT]].tolist() == counted, "the first channel's means, and its band above"
-    assert not powers._above_chance(gained / 4.0, ~weaker, np.arange(GROUPS), simulated).any()
+    assert not powers._above_chance(gained / 4.0, ~weaker, np.arange(CELLS), simulated).any()
 
 
 def test_what_may_be_there_gains_half_and_costs_log_two_at_most():
@@ -63,8 +63,8 @@ def halves_of(factor, count=150):
 
 def test_a_little_more_power_in_every_band_shows_in_the_sensors_sum():
     """A quarter more, of which a band holds two nats: no band alone tells it from chance, thirty together do."""
-    factor, middle = 1.25, np.zeros(GROUPS)
-    floor = SimpleNamespace(power=np.stack([middle, np.full(GROUPS, 0.05)]))
+    factor, middle = 1.25, np.zeros(CELLS)
+    floor = SimpleNamespace(power=np.stack([middle, np.full(CELLS, 0.05)]))
     trained, held_out = halves_of(factor)
     expected = 0.5 * 30 * 150 * (factor - 1.0 - np.log(factor)) - np.log(2.0)  # even odds that it is there
     assert powers.power_gain(trained, held_out, floor, True) == pytest.approx(expected, rel=0.25)

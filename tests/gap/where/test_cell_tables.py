@@ -7,7 +7,9 @@ from scipy.stats import chi2
 from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.where import cell_tables
-from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
+from airtouch.gap.where.band_sums import Sums
+from airtouch.gap.where.filter_bank import BANDS_HZ
+from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
 AIRBORNE = next(k for k in range(len(KINDS)) if k != GROUND)

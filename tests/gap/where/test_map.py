@@ -9,7 +9,10 @@ from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.signals.channels import CHANNELS
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.where import gap_map as maps
-from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
+from airtouch.gap.where.band_sums import stretches, sums
+from airtouch.gap.where.cell_words import in_words
+from airtouch.gap.where.filter_bank import BANDS_HZ, filtered, gains, sensor_rms
+from airtouch.gap.where.regimes import REGIMES
 from airtouch.gap.where.summary import significant
 from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
@@ -131,7 +134,7 @@ def test_largest_names_what_was_injected():
     gap_map = maps.gap_map(study(), [flight(20.0, force)], [flight(20.0, noise(20.0, 0.06, i)) for i in (2, 3)])
     first = maps.largest(gap_map.cells)[0]
     assert (first.channel, first.band_hz) == ("force_z", (2.0, 6.0)) and first.gap == pytest.approx(0.35, rel=0.1)
-    assert "2-6 Hz, lift: 0.35 m/s^2" in maps.in_words(first) and "times the floor" in maps.in_words(first)
+    assert "2-6 Hz, lift: 0.35 m/s^2" in in_words(first) and "times the floor" in in_words(first)
 
 
 def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
@@ -148,7 +151,7 @@ def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
 def test_after_an_effect_that_is_right_little_is_left(name, values, force, band):
     term = terms(name)[0]
     true_term = term.fitted(np.zeros(len(term.free)))
-    true_term = type(term)(term.effect, term.kind, term.free, {**true_term.values, **values})
+    true_term = type(term)(term.effect, term.shows_in, term.free, {**true_term.values, **values})
     c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[true_term]), "force_x", band)
     assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
 
@@ -157,7 +160,7 @@ def test_of_several_effects_each_cell_names_the_one_that_takes_most():
     chosen = []
     for name, values in (("imu_bias", {"acc_x": 0.9}), ("imu_noise", {"factor": 4.0})):
         term = terms(name)[0]
-        chosen.append(type(term)(term.effect, term.kind, term.free, {**term.values, **values}))
+        chosen.append(type(term)(term.effect, term.shows_in, term.free, {**term.values, **values}))
     force = noise(40.0, 4.0 * NOISE, 3) + np.array([0.9, 0.0, 0.0])
     gap_map = maps.gap_map(study(), [flight(40.0, force)], terms=chosen)
     assert cell(gap_map, "force_x", 0).by == "imu_bias" and cell(gap_map, "force_z", 5).by == "imu_noise"

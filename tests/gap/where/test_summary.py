@@ -1,7 +1,7 @@
 """The headline: the cell that most of the gap is in, or that the named effects explain."""
 
 from airtouch.gap.answer import advice, words
-from airtouch.gap.result import Cell, Found
+from airtouch.gap.result import Cell, NamedEffect
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -28,7 +28,7 @@ def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():
 
 def test_headline_of_named_effects_is_where_they_take_most():
     cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
-    result = diagnosis(cells, effects=(Found("ground_effect", {}),))
+    result = diagnosis(cells, effects=(NamedEffect("ground_effect", {}),))
     assert result.headline is cells[1] and "lift" in words.sentences(result)[0]
     assert ("1 of 2 cells still stand out, mostly in hover in roll torque at 0-0.5 Hz "
             "(18 times the floor, as before)") in words.answer(result)

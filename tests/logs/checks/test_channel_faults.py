@@ -5,6 +5,7 @@ import pytest
 
 from airtouch.logs.checks import channel_faults
 from airtouch.logs.flight_log import FlightLog
+from airtouch.robust import MAD_TO_SIGMA
 
 
 def log_of(columns, n=400):
@@ -20,7 +21,7 @@ def test_spikes_are_the_samples_that_a_loop_finds(seed):
     values[200:] += 1.0  # a step is no spike
     steps = np.abs(np.diff(values))
     noise = np.nanmedian(steps[:-1])
-    limit = max(0.3, 12.0 * 1.4826 * noise)
+    limit = max(0.3, 12.0 * MAD_TO_SIGMA * noise)
     expected = []
     for k in range(1, 399):
         rise, fall = values[k] - values[k - 1], values[k] - values[k + 1]

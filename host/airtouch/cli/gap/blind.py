@@ -57,7 +57,7 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
                 force: bool) -> None:
     """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
     from airtouch.extras import need
-    from airtouch.gap.sealed import blind as sealed
+    from airtouch.gap.sealed import blind_score as sealed
 
     need("plots", "scoring a sealed set")
     check_free(json_path, plot, force)

@@ -115,6 +115,6 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
 
 def _alone(case: Callable, log: Any) -> Any:
     try:
-        return replace(case([log]), held=None, map=None)  # which need not travel
+        return replace(case([log]), calibrated=None, map=None)  # which need not travel
     except AirTouchError as error:
         return str(error)

@@ -11,7 +11,7 @@ from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import interval, ratio, short
+from airtouch.gap.where.cell_words import interval, ratio, short
 
 MOST_CELLS = 16
 

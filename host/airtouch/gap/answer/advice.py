@@ -4,69 +4,54 @@ import shlex
 from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.result import Cell, Found, Step
-from airtouch.gap.signatures.alike import names_alike
-from airtouch.gap.where.gap_map import PHASE_WORDS
+from airtouch.gap.result import Cell, NamedEffect, NextStep
+from airtouch.gap.signatures.alike import confusion_among
+from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"
-#: what separates pairs that logs like these confuse, and the mission that shows it, "" where no ready one does
-SEPARATES = {
-    frozenset({"motor_lag", "actuator_delay"}): ("command steps in hover at two step sizes, or log rpm: a lag "
-                                                 "rounds the response, a delay shifts it", ""),
-    frozenset({"motor_lag", "inertia"}): ("log rpm, or add quick yaw turns: inertia scales every response alike", ""),
-    frozenset({"wind", "imu_bias"}): ("stand still with motors off for five seconds, and turn the vehicle by 90 "
-                                      "degrees in hover: wind turns in body axes and is gone on the ground, a bias is "
-                                      "neither", ""),
-    frozenset({"weak_motor", "com_offset"}): ("add yaw turns: a weak rotor leaves yaw torque, an offset does not", ""),
-    frozenset({"rotor_drag", "blade_flapping"}): ("fly faster than 1 m/s: flapping tilts the vehicle as well", ""),
-    frozenset({"sensor_latency", "controller_gain"}): ("log the attitude set-points, or fly steps of attitude: a sweep "
-                                                       "has them where it starts and stops", "there-and-back"),
-    frozenset({"battery_sag", "thrust_coefficient"}): ("log the battery voltage over a whole flight", "hover"),
-}
 #: mission with most of a phase; take-off and landing are in every one
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def advice(steps: Sequence[Step]) -> str:
-    """The steps as text."""
-    return " ".join(s.text for s in steps)
+def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[str, ...]], headline: Cell | None,
+          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[NextStep, ...]:
+    """What to do next, most useful first.
 
-
-def steps(verdict: str, effects: Sequence[Found], alike: Sequence[tuple[str, ...]], headline: Cell | None,
-          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[Step, ...]:
-    """What to do next, most useful first."""
-    said = [_apart(group) for group in alike]
+    effects: those named; alike: sets of names that these logs cannot tell apart; headline: the cell that the answer
+    speaks of; baseline: whether there were nominal flights.
+    """
+    said = [_to_tell_apart(group) for group in alike]
     if verdict == "unknown":
-        said += _open(headline, vehicle)
+        said += _for_an_open_gap(headline, vehicle)
     if verdict == "effect":
         named = " and ".join(e.name for e in effects)
-        said.append(Step(f"Switch on {named} with these parameters in the simulator, and fly it again.",
-                         switched_on(effects, vehicle)))
+        said.append(NextStep(f"Switch on {named} with these parameters in the simulator, and fly it again.",
+                             switched_on(effects, vehicle)))
     if verdict == "none":
-        said.append(Step("Nothing to add; longer flights would lower the floor."))
+        said.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not baseline:
-        said.append(Step("Give flights that are known to be nominal with --baseline: they lower the floor and show "
-                         "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+        said.append(NextStep("Give flights that are known to be nominal with --baseline: they lower the floor and show "
+                             "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
     if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
-        said.append(Step("Log the gyro: it shows torque at every frequency."))
+        said.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(said)
 
 
-def switched_on(effects: Sequence[Found], vehicle: str) -> str:
+def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
     """The command that flies the named effects in the simulator."""
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
-        given = [f"{k}={_value(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
+        given = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
                  for k, q in e.parameters.items()]
         words += [*(("--effect-file", file) if (file := source_of(e.name)) else ()),
                   "--effect", e.name + (":" + ",".join(given) if given else "")]
     return shlex.join(words)
 
 
-def _value(effect: str, parameter: str, value: float) -> str:
-    """Four digits, and within the parameter's bounds, which rounding may leave."""
+def _argument(effect: str, parameter: str, value: float) -> str:
+    """A value as the command takes it: four digits, and within the parameter's bounds, which rounding may leave."""
     bounds = {p.name: p for p in EFFECTS[effect].parameters}.get(parameter) if effect in EFFECTS else None
     text = f"{value:.4g}"
     if bounds is not None and not bounds.low <= float(text) <= bounds.high:
@@ -79,27 +64,25 @@ def collect(mission: str) -> str:
     return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
 
 
-def _apart(group: tuple[str, ...]) -> Step:
+def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
     """What tells the effects of a group from one another."""
-    alike_group = names_alike(group[0])
-    if alike_group and alike_group[0] <= frozenset(group):
-        return Step(f"To tell {' from '.join(sorted(alike_group[0]))}: {alike_group[1]}.")
-    tell, mission = next((t for k, t in SEPARATES.items() if k <= frozenset(group)),
-                         ("repeat the flight with other speeds and heights", "there-and-back"))
-    return Step(f"To tell {' from '.join(group)}: {tell}.", collect(mission) if mission else "")
+    among = confusion_among(group)
+    return NextStep(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
+                    collect(among.mission) if among.mission else "")
 
 
-def _open(headline: Cell | None, vehicle: str) -> list[Step]:
+def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
     said = []
     if headline is not None and headline.phase in MISSIONS:
-        said.append(Step(f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
-                         collect(MISSIONS[headline.phase])))
+        said.append(NextStep(
+            f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
+            collect(MISSIONS[headline.phase])))
     elif headline is not None:
-        said.append(Step("Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
-    said.append(Step("Write the effect that you suspect in a file of your own, and diagnose again with it among the "
-                     "candidates.",
-                     f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... "
-                     "--effects-file mine.py",
-                     ADD_AN_EFFECT))
+        said.append(NextStep(
+            "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
+    said.append(NextStep(
+        "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
+        f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effects-file mine.py",
+        ADD_AN_EFFECT))
     return said

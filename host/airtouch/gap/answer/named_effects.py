@@ -1,18 +1,18 @@
 """The effects named: fitted to all the data, in the shape that gains most, with 90 % intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import SETTLED, Fit, fit, judge, strength_variance
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.fit import SETTLED, FittedTerms, fit, judge, strength_variance
+from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
-from airtouch.gap.result import Found
-from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM, signature_of
+from airtouch.gap.result import NamedEffect
+from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
@@ -24,44 +24,78 @@ MODEL_ERROR = 0.1
 LOOP_ERROR = 0.25
 
 
-def chosen_effects(data: Data, selection: Selection) -> list[Found]:
-    """The effects that the selection chose, fitted anew to all the data, with 90 % intervals.
+def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
+    """The effects that a selection names, fitted anew to all the data, with 90 % intervals.
 
     Their order is that of the selection, so that the first is the first of the ranking.
     """
-    judged = selection.whole
-    if selection.chosen is None or judged is None:
+    whole, chosen = selection.whole, selection.chosen
+    if whole is None or chosen is None:
         return []
-    replayed = [t for t in judged.terms if t.kind != CLOCK]
-    whole = whole_of(data)
-    fitted = (best_shape(data, whole, replayed, _mean_of_halves(judged)) if replayed
-              else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
-    chosen = {t.name for t in selection.chosen.terms}
     readings = selection.inference.readings if selection.inference is not None else {}
-    out, first = [], 0
-    for t in fitted.terms:
-        part = slice(first, first + len(t.free)) if t.kind == MEAN else None
-        if part is not None:
-            first += len(t.free)
-        if t.name not in chosen:
-            continue
-        if t.companion:
-            out = [with_random_part(e, t) for e in out]
-            continue
-        x = fitted.scaled[part] if part is not None else t.scaled(t.values)
-        covariance = (fitted.covariance[part, part] if part is not None
-                      else strength_variance(data, whole, fitted.terms, t))
-        spread = _spread(data.study.controller, judged, t, covariance,
-                         LOOP_ERROR if t.name in readings and len(t.free) == 1 else MODEL_ERROR)
-        out.append(Found(t.name, t.quantities(*with_reading(t, x, spread, readings.get(t.name, {}))), t.gate))
-    for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
-        spread = _of_clock(t, sum(len(f) for f in data.flights))
-        out.append(Found(t.name, t.quantities(*with_reading(t, t.scaled(t.values), spread, readings.get(t.name, {})))))
-    order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
-    return sorted(out, key=lambda e: order.get(e.name, len(order)))
+    fitted = best_shape(data, whole_of(data), [t for t in whole.terms if t.shows_in != CLOCK], _mean_of_halves(whole))
+    names = {t.name for t in chosen.terms}
+    shown = [t for t in fitted.terms if t.name in names]
+    effects = [_named(t, *_in_spectra(data, whole, fitted, t, readings), readings) for t in shown if not t.companion]
+    for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
+        effects = [with_random_part(e, part) for e in effects]
+    effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
+    order = [s.name for s in selection.named]
+    return sorted(effects, key=lambda e: order.index(e.name) if e.name in order else len(order))
 
 
-def best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
+def _named(term: Term, x: np.ndarray, covariance: np.ndarray, readings: Mapping[str, Reading]) -> NamedEffect:
+    """An effect with scaled parameters x (k,) and covariance (k, k), and with its reading where there is one."""
+    fitted = with_reading(term, x, covariance, readings.get(term.name, {}))
+    return NamedEffect(term.name, term.quantities(*fitted), term.gate)
+
+
+def _in_spectra(data: Data, whole: Candidate, fitted: FittedTerms, term: Term, readings: Mapping[str, Reading],
+                ) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled parameters (k,) of an effect that shows in the spectra, and their covariance (k, k).
+
+    The covariance is that of the likelihood, of the difference of the two halves, and of model errors.
+    """
+    if term.shows_in == MEAN:
+        place = fitted.place(term)
+        x, covariance = fitted.scaled[place], fitted.covariance[place, place]
+    else:
+        x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)
+    of_halves = [t.scaled(t.values) for f in whole.fits for t in f.terms if t.identity == term.identity]
+    apart = 0.5 * (of_halves[0] - of_halves[1]) if len(of_halves) == 2 else np.zeros(len(x))
+    error = _model_error(data.study.controller, term, term.name in readings and len(x) == 1)
+    return x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2)
+
+
+def _model_error(law: ClosedLoop | None, term: Term, read: bool) -> float:
+    """Fraction of its parameters by which the model of an effect may be wrong.
+
+    read: whether the relations of signals measure its only parameter too.
+    """
+    error = 0.0
+    if law is not None and law.changes_loop((term.active(),)):
+        error = LOOP_ERROR if read else MODEL_ERROR
+    elif term.shows_in == SPECTRUM:
+        error = MODEL_ERROR
+    return max(error, term.signature.own_scatter)
+
+
+def _in_times(data: Data, term: Term) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled strength (1,) of an effect of the logged times, and its variance (1, 1).
+
+    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of an effect counted in
+    bursts is the variance of a Poisson number of bursts.
+    """
+    samples = sum(len(f) for f in data.flights)
+    count = 2.0 * samples / 10.0
+    if term.signature.bursts is not None:
+        share, burst = (term.values[p] for p in term.signature.bursts)
+        count = share * samples / (2.0 * burst - 1.0)
+    x = term.scaled(term.values)
+    return x, np.diag(x ** 2 / max(count, 1.0))
+
+
+def best_shape(data: Data, whole: BlockSet, terms: Sequence[Term], start: np.ndarray | None) -> FittedTerms:
     """Effects fitted to all the data, in the shape that gains most.
 
     start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
@@ -77,7 +111,7 @@ def best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray
     return converged(data, whole, best)
 
 
-def converged(data: Data, whole: Part, best: Fit) -> Fit:
+def converged(data: Data, whole: BlockSet, best: FittedTerms) -> FittedTerms:
     """The fit, begun anew where it ended until that gains nothing.
 
     Parameters that trade against each other, as a battery's charge and capacity, lie along a bent valley, which one fit
@@ -95,7 +129,7 @@ def converged(data: Data, whole: Part, best: Fit) -> Fit:
     return best
 
 
-def with_random_part(effect: Found, part: Term) -> Found:
+def with_random_part(effect: NamedEffect, part: Term) -> NamedEffect:
     """The effect with its random part as fitted, so that a simulator can switch it on unchanged.
 
     The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
@@ -104,12 +138,13 @@ def with_random_part(effect: Found, part: Term) -> Found:
     """
     if effect.name != part.name:
         return effect
-    own, of_mean = part.values["strength"], effect.parameters["strength"]
+    (amount,) = part.signature.free  # the strength
+    own, of_mean = part.values[amount], effect.parameters[amount]
     limits = {p.name: p.high for p in part.effect.parameters}
     strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
     raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
-    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
+    return NamedEffect(effect.name, {**effect.parameters, amount: raised, **scaled}, effect.seconds)
 
 
 def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Reading) -> tuple[np.ndarray, np.ndarray]:
@@ -132,37 +167,7 @@ def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Rea
     return np.clip(x + gain @ apart, low, high), wider * (covariance - gain @ covariance[read])
 
 
-def _mean_of_halves(chosen: Judged) -> np.ndarray | None:
+def _mean_of_halves(chosen: Candidate) -> np.ndarray | None:
     """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
     scaled = [f.scaled for f in chosen.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
-
-
-def _of_clock(term: Term, samples: int) -> np.ndarray:
-    """Variance (1, 1) of the scaled strength of an effect of the logged times, from so many samples.
-
-    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of an effect counted in
-    bursts is the variance of a Poisson number of bursts.
-    """
-    count = 2.0 * samples / 10.0
-    bursts = signature_of(term.effect).bursts
-    if bursts is not None:
-        share, burst = (term.values[p] for p in bursts)
-        count = share * samples / (2.0 * burst - 1.0)
-    return np.diag(term.scaled(term.values) ** 2 / max(count, 1.0))
-
-
-def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.ndarray, of_loop: float) -> np.ndarray:
-    """Covariance of a term's scaled parameters: of the likelihood, of the two halves' difference and of model errors.
-
-    of_loop: fraction of a parameter by which the model of the loop may be wrong.
-    """
-    pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
-             if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
-    between = np.zeros((len(term.free), len(term.free)))
-    if len(pairs) == 2:
-        between = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
-    loop = law is not None and law.changes_loop((term.active(),))
-    error = max(of_loop if loop else MODEL_ERROR if term.kind == SPECTRUM else 0.0,
-                signature_of(term.effect).own_scatter)
-    return covariance + between + np.diag((error * term.scaled(term.values)) ** 2)

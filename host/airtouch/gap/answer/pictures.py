@@ -9,23 +9,36 @@ import numpy as np
 
 import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
+from airtouch.gap.where.band_sums import stretches
+from airtouch.gap.where.command_power import command_spectra
+from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
 FEWEST_BLOCKS = 8  #: blocks of nominal flights above which their mean power is the floor of a spectrum
 TINY = 1e-12  #: power of a floor at least, in a channel's unit squared
+
+
+@dataclass(frozen=True)
+class FlightGap:
+    """Measured minus modelled (n, COUNT) of a flight, without and with mean effects; after: None where none act."""
+
+    flight: Flight
+    before: np.ndarray
+    after: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -65,19 +78,21 @@ class Pictures:
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     spectra: tuple[Spectrum, ...] = ()
-    commands: Mapping[str, Any] = field(default_factory=dict)  #: `measure.command_spectra`
+    commands: Mapping[str, Any] = field(default_factory=dict)  #: `command_power.command_spectra`
 
 
 def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
        headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis: headline is the cell that its answer speaks of."""
-    commands = measure.command_spectra(flights, nominal, study.vehicle)
+    commands = command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
         return Pictures(commands=commands)
-    first = flights[:MOST_FLIGHTS]
+    active = [t.active() for t in effects if t.shows_in == MEAN]
+    gaps = [FlightGap(f, _residual(study, f), _residual(study, f, active) if active else None)
+            for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
-    return Pictures(_signal(study, _median_flight(study, first, headline), effects, headline), frequencies(AIR),
-                    _spectra(study, first, effects, channels), commands)
+    return Pictures(_signal(_of_median_flight(gaps, headline), headline), frequencies(AIR),
+                    _spectra(study, gaps, effects, channels), commands)
 
 
 def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
@@ -89,29 +104,27 @@ def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], 
     return Pictures(curves.signal, curves.frequency_hz, curves.spectra, measurement.spectra)
 
 
-def _residual(study: Study, flight: Flight, effects: Sequence[Any] = ()) -> np.ndarray:
+def _residual(study: Study, flight: Flight, effects: Sequence[Active] = ()) -> np.ndarray:
     """Measured minus modelled (n, COUNT) of a flight, with effects in the model."""
     return residual(flight, study.vehicle, (*study.calibration, *effects), study.controller)
 
 
-def _signal(study: Study, flight: Flight, effects: Sequence[Term], cell: Cell) -> Signal:
+def _signal(gap: FlightGap, cell: Cell) -> Signal:
     """The curves of one flight in a cell's channel, up to the end of its band."""
-    active = [t.active() for t in effects if t.kind == MEAN]
+    flight, c = gap.flight, COLUMN[cell.channel]
     band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else 0
-    c = COLUMN[cell.channel]
-    measured = _measured(flight, c)
-    def lowpass(values):
-        return None if values is None else _lowpass(flight, values, band)
+    measured, after = _measured(flight, c), None if gap.after is None else gap.after[:, c]
     return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, lowpass(measured), lowpass(_residual(study, flight)[:, c]),
-                  lowpass(_residual(study, flight, active)[:, c]) if active else None, cell.floor)
+                  flight.phase, None if measured is None else _lowpass(flight, measured, band),
+                  _lowpass(flight, gap.before[:, c], band), None if after is None else _lowpass(flight, after, band),
+                  cell.floor)
 
 
-def _median_flight(study: Study, flights: Sequence[Flight], cell: Cell) -> Flight:
+def _of_median_flight(gaps: Sequence[FlightGap], cell: Cell) -> FlightGap:
     """The flight whose gap in the cell's channel is the median of all flights'."""
     c = COLUMN[cell.channel]
-    size = [np.nan_to_num(np.nanstd(_residual(study, f)[f.usable & (f.phase != GROUND), c])) for f in flights]
-    return flights[int(np.argsort(size)[len(size) // 2])]
+    size = [np.nan_to_num(np.nanstd(g.before[g.flight.usable & (g.flight.phase != GROUND), c])) for g in gaps]
+    return gaps[int(np.argsort(size)[len(size) // 2])]
 
 
 def _measured(flight: Flight, channel: int) -> np.ndarray | None:
@@ -134,31 +147,35 @@ def _lowpass(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
     return out
 
 
-def _spectra(study: Study, flights: Sequence[Flight], effects: Sequence[Term], channels: Sequence[str],
+def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
-    """The spectra of channels, means over all blocks in the air.
-
-    The power of a random effect is subtracted, as no sample of it can be predicted.
-    """
-    active = [t.active() for t in effects if t.kind == MEAN]
-    random = random_of(effects)
-    before, after, random_power = [], [], 0.0
-    for f in flights:
-        first = starts(f, AIR)
-        if not len(first):
-            continue
-        for out, model in ((before, ()), (after, active)):
-            gap = np.where(f.lost[:, None], 0.0, _residual(study, f, model))
-            out.append((np.abs(blocks(gap, first, AIR)) ** 2).mean(axis=0))
-        if random:
-            data = Data(study, [f])
-            random_power = random_power + sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
-    if not before:
+    """The spectra of channels, means over all blocks in the air; none where no flight has such a block."""
+    flown = [g for g in gaps if len(starts(g.flight, AIR))]
+    if not flown:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > FEWEST_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), TINY)
-    power, power_after = np.mean(before, axis=0), np.mean(after, axis=0)
-    power_after = floor + np.abs(power_after - floor - random_power / len(before)) if random else power_after
-    return tuple(Spectrum(name, CHANNELS[COLUMN[name]].unit, power[:, COLUMN[name]],
-                          power_after[:, COLUMN[name]] if effects else None, floor[:, COLUMN[name]])
-                 for name in channels if np.isfinite(power[:, COLUMN[name]]).all())
+    before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
+    after = _power_after(study, flown, effects, floor) if effects else None
+    return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
+                 for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
+
+
+def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
+    """Mean power (bins, COUNT) of a gap (n, COUNT) over all blocks in the air of a flight."""
+    known = np.where(flight.lost[:, None], 0.0, gap)
+    return (np.abs(blocks(known, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
+
+
+def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:
+    """Mean power (bins, COUNT) with effects in the model.
+
+    The power of a random effect is subtracted from what is over the floor, as no sample of it can be predicted.
+    """
+    power = np.mean([_power(g.flight, g.before if g.after is None else g.after) for g in gaps], axis=0)
+    random = random_of(effects)
+    if not random:
+        return power
+    of_random = sum(sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
+                    for data in (Data(study, [g.flight]) for g in gaps))
+    return floor + np.abs(power - floor - of_random / len(gaps))

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
-from airtouch.gap.answer.named_effects import chosen_effects
+from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
-from airtouch.gap.answer.shrink import Cells, Shrink, nearer, shrink_of
+from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
-from airtouch.gap.naming.selection import Selection, probabilities
-from airtouch.gap.result import Found, Quantity, Ranked
+from airtouch.gap.naming.selection import Selection
+from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
@@ -17,7 +17,7 @@ AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by def
 CLOSE = 3.0
 
 
-def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> str:
+def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     """The verdict: "none", "effect" or "unknown". A gap at its floor is none, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
@@ -25,47 +25,49 @@ def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> s
     calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no nominal
     flight has odd times. A recorded one had calm air or a poor link.
     """
-    if selection.inference is not None:
-        return "unknown" if not selection.explained else "none" if selection.chosen is None else "effect"
-    outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.before <= AT_FLOOR and not outside_the_gap:
-        odd_times = selection.of_times > selection.allowed
-        if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, cells)):
-            return "none"
+    if selection.inference is None and _at_its_floor(data, selection, gap):
+        return "none"
     if not selection.explained:
         return "unknown"
     return "none" if selection.chosen is None else "effect"
 
 
-def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked], Shrink, str, list[Found]]:
-    """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
-    parts = selection.parts
-    overall = shrink_of(data, parts, selection.chosen, cells)
-    verdict = verdict_of(data, selection, overall, cells)
-    effects = chosen_effects(data, selection) if verdict == "effect" else []
-    answer = effects[0].name if effects else verdict
-    chance = agreeing(probabilities(selection, verdict == "none"), answer)
+def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
+    """Whether there is no gap, and nothing that would be outside it or within calmer bands; see `verdict_of`."""
+    chosen = selection.chosen
+    outside_the_gap = chosen is not None and all(t.shows_in == CLOCK or t.gate for t in chosen.terms)
+    if gap.named.before > AT_FLOOR or outside_the_gap:
+        return False
+    odd_times = selection.left_of_times > selection.allowed
+    return not data.study.simulated or not (odd_times or nearer(data, selection.parts, chosen, gap))
+
+
+def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:
+    """Every candidate with its probability and how far it closes the gap, best first.
+
+    answer: the first effect named, else the verdict.
+    """
     out = []
-    for name, p in chance.items():
+    for name, p in agreeing(probabilities(selection, verdict == "none"), answer).items():
         single = selection.singles.get(name)
         share = Quantity(0.0)
-        if name == answer and effects and len(selection.named) == 1:
-            share = overall.share
+        if name == answer and verdict == "effect" and len(selection.named) == 1:
+            share = gap.named.share
         elif single is not None and single.full and single.gain > FIRST_GAIN:
-            share = shrink_of(data, parts, single, cells).share
+            share = shrink_of(data, selection.parts, single, gap).share
         nats = None if single is None else selection.gained(single)
-        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
+        out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
-    return out, overall, verdict, effects
+    return out
 
 
-def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
+def agreeing(probability: Mapping[str, float], answer: str) -> dict[str, float]:
     """The probabilities, of which the answer's is the largest: a larger one changes places with it.
 
     The verdict weighs what the ranking of single candidates does not, as effects that come and go.
     """
-    out = {answer: 0.0, **chance}
+    out = {answer: 0.0, **probability}
     best = max(out, key=out.__getitem__)
     out[answer], out[best] = out[best], out[answer]
     return out
@@ -83,7 +85,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named:
-        group = names_alike(step.name)
-        if group and not any(step.name in g for g in groups):
-            groups.append(tuple(sorted(group[0])))
+        alike = names_alike(step.name)
+        if alike and not any(step.name in g for g in groups):
+            groups.append(tuple(sorted(alike.effects)))
     return tuple(groups)

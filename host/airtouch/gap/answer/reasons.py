@@ -1,6 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
-from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
@@ -31,22 +31,22 @@ def nearest(selection: Selection) -> list[dict[str, str]]:
     return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
 
 
-def shortfall(selection: Selection, judged: Judged) -> str:
+def shortfall(selection: Selection, candidate: Candidate) -> str:
     """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
-        return shortfall_by_relations(selection, selection.inference, judged.name)
-    least = selection.least[judged.name]
-    if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
+        return shortfall_by_relations(selection, selection.inference, candidate.name)
+    least = selection.least[candidate.name]
+    if candidate.name in {s.name for s in selection.named}:  # the best there is, and not enough
         return against(selection)
-    if judged.gain < least:
-        return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
-    if judged.evidence < least:
-        return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
-                f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+    if candidate.gain < least:
+        return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
+    if candidate.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
+                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
     if selection.chosen:
-        return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
+        return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+    return f"gains {candidate.gain:.0f} of the {selection.nameless_alone:.0f} nats that a model without names gains"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -68,11 +68,11 @@ def against(selection: Selection) -> str:
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.least_left:.0f} may be chance")
-    return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
+    return (f"a model without names gains {max(selection.nameless_beside, 0.0):.0f} nats beside it, up to "
             f"{selection.allowed:.0f} may be left")
 
 
-def _why_beside(selection: Selection, step: Judged) -> str:
+def _why_beside(selection: Selection, step: Candidate) -> str:
     """The reason why an effect named beside the first has no more probability than the ranking says."""
     first = selection.named[0].name
     if selection.inference is not None:
@@ -85,15 +85,15 @@ def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not selection.explained:
         return "the gap as a whole is at its floor"
-    return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} "
+    return (f"a model without names adds {max(selection.nameless_beside, 0.0):.0f} nats, up to {selection.allowed:.0f} "
             "may be left")
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.chosen is None:
-        return (f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
-                "left")
+        return (f"a model without names gains {selection.nameless_beside:.0f} nats, up to {selection.allowed:.0f} "
+                "may be left")
     first = selection.named[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
     return f"{first} gains {gain:.0f} nats over it"

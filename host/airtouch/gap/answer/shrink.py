@@ -11,13 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
-from airtouch.gap.evidence.problem import Part
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.evidence.problem import BlockSet
+from airtouch.gap.flights.clock import LEAST_JITTER_S
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
+from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
@@ -25,10 +27,10 @@ MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it h
 FEWEST = 12  #: values that a cell needs; chosen
 DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
 PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws; chosen
+SEED = 0  #: of the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
 LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
 LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
-LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least; chosen
 JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
 
 
@@ -42,41 +44,49 @@ class Shrink:
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Where a gap is measured: bool (GROUPS,) for each half, as the other half shows it.
+class Gap:
+    """A gap on held-out data, and how far the effects named close it.
 
-    calm: by how much the energy there (floor 1) is below nominal flights' once the effects named are in the model.
-    before: energies (n,) without any effect, calm added.
+    cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; calm: by how much the
+    energy there (floor 1) is below nominal flights' once the effects named are in the model; before: energies (n,)
+    without any effect, calm added; named: the shrink of the effects named.
     """
 
-    chosen: tuple[np.ndarray, np.ndarray]
+    cells: tuple[np.ndarray, np.ndarray]
     calm: float
     before: np.ndarray
+    named: Shrink
 
 
-def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
-    """The cells in which the gap of two halves of the data is measured, each half's as the other shows them.
-
-    parts: the two halves; named: the effects named.
-    """
+def gap_of(data: Data, parts: Sequence[BlockSet], named: Candidate | None) -> Gap:
+    """The gap of two halves of the data, each in the cells that the other shows. named: the effects named."""
     terms = _terms(named)
-    chosen = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
-    after = _energies(data, parts, terms, chosen)
+    cells = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
+    after = _energies(data, parts, terms, cells)
     calm = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
-    return Cells(chosen, calm, calm + _energies(data, parts, ((), ()), chosen))
+    before = calm + _energies(data, parts, ((), ()), cells)
+    return Gap(cells, calm, before, shrink_of_jitter(data) if _only_jitter(named) else _shrink(before, calm + after))
 
 
-def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells, seed: int = 0) -> Shrink:
-    """The gap over all held-out blocks, each half judged under the fit of the other. seed: of the bootstrap."""
-    if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
+def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:
+    """How far another hypothesis than the effects named closes the gap of two halves."""
+    if _only_jitter(candidate):
         return shrink_of_jitter(data)
-    before = cells.before
+    return _shrink(gap.before, gap.calm + _energies(data, parts, _terms(candidate), gap.cells))
+
+
+def _only_jitter(candidate: Candidate | None) -> bool:
+    """Whether a hypothesis moves the logged times and does nothing else."""
+    return candidate is not None and bool(candidate.terms) \
+        and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in candidate.terms)
+
+
+def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:
+    """The shrink from held-out energies (n,) without and with effects."""
     if not len(before):
         return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
-    after = cells.calm + _energies(data, parts, _terms(judged), cells.chosen)
-    low, high = _interval(before, after, seed)
     return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
-                  Quantity(share_closed(before.mean(), after.mean()), low, high))
+                  Quantity(share_closed(before.mean(), after.mean()), *_interval(before, after)))
 
 
 def shrink_of_jitter(data: Data) -> Shrink:
@@ -104,64 +114,65 @@ def share_closed(before: float, after: float) -> float:
     return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_GAP else 0.0
 
 
-def _interval(before: np.ndarray, after: np.ndarray, seed: int) -> tuple[float, float]:
+def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
     """Ends of the share's 90 % interval by block bootstrap of the held-out energies (n,) before and after."""
     pieces = min(PIECES, len(before))
     means_before, means_after = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
-    drawn = np.random.default_rng(seed).integers(0, pieces, (DRAWS, pieces))
+    drawn = np.random.default_rng(SEED).integers(0, pieces, (DRAWS, pieces))
     shares = [share_closed(b, a) for b, a in zip(means_before[drawn].mean(axis=1), means_after[drawn].mean(axis=1),
                                                  strict=True)]
     low, high = np.percentile(shares, INTERVAL)
     return float(low), float(high)
 
 
-def nearer(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells) -> bool:
-    """Whether the cells lie nearer to the floor with a hypothesis than without, on held-out blocks.
+def nearer(data: Data, parts: Sequence[BlockSet], candidate: Candidate | None, gap: Gap) -> bool:
+    """Whether the cells of a gap lie nearer to the floor with a hypothesis than without, on held-out blocks.
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
     """
-    without, within = (_off_floor(data, parts, terms, cells) for terms in (((), ()), _terms(judged)))
+    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (((), ()), _terms(candidate)))
     return within < without
 
 
-def _off_floor(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], cells: Cells) -> float:
-    """Distance of the chosen cells' energy from the floor, above or below, summed over their values."""
-    total, count = np.zeros(GROUPS), np.zeros(GROUPS)
-    for groups, energies in _held_out(data, parts, terms, cells.chosen):
-        total += np.bincount(groups, energies, GROUPS)
-        count += np.bincount(groups, minlength=GROUPS)
+def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]],
+               cells: Sequence[np.ndarray]) -> float:
+    """Distance of the cells' energy from the floor, above or below, summed over their values."""
+    total, count = np.zeros(CELLS), np.zeros(CELLS)
+    for groups, energies in _held_out(data, parts, terms, cells):
+        total += np.bincount(groups, energies, CELLS)
+        count += np.bincount(groups, minlength=CELLS)
     return float(np.abs(total - count).sum())
 
 
-def _terms(judged: Judged | None) -> Sequence[Sequence[Term]]:
+def _terms(candidate: Candidate | None) -> Sequence[Sequence[Term]]:
     """The terms of a hypothesis as fitted to each half; none where there is no hypothesis."""
-    return [f.terms for f in judged.fits] if judged and judged.fits else ((), ())
+    return [f.terms for f in candidate.fits] if candidate and candidate.fits else ((), ())
 
 
-def _energies(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], chosen: Sequence[np.ndarray],
+def _energies(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> np.ndarray:
     """Energies (n,) of both halves: see `_held_out`."""
-    return np.concatenate([energies for _, energies in _held_out(data, parts, terms, chosen)])
+    return np.concatenate([energies for _, energies in _held_out(data, parts, terms, cells)])
 
 
-def _held_out(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], chosen: Sequence[np.ndarray],
+def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """For each half, group (n,) and energy (n,) over the floor of its values in chosen cells.
+    """For each half, group (n,) and energy (n,) over the floor of its values in the cells.
 
-    The energy is what effects as fitted to the other half leave. chosen: mask (GROUPS,) for each half.
+    The energy is what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
         problem, values, power = left_over(data, parts[half], terms[1 - half])
-        use = problem.known & chosen[half][problem.groups]
-        yield problem.groups[use], np.minimum(squared(values[use]) / power[use], LARGEST)
+        use = problem.known & cells[half][problem.cells]
+        yield problem.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
 
 
-def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
-    """Mask (GROUPS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
+def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
+    """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
     energy = np.minimum(squared(values) / power, LARGEST)
-    count = np.bincount(problem.groups, problem.known, GROUPS)
-    mean = np.bincount(problem.groups, energy * problem.known, GROUPS) / np.maximum(count, 1)
+    count = np.bincount(problem.cells, problem.known, CELLS)
+    mean = np.bincount(problem.cells, energy * problem.known, CELLS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN

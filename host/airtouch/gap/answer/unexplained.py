@@ -6,16 +6,15 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.answer.reasons import nearest
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.simulation import signals as at
-from airtouch.simulation.effects import Active
 
 MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
 FEWEST = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
@@ -32,11 +31,14 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     the effects that gain most with the reason why they were not named.
     """
     terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
-    active = tuple(t.active() for t in terms if t.kind == MEAN)
+    active = tuple(t.active() for t in terms if t.shows_in == MEAN)
+    chosen = [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]
+    model = (*study.calibration, *active)
+    gaps = [(f, residual(f, study.vehicle, model, study.controller)) for f in flights] if chosen else []
     near = nearest(selection)
     out = []
-    for cell in [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]:
-        ratios = [(f, r) for f in flights if len(r := over_floor(study, f, active, cell))]
+    for cell in chosen:
+        ratios = [(f, r) for f, gap in gaps if len(r := over_floor(study, f, gap, cell))]
         if not ratios:
             continue
         flight, ratio = max(ratios, key=lambda pair: float(pair[1].max()))
@@ -49,16 +51,17 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     return out
 
 
-def over_floor(study: Study, flight: Flight, active: Sequence[Active], cell: Cell) -> np.ndarray:
-    """Rms of a cell's channel and band over its floor, in each block (blocks,) in the air; active: in the model."""
+def over_floor(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
+    """Rms of a cell's channel and band over its floor, in each block (blocks,) in the air.
+
+    gap (n, COUNT): the flight, measured minus modelled.
+    """
     begin, c = starts(flight, AIR), COLUMN[cell.channel]
     if not len(begin):
         return np.zeros(0)
-    residuals = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
-    gap = interpolate_missing(residuals[:, c:c + 1])
     f = frequencies(AIR)
     band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
-    power = (np.abs(blocks(gap, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
+    power = (np.abs(blocks(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
     return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
 
 

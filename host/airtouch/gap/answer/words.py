@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import PHASE_WORDS, in_words, ratio, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, ratio, short
 
 
 def answer(diagnosis: Diagnosis) -> str:
@@ -41,7 +41,7 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unknown":
         near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
         return (f"No known effect explains it (probability {chance})"
-                + (f"; the nearest is {plain(near.name)} with {near.probability:.1%}." if near else "."))
+                + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
     cell = diagnosis.headline
     if cell is not None and cell.after is not None and not summary.closes(cell):
@@ -50,10 +50,10 @@ def _which(diagnosis: Diagnosis) -> str:
     return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
 
 
-def _named(effect: Found) -> str:
+def _named(effect: NamedEffect) -> str:
     """The effect's name, and of which rotor."""
     rotor = effect.parameters.get("rotor")
-    return plain(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+    return name_in_words(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
 
 
 def _how_far(diagnosis: Diagnosis) -> str:
@@ -99,19 +99,19 @@ def band_in_words(cell: Cell) -> str:
     return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
 
-def plain(name: str) -> str:
+def name_in_words(name: str) -> str:
     """An effect's name as a phrase."""
     return name.replace("_", " ")
 
 
-def effect_in_words(effect: Found) -> str:
+def effect_in_words(effect: NamedEffect) -> str:
     """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`; of one that comes and goes, when it acts."""
     when = seconds_in_words(effect)
     return (f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
             + (f"; acts from {when}" if when else ""))
 
 
-def seconds_in_words(effect: Found) -> str:
+def seconds_in_words(effect: NamedEffect) -> str:
     """When an effect acts, "" where it always does."""
     return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
 
@@ -139,7 +139,8 @@ def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.unexplained:
         return []
     shown = {r.name for r in summary.leading(diagnosis.ranking) if r.why}
-    return [f"{plain(n['name'])}: {n['fails']}" for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
+    near = [n for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
+    return [f"{name_in_words(n['name'])}: {n['fails']}" for n in near]
 
 
 def digits(q: Quantity) -> str:

@@ -1,11 +1,10 @@
 """Flights without a gyro: how likely each hypothesis makes the pattern of a hover.
 
-Evidence integrates the likelihood over each hypothesis' prior, so that a hypothesis with more
-freedom must earn it.
+Evidence integrates the likelihood over each hypothesis' prior, so that a hypothesis with more freedom must earn it.
 
-How unsteady a flight is says little of the vehicle unless the position is measured equally
-well: the controllers answer every correction of the estimated velocity. Their power is a
-part of its own and one in proportion to these corrections, which the log shows.
+How unsteady a flight is says little of the vehicle unless the position is measured equally well: the controllers answer
+every correction of the estimated velocity. Their expected power is own + ANSWER x variance of the corrections, which
+the log shows; what is judged is the log10 of the power over that.
 """
 
 from collections.abc import Sequence
@@ -42,7 +41,11 @@ class Reference:
 
 
 def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Reference:
-    """Mean of nominal flights that have a hover, and their scatter beside that of the prior."""
+    """Mean of nominal flights that have a hover, and the variance of a further one about it.
+
+    The prior's variance counts as that of `priors.nominal_flights` flights more (normal law, conjugate prior); a
+    further flight differs from the mean of n by 1 + 1 / n of it.
+    """
     known = [p for p in patterns if p.known]
     power, caused = np.array([p.power for p in known]), _caused(known)
     own_power = np.array([_own_power(*of) for of in zip(power.T, caused.T, strict=True)])
@@ -55,21 +58,41 @@ def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Refe
 
 def evidence(pattern: HoverPattern, base: Reference, candidates: Sequence[Hypothesis],
              priors: Priors = PRIORS) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Log evidence of each hypothesis for a pattern, its prior probability included, and the weights of its samples."""
-    difference, nu = base.difference(pattern), priors.freedom
+    """Log evidence of each hypothesis for a pattern, its prior probability included, and the weights of its samples.
+
+    In nats, without the constants that all hypotheses share.
+    """
+    difference = base.difference(pattern)
     logs, weights = [], []
     for h in candidates:
         variance = base.variance[BALANCE] + (np.array(priors.maintenance) ** 2 if h.after_maintenance else 0.0)
-        tails = np.log1p((difference[BALANCE] - h.change) ** 2 / variance / nu)  # of Student's law
-        distance = 0.5 * (nu + 1.0) * tails.sum(axis=1)
-        w = np.exp(distance.min() - distance)
-        log = np.log(w.mean()) - distance.min() + np.log(h.prior) - 0.5 * np.log(variance).sum()
-        for change, power, power_variance in zip(h.power_change, difference[POWER], base.variance[POWER], strict=True):
-            width = change.deviation ** 2 + power_variance
-            log -= 0.5 * (power - change.mean) ** 2 / width + 0.5 * np.log(width)
-        logs.append(log)
-        weights.append(w / w.sum())
+        log, weight = _of_balance(h, difference[BALANCE], variance, priors.freedom)
+        logs.append(_with_power(log, h, difference[POWER], base.variance[POWER]))
+        weights.append(weight)
     return np.array(logs), weights
+
+
+def _of_balance(h: Hypothesis, difference: np.ndarray, variance: np.ndarray, nu: float) -> tuple[float, np.ndarray]:
+    """Log evidence for a difference (4,) of the balance, its prior probability included, and the samples' weights.
+
+    The mean over samples of the product of four Student densities, each of nu degrees of freedom about the sample's
+    change: log t = -(nu + 1) / 2 log(1 + (difference - change)^2 / (nu variance)) - log(variance) / 2.
+    """
+    tails = np.log1p((difference - h.change) ** 2 / variance / nu)
+    distance = 0.5 * (nu + 1.0) * tails.sum(axis=1)
+    w = np.exp(distance.min() - distance)
+    return np.log(w.mean()) - distance.min() + np.log(h.prior) - 0.5 * np.log(variance).sum(), w / w.sum()
+
+
+def _with_power(log: float, h: Hypothesis, difference: np.ndarray, variance: np.ndarray) -> float:
+    """A log evidence with that for a difference (2,) of the powers: normal about the change that the hypothesis makes.
+
+    variance (2,): of nominal flights.
+    """
+    for change, power, power_variance in zip(h.power_change, difference, variance, strict=True):
+        width = change.deviation ** 2 + power_variance
+        log -= 0.5 * (power - change.mean) ** 2 / width + 0.5 * np.log(width)
+    return log
 
 
 def _caused(patterns: Sequence[HoverPattern]) -> np.ndarray:
@@ -86,6 +109,7 @@ def _over_caused(patterns: Sequence[HoverPattern], own_power: np.ndarray) -> np.
 def _own_power(power: np.ndarray, caused: np.ndarray) -> float:
     """log10 of the power that flights have beside the one that is caused; power (flights,) log10, caused (flights,)."""
     def mean_over(own: float) -> float:
+        """Mean log10 of the power over the expected one."""
         return float(np.mean(power - np.log10(10.0 ** own + caused)))
     return LEAST_POWER if mean_over(LEAST_POWER) <= 0.0 else float(brentq(mean_over, LEAST_POWER, power.max()))
 

@@ -1,1 +1,1 @@
-"""How likely the flights are under an effect: likelihood, fit, gates in time."""
+"""How likely the flights are under an effect: their likelihood, and the fit of an effect to them."""

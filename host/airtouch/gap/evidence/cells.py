@@ -10,7 +10,7 @@ from airtouch.gap.signals.channels import CHANNELS, COUNT
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell: about octaves; no other source
 REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: numbers of the views: in the air, on the ground, of the commands
 VIEW = 1000  #: numbers that are kept for the cells of a view
-GROUPS = 3 * VIEW  #: numbers of cells are below it
+CELLS = 3 * VIEW  #: numbers of cells are below it
 AXES = 3  #: channels of one sensor (x, y and z), whose numbers follow one another
 
 
@@ -23,29 +23,29 @@ def cell_numbers(view: int, band: np.ndarray, channel: np.ndarray) -> np.ndarray
 
 
 def channel_cells() -> np.ndarray:
-    """For each cell (GROUPS,) the number that stands for its view and channel, all bands together."""
-    cell = np.arange(GROUPS)
+    """For each cell (CELLS,) the number that stands for its view and channel, all bands together."""
+    cell = np.arange(CELLS)
     return cell - cell % VIEW + cell % VIEW % COUNT
 
 
 def sensor_cells() -> np.ndarray:
-    """For each cell (GROUPS,) the number of the first cell of its sensor, in the same view and band.
+    """For each cell (CELLS,) the number of the first cell of its sensor, in the same view and band.
 
     A sensor has AXES channels; of the commands thrust, roll and pitch count as one, yaw as another.
     """
-    cell = np.arange(GROUPS)
+    cell = np.arange(CELLS)
     return cell - cell % VIEW % COUNT % AXES
 
 
 def band_cells() -> np.ndarray:
-    """For each cell (GROUPS,) the number of the first cell of its view and band, all channels together."""
-    cell = np.arange(GROUPS)
+    """For each cell (CELLS,) the number of the first cell of its view and band, all channels together."""
+    cell = np.arange(CELLS)
     return cell - cell % VIEW % COUNT
 
 
 def above_means() -> np.ndarray:
-    """Whether each cell (GROUPS,) is in a band above the lowest, which has the means; every cell of the commands is."""
-    return np.arange(GROUPS) % VIEW >= COUNT
+    """Whether each cell (CELLS,) is in a band above the lowest, which has the means; every cell of the commands is."""
+    return np.arange(CELLS) % VIEW >= COUNT
 
 
 def cell_words(cell: int) -> str:

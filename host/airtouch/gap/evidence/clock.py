@@ -5,20 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-LEAST_CLOCK_S = 2e-4  #: s, rms of a clock that nothing disturbs; chosen
 #: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
 CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
-JITTER, LOSS = "time_jitter", "packet_loss"
 
 
 def jitter(data: Data) -> tuple[float, float]:
     """Rms (s) of the logged times beyond that of nominal flights, and the log likelihood that it gains."""
-    nominal = max(data.study.floor.clock_s, LEAST_CLOCK_S)
+    nominal = max(data.study.floor.clock_s, LEAST_JITTER_S)
     clock = np.concatenate([f.clock_s for f in data.flights])
     measured = max(float(np.std(clock)), 1e-9)
     if measured <= nominal:
@@ -42,15 +41,16 @@ def loss(data: Data) -> tuple[float, float]:
 
 def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
     """An effect on the logged times with its parameter as measured, and its gain, nats."""
-    measured, gain = jitter(data) if term.name == JITTER else loss(data)
+    measured, gain = loss(data) if term.signature.loses_rows else jitter(data)
     return term.fitted(np.array([measured / term.step(term.free[0])])), gain
 
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood that those effects gain that act on the logged times, among others that do not."""
-    return sum(clock_gain(data, t)[1] for t in terms if t.kind == CLOCK)
+    return sum(clock_gain(data, t)[1] for t in terms if t.shows_in == CLOCK)
 
 
-def clock_left(data: Data, named: Sequence[str]) -> float:
-    """Log likelihood of the logged times that the effects named do not explain."""
-    return (0.0 if JITTER in named else jitter(data)[1]) + (0.0 if LOSS in named else loss(data)[1])
+def clock_left(data: Data, terms: Sequence[Term]) -> float:
+    """Log likelihood of the logged times that effects do not explain."""
+    explained = {t.signature.loses_rows for t in terms if t.shows_in == CLOCK}
+    return (0.0 if False in explained else jitter(data)[1]) + (0.0 if True in explained else loss(data)[1])

@@ -2,56 +2,21 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY, ClosedLoop
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
-from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, starts
+from airtouch.gap.signals.study import Study
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
-from airtouch.vehicle import Vehicle
 
-SCALES_TORQUE = frozenset({"inertia"})  #: effects that only multiply torque, and would shrink any trim
 #: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
 KEPT, KEPT_SAMPLES = 96, 20000
-
-
-@dataclass(frozen=True)
-class Study:
-    """What a diagnosis holds flights against: vehicle, calibration, controller and floor."""
-
-    vehicle: Vehicle
-    calibration: tuple[Active, ...]
-    controller: ClosedLoop | None
-    floor: Floor
-    response: Response | None = None
-    unnamed_floor: Any = None  #: unnamed.columns.UnnamedFloor of the nominal flights
-    nominal: int = 0  #: how many there were
-    scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
-    relations: Any = None  #: relations.library.Library that holds for the nominal flights, if there is one
-    #: (flight, from_s, to_s) in which another vehicle is known to be overhead; none: nobody knows
-    overhead: tuple[tuple[str, float, float], ...] = ()
-
-    @property
-    def simulated(self) -> bool:
-        """Whether its nominal flights are those of a simulator, which are all drawn alike."""
-        return self.scatter is not None and self.scatter.exact
-
-    @property
-    def same_models(self) -> bool:
-        """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
-        return self.simulated and self.controller is not None and self.controller.by_firmware
-
-    @property
-    def recorded(self) -> bool:
-        """Whether its nominal flights are recorded ones. Without nominal flights this is False, as `simulated` is."""
-        return self.scatter is not None and not self.scatter.exact
 
 
 @dataclass
@@ -74,12 +39,17 @@ class Data:
     bridging: list[np.ndarray] = field(default_factory=list)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
+    @property
+    def seconds(self) -> float:
+        """How long the flights last together, s."""
+        return sum(len(f) for f in self.flights) * PERIOD_S
+
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
         self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
                         for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
-            self.quiet = [self.study.response.quiet(w) for w in commanded(self)]
+            self.quiet = [self.study.response.quiet(w) for w in command_torque(self)]
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
@@ -93,26 +63,33 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
     """
     response = data.study.response
-    replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
+    replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
-        with_all = _replayed(data, replayed)
-        return _without_means(data, replayed, with_all) if data.slow else with_all
-    return _cached(data, "applied", active, lambda: _applied(data, response, active, replayed))
+        with_all = _replay_spectra(data, replayed)
+        return _without_scaling(data, replayed, with_all) if data.slow else with_all
+    return _cached(data, "by response", active, lambda: _by_response(data, response, active, replayed))
 
 
-def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
-             ) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap, torque compared with what the commands lead to expect. replayed: without COMMAND_ONLY."""
-    with_all = _replayed(data, replayed)
+def _by_response(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
+                 ) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap, torque compared with what the commands lead to expect.
+
+    replayed: the effects that do not show in the commands alone.
+    """
+    with_all = _replay_spectra(data, replayed)
     law = data.study.controller
     assert law is not None  # a response is known of nominal flights, and so is their loop
     not_loop = [a for a in replayed if not law.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
     change = law.torque_change(active, frequencies(AIR))
-    replays = (_replayed(data, s) for s in ((), by_command, not_loop))
-    sets = zip(data.flights, data.quiet, data.turning, *replays, with_all, strict=True)
-    return [e if f.rates is None else {**e, AIR: response.with_residual(e[AIR], q, _torque(m, n, d, o), change)}
-            for f, q, m, n, d, o, e in sets]
+    nominal, driven, disturbed = (_replay_spectra(data, some) for some in ((), by_command, not_loop))
+    out = []
+    for i, gap in enumerate(with_all):
+        if data.flights[i].rates is not None:
+            torque = _torque(data.turning[i], nominal[i], driven[i], disturbed[i])
+            gap = {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
+        out.append(gap)
+    return out
 
 
 def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],
@@ -128,10 +105,10 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
     return TorqueSpectra(measured, residual, by_command, disturbance)
 
 
-def commanded(data: Data) -> list[np.ndarray]:
+def command_torque(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
     return [measured - residual[AIR][:, :, TORQUE]
-            for measured, residual in zip(data.turning, _replayed(data, ()), strict=True)]
+            for measured, residual in zip(data.turning, _replay_spectra(data, ()), strict=True)]
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
@@ -144,7 +121,7 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     if response is None or change is None or not change.cut.any():
         return None
     out = []
-    for f, q, torque, base in zip(data.flights, data.quiet, commanded(data), data.base, strict=True):
+    for f, q, torque, base in zip(data.flights, data.quiet, command_torque(data), data.base, strict=True):
         power = {r: np.zeros(x.shape) for r, x in base.items()}
         if f.rates is not None:
             doubt = response.doubt(q, torque, change)
@@ -153,32 +130,30 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     return out
 
 
-def _without_means(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
-                   ) -> list[dict[str, np.ndarray]]:
+def _without_scaling(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
+                     ) -> list[dict[str, np.ndarray]]:
     """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
-    unscaled = [a for a in active if a.effect.name not in SCALES_TORQUE]
+    unscaled = [a for a in active if not signature_of(a.effect).scales_torque]
     if len(unscaled) == len(active):
         return with_all
     out = [{r: v.copy() for r, v in e.items()} for e in with_all]
-    for spectra_of_all, spectra_without in zip(out, _replayed(data, unscaled), strict=True):
+    for spectra_of_all, spectra_without in zip(out, _replay_spectra(data, unscaled), strict=True):
         for r, v in spectra_of_all.items():
             v[:, :, TORQUE] = spectra_without[r][:, :, TORQUE]
     return out
 
 
-def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    residuals = data.workspace.once("ungated", (), lambda: [{} for _ in data.flights])
-    return _cached(data, "spectra", active, lambda: [
-        _replay(data, *each, active) for each in zip(data.flights, data.first, residuals, strict=True)])
+    return _cached(data, "spectra", active, lambda: [_flight_replay(data, i, active) for i in range(len(data.flights))])
 
 
-def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], residuals: dict, active: Sequence[Active],
-            ) -> dict[str, np.ndarray]:
-    """`_replayed` of one flight. first: of its blocks by regime; residuals: those of effects that always act, kept."""
-    bridged = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), residuals)
+def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
+    """`_replay_spectra` of flight i, by regime."""
+    bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
+                               data.workspace.once("residuals", i, Workspace))
     out = {}
-    for r, begin in first.items():  # commands are the command view's: nothing is left of them here
+    for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = blocks(bridged[:, :COMMAND.start], begin, r)
         out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[r][:, :, :COMMAND.start] = replayed

@@ -11,16 +11,16 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.cells import GROUPS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.gauss_newton import gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
-from airtouch.gap.evidence.problem import Part, Problem, problem_of
+from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms, mean_places
 from airtouch.simulation.effects import Active
 
 #: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
@@ -34,62 +34,61 @@ CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelih
 
 
 @dataclass
-class Fit:
+class FittedTerms:
     """A hypothesis fitted.
 
-    terms: with their values; scaled (k,), covariance (k, k): of the free parameters of its mean effects; offsets (m,):
-    of channels of flights, in the order of `Problem.offsets`; gained: log likelihood of the blocks fitted.
+    terms: with their values; scaled (k,), covariance (k, k): of the free parameters of its mean effects.
     """
 
-    terms: tuple[Term, ...]
+    terms: Terms
     scaled: np.ndarray
     covariance: np.ndarray
-    offsets: np.ndarray
-    gained: float
+
+    def place(self, term: Term) -> slice:
+        """Where the parameters of one of its mean effects are among the k."""
+        return next(place for t, place in mean_places(self.terms) if t is term)
 
 
-def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None,
-        prior: np.ndarray | float = PRIOR_UNITS) -> Fit:
+def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
+    """Scaled parameters (k,) of the mean effects among terms with values."""
+    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in terms if t.shows_in == MEAN)])
+
+
+def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
+        prior: np.ndarray | float = PRIOR_UNITS) -> FittedTerms:
     """Fit of effects to the blocks of `part`; the residual is judged elsewhere.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior: standard deviation of
     these around neutral. Mean and random effects are fitted in turn until neither moves.
     """
     problem = problem_of(data, part)
-    mean, random = tuple(t for t in terms if t.kind == MEAN), random_of(terms)
+    mean, random = tuple(t for t in terms if t.shows_in == MEAN), random_of(terms)
     x = start_of(problem, mean, start)
     random_power: np.ndarray | float = 0.0
     if random and mean and start is not None:
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
-    for _ in range(TURNS if random and mean else 1):
+    for _ in range(TURNS):
         solution = gauss_newton(problem, mean, x, random_power, prior, bool(random))
         x, active = solution.x, active_at(mean, solution.x)
-        command_power, cost = problem.commanded(active, bool(random))
-        random_power = _random_power(problem, random, solution.values, active) if random else 0.0
+        if not random:
+            break
+        command_power, cost = problem.loop_power(active, True)
+        random_power = _random_power(problem, random, solution.values, active)
         level = problem.likelihood(solution.values, random_power + command_power) - cost
-        if level < last_level + SETTLED:
+        if not mean or level < last_level + SETTLED:
             break
         last_level = level
-    if random:
-        command_power, cost = problem.commanded([*active, *(t.active() for t in random)], True)
-    gained = problem.likelihood(solution.values, random_power + command_power) - cost
-    return Fit(_with_values(terms, x, random), x, solution.covariance, solution.offsets, gained)
+    return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
 
 
-def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> tuple[Term, ...]:
+def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> Terms:
     """The terms with their values: mean ones at scaled parameters x (k,), random ones as fitted, in their order."""
-    out, place, fitted = [], 0, iter(random)
-    for t in terms:
-        if t.kind == MEAN:
-            out.append(t.fitted(x[place:place + len(t.free)]))
-            place += len(t.free)
-        else:
-            out.append(next(fitted) if t.kind == SPECTRUM else t)
-    return tuple(out)
+    fitted = {MEAN: iter([t.fitted(x[own]) for t, own in mean_places(terms)]), SPECTRUM: iter(random)}
+    return tuple(next(fitted[t.shows_in]) if t.shows_in in fitted else t for t in terms)
 
 
-def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> float:
+def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False) -> float:
     """Log likelihood of blocks under effects fitted elsewhere; offsets between flights fitted anew.
 
     wide: the commands' floor is as uncertain as under random effects, though there are none.
@@ -98,22 +97,22 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
     return problem.likelihood(values, added) - price
 
 
-def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem, its residual (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
     problem, values, added, _ = _explained(data, part, terms, wide)
     return problem, values, problem.power + added
 
 
-def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
-    """Log likelihood (GROUPS,) that effects with these parameters add in each cell: view, channel and band."""
+def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
+    """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
     problem, values, power = left_over(data, part, (), bool(random_of(terms)))
     without = problem.likelihood.each(values, power - problem.power)
     problem, values, power = left_over(data, part, terms)
-    return np.bincount(problem.groups, problem.likelihood.each(values, power - problem.power) - without, GROUPS)
+    return np.bincount(problem.cells, problem.likelihood.each(values, power - problem.power) - without, CELLS)
 
 
-def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
     """Problem of a part, its residual under effects, the power that they add, and the cost of offsets and floor."""
     problem = problem_of(data, part)
@@ -124,10 +123,10 @@ def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
     """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
-    commanded, _ = problem.commanded(mean, True)
+    command_power, _ = problem.loop_power(mean, True)
     for _ in range(ROUNDS if len(random) > 1 else 1):
         for i in range(len(random)):
-            random[i] = _strength(problem, random, i, values, commanded)
+            random[i] = _strength(problem, random, i, values, command_power)
     return problem.random_power(random)
 
 
@@ -162,7 +161,7 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.
     return term.fitted(np.full(len(term.free), float(np.exp(optimum.x))))
 
 
-def strength_variance(data: Data, part: Part, terms: Sequence[Term], term: Term) -> np.ndarray:
+def strength_variance(data: Data, part: BlockSet, terms: Sequence[Term], term: Term) -> np.ndarray:
     """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature; inf for none."""
     x = term.scaled(term.values)
     levels = []

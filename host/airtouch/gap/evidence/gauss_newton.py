@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of
-from airtouch.gap.evidence.problem import LOOP, Problem
-from airtouch.gap.evidence.slopes import Slopes, active_at
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
+from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
+from airtouch.gap.signatures.term import Term, mean_places
 
 ITERATIONS = 8  #: steps at most; chosen
 ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
@@ -23,10 +23,9 @@ GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,) with their covariance (k, k), offsets (m,) of flights, and the residual (n,)."""
+    """Scaled parameters x (k,) with their covariance (k, k), and the residual (n,)."""
 
     x: np.ndarray
-    offsets: np.ndarray
     covariance: np.ndarray
     values: np.ndarray
 
@@ -51,7 +50,7 @@ class _Posterior:
     def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
                  wide: bool) -> None:
         self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
-        of_loop = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
+        of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         own = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
         self.prior = np.concatenate([own, [deviation for _, deviation in problem.unit_offsets]])
 
@@ -61,10 +60,10 @@ class _Posterior:
         values = self.problem.values(active) if self.mean else self.problem.base.copy()
         for amount, (index, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[index] -= amount * column
-        command_power, price = self.problem.commanded(active, self.wide)
+        command_power, price = self.problem.loop_power(active, self.wide)
         power = self.added + command_power
-        return _State(x, offsets, values, power,
-                      price + cost_of(self.problem, values, power, x, offsets, self.prior))
+        away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
+        return _State(x, offsets, values, power, price + (0.5 * away - self.problem.likelihood(values, power)))
 
 
 def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
@@ -78,10 +77,10 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
     low, high = limits(mean)
     x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.unit_offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.unit_offsets:
-        return MeanFit(x, offsets, covariance, problem.base)
+        return MeanFit(x, covariance, problem.base)
     posterior = _Posterior(problem, mean, added, spread, wide)
     now = posterior.at(x, offsets)
-    slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0
+    slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
     for _ in range(ITERATIONS):
         slopes.take(now.x, stuck)
         before = now.cost
@@ -90,22 +89,22 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
         if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
             break
         stuck = gain == 0.0
-    return MeanFit(now.x, now.offsets, covariance, now.values)
+    return MeanFit(now.x, covariance, now.values)
 
 
-def _step(posterior: _Posterior, slopes: Slopes, now: _State, bounds: tuple[np.ndarray, np.ndarray], damping: float,
-          ) -> tuple[_State, np.ndarray, float, bool]:
+def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],
+          damping: float) -> tuple[_State, np.ndarray, float, bool]:
     """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained.
 
     It is shortened until it gains, TRIES times at most.
     """
     problem, size = posterior.problem, len(now.x)
     columns = [*slopes.columns, *(-column for column, _ in problem.unit_offsets)]
-    weights = weights_of(problem, now.values, now.power)
-    of_power = slopes.of_power(now.x, now.values, now.power, posterior.wide)
+    equations = normal_equations(columns, posterior.prior, now.values, weights_of(problem, now.values, now.power),
+                                 np.concatenate([now.x, now.offsets]))
+    equations = equations.with_power(*slopes.of_power(now.x, now.values, now.power, posterior.wide))
     for _ in range(TRIES):
-        change, covariance = bounded_step(columns, posterior.prior, now.values, weights, now.x, now.offsets, *bounds,
-                                          of_power, damping)
+        change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
         if new.cost < now.cost - 1e-9:
             return new, covariance, damping * CALMED, True
@@ -121,12 +120,9 @@ def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -
     size = sum(len(t.free) for t in mean)
     known = np.full(size, np.nan) if known is None else known
     x = np.where(np.isnan(known), CLOSE, known)
-    place = 0
-    for t in mean:
-        own = range(place, place + len(t.free))
-        place += len(t.free)
-        if t.name in LOOP and len(problem.commands) and np.isnan(known[own]).all():
-            x = _best_on_grid(problem, mean, x, own)
+    for t, own in mean_places(mean):
+        if t.signature.loop_only and len(problem.commands) and np.isnan(known[own]).all():
+            x = _best_on_grid(problem, mean, x, range(own.start, own.stop))
     return x
 
 
@@ -137,7 +133,7 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: ra
     for i, amount in itertools.product(own, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        command_power, cost = problem.commanded(active_at(mean, trial))
+        command_power, cost = problem.loop_power(active_at(mean, trial))
         level = problem.likelihood(problem.base, command_power) - cost
         if level > best:
             best, out = level, trial

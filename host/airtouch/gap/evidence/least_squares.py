@@ -1,12 +1,70 @@
 """Steps of weighted ridge regression on flattened spectra: those of a fit, and the offsets between flights."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
+
+
+class NormalEquations(NamedTuple):
+    """Equations of a step of k parameters and m offsets: matrix (k + m, k + m) times the step is right (k + m,)."""
+
+    matrix: np.ndarray
+    right: np.ndarray
+
+    def with_power(self, gradient: np.ndarray, information: np.ndarray) -> "NormalEquations":
+        """These with gradient (k,) and information (k, k) of the likelihood from the power that parameters change."""
+        k, matrix, right = len(gradient), self.matrix.copy(), self.right.copy()
+        matrix[:k, :k] += information
+        right[:k] += gradient
+        return NormalEquations(matrix, right)
+
+
+def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
+                     weights: np.ndarray, at: np.ndarray) -> NormalEquations:
+    """Normal equations of the ridge regression that lowers values + sum(step * column).
+
+    columns (k + m, n): change of the values per parameter and offset; prior (k + m,): their standard deviations about
+    0; values (n,): the residual; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step begins.
+    """
+    j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
+    wj = j * np.repeat(weights, 2)
+    return NormalEquations(
+        2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2),
+        -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2)
+
+
+def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
+                 damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A step (k + m,) that leaves parameters at a bound there when it would take them past it; covariance (k, k) of x.
+
+    x (k,): parameters where the step begins; bounds (k,) each: lowest and highest; damping: share of the matrix's
+    diagonal that is added to it for the step.
+    """
+    matrix, right = equations
+    n, (low, high) = len(x), bounds
+    free, covariance = np.ones(len(right), bool), np.zeros((n, n))
+    for _ in range(n + 1):
+        change = np.zeros(len(right))
+        where = np.flatnonzero(free)
+        if not len(where):
+            break
+        full = np.linalg.pinv(matrix[np.ix_(where, where)], hermitian=True)
+        damped = matrix[np.ix_(where, where)] + damping * np.diag(np.diag(matrix)[where])
+        change[where] = np.linalg.solve(damped, right[where]) if damping else full @ right[where]
+        stuck = np.zeros(len(right), bool)
+        stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
+        if not stuck.any():
+            free_parameters = where[where < n]
+            covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], 1e-300))  # of those at a bound: all else known
+            covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
+            break
+        free &= ~stuck
+    return change, covariance
 
 
 def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
@@ -17,65 +75,13 @@ def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
-    """Weights of a least-squares step whose optimum is that of the tailed likelihood, flattened; 0 where unknown."""
+    """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where unknown.
+
+    values (n,): the residual; added (n,): power over the floor.
+    """
     power = problem.power + added
     e = squared(values) / power
     return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
-
-
-def _normal(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
-            weights: np.ndarray, at: np.ndarray, commands: tuple[np.ndarray, np.ndarray],
-            ) -> tuple[np.ndarray, np.ndarray]:
-    """Normal matrix and right-hand side of the ridge regression that lowers values + sum(step * column).
-
-    commands: gradient and information of the likelihood from the commands' spectra.
-    """
-    j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
-    wj = j * np.repeat(weights, 2)
-    normal = 2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2)
-    slope = -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2
-    return normal + commands[1], slope + commands[0]
-
-
-def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
-                 x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
-                 commands: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A step that leaves parameters at a bound there when it would take them past it, and the covariance (k, k) of x.
-
-    columns (k + m, n): change of the values per parameter and offset; prior (k + m,): their standard deviations; values
-    (n,): the residual; weights (n,): `weights_of`; x (k,), offsets (m,): where the step begins; low, high (k,): bounds
-    of x; commands: gradient (k,) and information (k, k) of the likelihood from the power that parameters change;
-    damping: share of the normal matrix's diagonal that is added to it for the step. The step is (k + m,).
-    """
-    all_parameters, n = np.concatenate([x, offsets]), len(x)
-    free = np.ones(len(all_parameters), bool)
-    covariance = np.zeros((n, n))
-    gradient, information = np.zeros(len(all_parameters)), np.zeros((len(all_parameters), len(all_parameters)))
-    gradient[:n], information[:n, :n] = commands
-    normal, slope = _normal(columns, prior, values, weights, all_parameters, (gradient, information))
-    for _ in range(n + 1):
-        change = np.zeros(len(all_parameters))
-        where = np.flatnonzero(free)
-        if not len(where):
-            break
-        full = np.linalg.pinv(normal[np.ix_(where, where)], hermitian=True)
-        damped = normal[np.ix_(where, where)] + damping * np.diag(np.diag(normal)[where])
-        change[where] = np.linalg.solve(damped, slope[where]) if damping else full @ slope[where]
-        stuck = np.zeros(len(all_parameters), bool)
-        stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
-        if not stuck.any():
-            free_parameters = where[where < n]
-            covariance = np.diag(1.0 / np.maximum(np.diag(normal)[:n], 1e-300))  # of those at a bound: all else known
-            covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
-            break
-        free &= ~stuck
-    return change, covariance
-
-
-def cost_of(problem: Problem, values: np.ndarray, added: np.ndarray | float, x: np.ndarray,
-            offsets: np.ndarray, prior: np.ndarray) -> float:
-    """Minus the log of the posterior of a residual, of parameters x and of offsets, both with a Gaussian prior."""
-    return -problem.likelihood(values, added) + 0.5 * float(((np.concatenate([x, offsets]) / prior) ** 2).sum())
 
 
 def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:

@@ -2,7 +2,7 @@
 
 import functools
 import weakref
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -12,20 +12,19 @@ from airtouch.gap.evidence.cells import BANDS_HZ, COMMAND_VIEW, REPLAY_VIEW, RES
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged, squared
 from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.signature import MEAN, signature_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
+ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
 DOUBT = 0.25
 #: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
@@ -33,10 +32,15 @@ FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
 
 
 @dataclass(frozen=True)
-class Part:
+class BlockSet:
     """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
 
     pieces: tuple[Piece, ...]
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for two parts of the same blocks."""
+        return tuple((flight, regime, chosen.tobytes()) for flight, regime, chosen in self.pieces)
 
 
 @dataclass(frozen=True)
@@ -62,22 +66,22 @@ class Elements:
 
 
 class Problem:
-    """A part of flights as flattened values (n,): those of the replay view, `own` of them, then those of the commands.
+    """A part of flights as flattened values (n,): `replay_count` of the replay view, then those of the commands.
 
-    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view; torque (own,):
+    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view; torque (replay,):
     whether a value is one of the torque.
     """
 
-    def __init__(self, data: Data, part: Part) -> None:
+    def __init__(self, data: Data, part: BlockSet) -> None:
         # the data keeps its problems: no cycle, no garbage to wait for
-        self.data, self.part, self.workspace = weakref.proxy(data), part, Workspace()
+        self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.slow))
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
-        #: power (own,) of the floor, without what lost rows add
+        #: power (replay,) of the floor, without what lost rows add
         self.noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
                                          for f, b in zip(data.flights, data.first, strict=True)]).real
         replay = _of_replay(data, self.layout, self.noise)
-        self.own = len(replay.base)
+        self.replay_count = len(replay.base)
         self.torque = (replay.channel >= TORQUE.start) & (replay.channel < TORQUE.stop)
         self.air = self.layout.air_blocks(data.first)
         values = replay.followed_by(_of_commands(self.commands))
@@ -87,7 +91,7 @@ class Problem:
         self.likelihood = Likelihood(self.power, self.freedom, self.tail, self.known)
 
     @functools.cached_property
-    def groups(self) -> np.ndarray:
+    def cells(self) -> np.ndarray:
         """Number (n,) of the cell of each value (`cells`)."""
         bands = {r: np.digitize(frequencies(r), BANDS_HZ)[:, None] - 1 for r in (AIR, REST)}
         replay = self.layout.per_bin({r: cell_numbers(view, bands[r], np.arange(COUNT))
@@ -98,13 +102,13 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """The gap (n,) with effects in the model."""
-        replayed = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
-        replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.own]
+        replayed = _beside_edges(active)
+        replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.replay_count]
         command_values = self.commands.moved([a for a in active if not a.gate])
         return np.where(self.known, self.with_commands(replay_values, command_values), 0.0)
 
     def with_commands(self, own: np.ndarray, of_commands: np.ndarray | float = 0.0) -> np.ndarray:
-        """Values (own,) of the replay view, followed by one value, or one each, for those of the commands."""
+        """Values (replay,) of the replay view, followed by one value, or one each, for those of the commands."""
         return np.concatenate([own, np.broadcast_to(of_commands, len(self.commands))])
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
@@ -113,42 +117,42 @@ class Problem:
         wide: the commands' floor is as uncertain as under random effects, though there are none.
         """
         random = random_of(terms)
-        mean = [t.active() for t in terms if t.kind == MEAN]
-        command_power, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
+        mean = [t.active() for t in terms if t.shows_in == MEAN]
+        command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + command_power, cost
 
-    def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+    def loop_power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power (n,) that effects of the loop add to the floors of torque and commands, and nats that this costs.
 
         wide: as in `modelled`.
         """
         power, cost = self.commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.of_torque(active), power - self.commands.floor]), cost
+        return np.concatenate([self.torque_power(active), power - self.commands.floor]), cost
 
-    def of_torque(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (own,) that effects of the loop add to the floor of the torque.
+    def torque_power(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (replay,) that effects of the loop add to the floor of the torque.
 
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
         law = self.data.study.controller
-        loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
-        if not self.own or not loop or not law.changes_loop(loop):
-            return np.zeros(self.own)
-        gather = self.layout.gather
-        change = np.where(self.known[:self.own], gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
+        loop = _beside_edges(active) if law else []
+        if not self.replay_count or not loop or not law.changes_loop(loop):
+            return np.zeros(self.replay_count)
+        gather, own = self.layout.gather, slice(self.replay_count)
+        change = np.where(self.known[own], gather(spectra(self.data, loop)) - self.base[own], 0.0)
         steps = step_doubt(self.data, loop)
         doubt = DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
 
     def _noise_growth(self, change: Change) -> np.ndarray:
-        """Factor (own,) of a changed loop on the torque's floor, less 1, as far as the floor is noise of the loop."""
+        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
         before, after = change.unexplained
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
         table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
         return self.layout.per_bin({AIR: table, REST: np.zeros(self.layout.keep[REST].shape)})
 
-    def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
+    def loops_differ(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
         """Whether the loops of roll and pitch differ between two hypotheses."""
         law = self.data.study.controller
         return law is not None and not law.same_loop(before, after)
@@ -184,6 +188,11 @@ class Problem:
         return [(here, column[here], spread) for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
 
 
+def _beside_edges(active: Sequence[Active]) -> list[Active]:
+    """The effects that show beside edges: in the replay, or in the loop that is part of it."""
+    return [a for a in active if not signature_of(a.effect).edges_only]
+
+
 def _counted(slow: bool) -> dict[str, np.ndarray]:
     """Bins and channels (bins, COUNT) of the replay view that count, by regime. slow: `Data.slow`."""
     keep = {r: judged(r) for r in (AIR, REST)}
@@ -195,7 +204,7 @@ def _counted(slow: bool) -> dict[str, np.ndarray]:
 
 
 def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
-    """The values of the replay view. noise (own,): power of the floor, without what lost rows add."""
+    """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
     base, counts = layout.gather(data.base), data.study.floor.blocks
     known = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
@@ -211,14 +220,13 @@ def _of_commands(commands: CommandView) -> Elements:
                     commands.freedom, commands.freedom)
 
 
-def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
-    """Every block of every flight, one and the same part in each call, or of the flights of these numbers."""
-    if flights is None:
-        return data.workspace.once("whole", (), lambda: whole_of(data, range(len(data.flights))))
-    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in flights for r in (AIR, REST)
-                      if len(data.first[i][r])))
+def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
+    """Every block of every flight, or of the flights of these numbers."""
+    numbers = range(len(data.flights)) if flights is None else flights
+    return BlockSet(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
+                          if len(data.first[i][r])))
 
 
-def problem_of(data: Data, part: Part) -> Problem:
+def problem_of(data: Data, part: BlockSet) -> Problem:
     """The flattened blocks of a part, made once."""
-    return data.workspace.once("problem", id(part), lambda: (part, Problem(data, part)))[1]  # the part lives as long
+    return data.workspace.once("problem", part.key, lambda: Problem(data, part))

@@ -4,23 +4,25 @@ White noise of the IMU and the rotors' lines in closed form; random forces by ru
 effect itself on the flight's signals with several seeds.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.vibration_lines import lines
-from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signals.spectra import AIR, LEAKED, LENGTH, blocks, difference_power, frequencies
+from airtouch.gap.signals.study import Study
+from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
+from airtouch.gap.signatures.term import Term, neutral_of, parameter_of
 from airtouch.simulation.body import rigid_body
+from airtouch.simulation.effects.effect import Gate
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
@@ -28,15 +30,6 @@ SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen 
 LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by; chosen
 RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
 LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
-SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
-
-
-def growth(term: Term, x: float) -> float:
-    """Added power at scaled strength x over that at 1."""
-    if term.name == "imu_noise":
-        values = term.at(np.array([x])), term.at(np.array([1.0]))
-        return max(values[0]["factor"] ** 2 - 1.0, 0.0) / (values[1]["factor"] ** 2 - 1.0)
-    return x * x
 
 
 def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
@@ -44,17 +37,16 @@ def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     of_unit = data.workspace.once("random", (term.name, *sorted(unit.values.items())),
                                   lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
-    p = next(q for q in term.effect.parameters if q.name == term.free[0])
-    neutral = p.neutral or 0.0
-    step = unit.values[term.free[0]] - neutral
-    scale = growth(term, (term.values[term.free[0]] - neutral) / step)
+    (name, *_) = term.free
+    neutral = neutral_of(parameter_of(term.effect, name))
+    scale = growth(term, (term.values[name] - neutral) / (unit.values[name] - neutral))
     if term.gate:
         return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()}
                 for i, f in enumerate(of_unit)]
     return [{r: scale * v for r, v in f.items()} for f in of_unit]
 
 
-def _covered(data: Data, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
+def _covered(data: Data, i: int, regime: str, gate: Gate) -> np.ndarray:
     """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[regime], data.first[i][regime]
@@ -63,23 +55,66 @@ def _covered(data: Data, i: int, regime: str, gate: Sequence[tuple[str, float, f
     return (windows @ weight / weight.sum())[:, None, None]
 
 
+def growth(term: Term, x: float) -> float:
+    """Added power at scaled strength x over that at 1."""
+    if not term.signature.factors:
+        return x * x
+    factor, of_one = (term.at(np.array([scaled]))[term.free[0]] for scaled in (x, 1.0))
+    return max(factor ** 2 - 1.0, 0.0) / (of_one ** 2 - 1.0)
+
+
 def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """PSD (blocks, bins, COUNT) by regime that a random effect of unit strength adds to flight i."""
-    shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
-    maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
-    power_by_regime = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
+    power_by_regime = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
     response = data.study.response
     if response is not None and data.flights[i].rates is not None:
-        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.name in SENSED)
+        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.signature.sensed)
     return power_by_regime
 
 
-def _imu_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
+def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+    """Power by regime of an effect that is run on the flight's own signals with several seeds.
+
+    A channel has one shape of the spectrum, at the strength of each block.
+    """
+    flight, study = data.flights[i], data.study
+    runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
+            for seed in range(SEEDS)]
+    mean, out = np.mean(runs, axis=0), _no_power(data, i)
+    for r, first in data.first[i].items():
+        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
+        total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
+        if not len(total):
+            continue
+        if r == AIR:
+            total[:, :, TORQUE] *= _over_a_sample()[:, None]
+        shape = total.mean(axis=0, keepdims=True)
+        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
+        out[r] = shape * strength
+    return out
+
+
+def _over_a_sample() -> np.ndarray:
+    """Power (bins,) of the gyro's differences over that of means of two samples, as `channels.residual` takes them.
+
+    A difference is a mean over a sample. Near 50 Hz, where means of two samples pass nothing, LEAST_PASSED limits it.
+    """
+    turns = frequencies(AIR) * PERIOD_S
+    return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
+
+
+def _no_power(data: Data, i: int) -> dict[str, np.ndarray]:
+    """Zeros (blocks, bins, COUNT) by regime, of flight i."""
+    return {r: np.zeros(gap.shape) for r, gap in data.base[i].items()}
+
+
+def _imu_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
     row = prepare(data.study.vehicle, ())[0][0]
     extra = term.values["factor"] ** 2 - 1.0
-    out = {}
-    for r in shape:
+    out = _no_power(data, i)
+    for r, table in out.items():
         f = frequencies(r)
         white = np.zeros((len(f), COUNT))
         white[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
@@ -87,7 +122,7 @@ def _imu_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndar
             gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
             white[:, TORQUE] = _torque_noise(data.study, r, _difference(r)[:, None] * gyro)
             white[:, RATE] = gyro
-        out[r] = np.broadcast_to(extra * white, shape[r]).copy()
+        table[:] = extra * white
     return out
 
 
@@ -134,75 +169,35 @@ def _gyro_share(study: Study) -> np.ndarray:
 def _difference(regime: str) -> np.ndarray:
     """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
     f = frequencies(regime)
-    return 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
+    return difference_power(np.maximum(f, LEAKED * f[1])) / PERIOD_S ** 2
 
 
-def _motor_noise(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
-    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing, by regime."""
-    flight, study = data.flights[i], data.study
+def _thrust_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing; at rest the rotors stand."""
+    out, study, f = _no_power(data, i), data.study, frequencies(AIR)
     row = prepare(study.vehicle, study.calibration)[0][0]
-    thrust = study.vehicle.thrust(flight.pwm)
+    thrust = study.vehicle.thrust(data.flights[i].pwm)
     tau, rms = term.values["time"], term.values["rms"]
     arms = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
                      -row["rotor_x"] / row["inertia"][1],
                      np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
-    out = {}
-    for r in shape:
-        f = frequencies(r)
-        aliases = np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
-        density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
-        folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
-        folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
-        power_of_blocks = np.zeros(shape[r])
-        for b, first in enumerate(data.first[i][r] if r == AIR else ()):  # at rest the rotors stand
-            size = (thrust[first:first + LENGTH[AIR]] ** 2).mean(axis=0)
-            strength = rms ** 2 * (arms ** 2 @ size)
-            power_of_blocks[b, :, LIFT_AND_TORQUE] = folded * strength
-        out[r] = power_of_blocks
+    aliases = np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
+    density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
+    folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
+    folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
+    for b, first in enumerate(data.first[i][AIR]):
+        size = (thrust[first:first + LENGTH[AIR]] ** 2).mean(axis=0)
+        out[AIR][b, :, LIFT_AND_TORQUE] = folded * (rms ** 2 * (arms ** 2 @ size))
     return out
 
 
-def _vibration(data: Data, i: int, term: Term, shape: dict) -> dict[str, np.ndarray]:
+def _rotor_lines(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
-    out = {r: np.zeros(s) for r, s in shape.items()}
+    out = _no_power(data, i)
     if not len(data.base[i][AIR]):
         return out
     line = lines(data).power[i][:, :, None] * term.values["amplitude"] ** 2
     out[AIR][:, :, FORCE] = line
     if data.flights[i].rates is not None:
         out[AIR][:, :, TORQUE] = term.values["gyro"] ** 2 * _difference(AIR)[:, None] * line
-    return out
-
-
-def _over_a_sample() -> np.ndarray:
-    """Power (bins,) of the gyro's differences over that of means of two samples, as `channels.residual` takes them.
-
-    A difference is a mean over a sample. Near 50 Hz, where means of two samples pass nothing, LEAST_PASSED limits it.
-    """
-    turns = frequencies(AIR) * PERIOD_S
-    return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
-
-
-def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
-    """Power by regime of an effect that is run on the flight's own signals with several seeds.
-
-    A channel has one shape of the spectrum, at the strength of each block.
-    """
-    flight: Flight = data.flights[i]
-    study = data.study
-    runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
-            for seed in range(SEEDS)]
-    mean = np.mean(runs, axis=0)
-    out = {}
-    for r, first in data.first[i].items():
-        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
-        total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
-        if not len(total):
-            out[r] = np.zeros(data.base[i][r].shape)
-            continue
-        if r == AIR:
-            total[:, :, TORQUE] *= _over_a_sample()[:, None]
-        shape = total.mean(axis=0, keepdims=True)
-        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
-        out[r] = shape * strength
     return out

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, mean_places
 from airtouch.simulation.effects import Active
 
 STEP = 0.02  #: change of a scaled parameter over which slopes are taken; chosen
@@ -14,20 +14,14 @@ FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slop
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     """Mean effects at scaled parameters x (k,), without those that are neutral there."""
-    out, place = [], 0
-    for t in mean:
-        own = x[place:place + len(t.free)]
-        place += len(t.free)
-        if own.any() or t.acts_when_neutral:
-            out.append(t.active(own))
-    return out
+    return [t.active(x[own]) for t, own in mean_places(mean) if x[own].any() or t.acts_when_neutral]
 
 
-class Slopes:
+class SpectraSlopes:
     """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
 
     at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;
-    rises (bins, axes): of the logarithm of the commands' power; powers (own,): of the floor of the torque; bent:
+    rises (bins, axes): of the logarithm of the commands' power; powers (replay,): of the floor of the torque; bent:
     whether it changes the loop, in which nothing is linear. high (k,): largest parameters.
     """
 
@@ -46,7 +40,7 @@ class Slopes:
         if not len(stale):
             return
         before = active_at(self.mean, x)
-        values, power = self.problem.values(before), self.problem.of_torque(before)
+        values, power = self.problem.values(before), self.problem.torque_power(before)
         for i in stale:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             shifted = x.copy()
@@ -54,8 +48,8 @@ class Slopes:
             after = active_at(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.of_torque(after) - power) / step
-            self.bent[i] = self.problem.bends(before, after)
+            self.powers[i] = (self.problem.torque_power(after) - power) / step
+            self.bent[i] = self.problem.loops_differ(before, after)
         self.at = x.copy() if anew else self.at
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
@@ -69,7 +63,7 @@ class Slopes:
         powers = np.array(self.powers)
         if powers.any():
             push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
-                                                              problem.own)
+                                                           problem.replay_count)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

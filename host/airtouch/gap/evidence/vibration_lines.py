@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH
+from airtouch.gap.signals.study import Study
 from airtouch.simulation import replay
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import hover_speed

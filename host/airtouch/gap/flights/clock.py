@@ -1,9 +1,11 @@
 """A log on a regular 10 ms clock: resampled where it is faster, with a row of NaN for each one that was lost."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.flights import motion
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.resample import resample
@@ -11,9 +13,11 @@ from airtouch.logs.resample import resample
 PERIOD_S = 0.01
 FAST_PERIOD_S = 0.006  #: a log whose period is shorter is resampled; chosen, between those of 100 Hz and of 200 Hz
 BACKWARDS_S = 0.05  #: step back of the clock that is no jitter: such a log is refused; chosen
-LONGEST, LONGEST_ROWS = 3, 1000  #: rows with the lost ones at most: so many times those logged, and more; chosen
+#: most rows with the lost ones, else the clock column is at fault: so many for each logged one, and some more; chosen
+MOST_ROWS_EACH, MOST_ROWS_MORE = 3, 1000
 ALIKE = 0.02  #: share of the median step by which a step may differ from it and count as alike; chosen
 MOST_ALIKE = 0.7  #: share of the steps from which the mean of those alike is the period; chosen
+LEAST_JITTER_S = 2e-4  #: s, rms of a clock that nothing disturbs: a jitter below it says nothing; chosen
 MISSING = 1.5  #: step, in periods, from which a row is missing: nearer to two periods than to one
 
 
@@ -33,23 +37,31 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
     return log
 
 
-def with_lost_rows(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarray]:
-    """The log (n rows) on a regular clock, its lost rows put back as NaN; see `Flight.clock_s` and `Flight.lost`.
+class RegularLog(NamedTuple):
+    """A log on a regular clock. clock_s (m,), lost (n,): as in `flight.Flight`."""
+
+    log: FlightLog
+    clock_s: np.ndarray
+    lost: np.ndarray
+
+
+def with_lost_rows(log: FlightLog, name: str) -> RegularLog:
+    """The log on a regular clock, its lost rows put back as NaN.
 
     Raises AirTouchError, with the file `name`, where most of the rows are missing.
     """
     n = len(log)
     if not log.has("t_s"):
-        return log, np.zeros(n), np.zeros(n, bool)
-    time = motion.interpolate_missing(log["t_s"])
+        return RegularLog(log, np.zeros(n), np.zeros(n, bool))
+    time = interpolate_missing(log["t_s"])
     period = _period(time)
-    place = np.arange(n)
-    for gap in lost_samples(time, period):
-        place[gap.sample:] += gap.lost
-    if place[-1] > LONGEST * n + LONGEST_ROWS:
+    place = np.arange(n)  # of each logged row among all
+    for hole in lost_samples(time, period):
+        place[hole.sample:] += hole.lost
+    if place[-1] > MOST_ROWS_EACH * n + MOST_ROWS_MORE:
         raise AirTouchError(f"{name}: {place[-1] - n} of {place[-1]} samples are missing; check the clock column")
-    known = n - _rows_in_doubt(time, period)
-    clock = (time - np.polyval(np.polyfit(place[:known], time[:known], 1), place))[:known] if known > 2 else np.zeros(n)
+    sure = n - _rows_in_doubt(time, period)
+    clock = _off_a_line(time, place, sure) if sure > 2 else np.zeros(n)
     lost = np.ones(place[-1] + 1, bool)
     lost[place] = False
     columns = {}
@@ -57,8 +69,12 @@ def with_lost_rows(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np
         columns[key] = np.full(len(lost), np.nan)
         columns[key][place] = values
     columns["t_s"] = np.arange(len(lost)) * PERIOD_S
-    meta = {**log.meta, "sample_period_s": PERIOD_S}
-    return FlightLog(columns, meta), clock, lost
+    return RegularLog(FlightLog(columns, {**log.meta, "sample_period_s": PERIOD_S}), clock, lost)
+
+
+def _off_a_line(time: np.ndarray, place: np.ndarray, sure: int) -> np.ndarray:
+    """Distance (sure,), s, of the first times, as many as are sure, from a straight line over their places."""
+    return (time - np.polyval(np.polyfit(place[:sure], time[:sure], 1), place))[:sure]
 
 
 def _rows_in_doubt(time: np.ndarray, period: float) -> int:

@@ -13,6 +13,7 @@ LEAST_AT_REST_MPS2 = 1e-3  #: deviation at rest that an accelerometer has at lea
 #: reach; chosen
 JOLT = 40.0
 LEAST_IN_FLIGHT = 1e-6  #: deviation in flight, in the channel's unit, that a channel has at least; chosen
+LONG_AGO = 10 ** 6  #: samples, longer than SETTLED_S: before the first command
 MOST_JOLTED = 0.1  #: share of a flight that collisions may take; more is no collision; chosen
 
 
@@ -59,7 +60,7 @@ def near_ground(ground: np.ndarray, running: np.ndarray) -> np.ndarray:
     for k in np.flatnonzero(change):
         touching[max(k - wide, 0):k + wide] = True
     sample = np.arange(len(running))
-    since = sample - np.maximum.accumulate(np.where(running, sample, -10 ** 6))  # samples since the last command
+    since = sample - np.maximum.accumulate(np.where(running, sample, -LONG_AGO))  # samples since the last command
     touching |= rest & (since < SETTLED_S / PERIOD_S)
     before = rest & (np.cumsum(running) == 0)
     before[np.argmax(running) - 1 if running.any() else 0:] = False

@@ -58,6 +58,11 @@ def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
     return 0.5 * np.log1p(cut.var(axis=1).sum(axis=1) / STILL_RAD ** 2)
 
 
+def tilt_degrees(hardness: float) -> float:
+    """Standard deviation of tilt, degrees, of a block of this hardness; undoes `hardness_of`."""
+    return float(np.degrees(STILL_RAD * np.sqrt(np.expm1(2.0 * max(hardness, 0.0)))))
+
+
 def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
               flat: np.ndarray | bool = False) -> Slopes:
     """Slopes from the power (blocks, bins, COUNT) of nominal flights' residuals; NaN where it is not known.

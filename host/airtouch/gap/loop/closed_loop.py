@@ -1,9 +1,8 @@
-"""Command view: the closed loop seen in the power spectra of the commands.
+"""The loops of nominal flights, and what they are under a hypothesis: power of the commands, share of their torque.
 
-Noise that no log holds drives the controller, so commands cannot be
-predicted sample by sample; their spectra can. Flights declared nominal give the spectra
-of level flight and, through `loop_model`, the controller and its noise; a hypothesis
-then multiplies them by the ratio of the modelled spectra with and without it.
+Noise that no log holds drives the controller, so commands cannot be predicted sample by sample; their spectra can.
+Flights declared nominal give the spectra of level flight and, by `identify`, the controller and its noise. A
+hypothesis multiplies these spectra by S_uu of the loop model under it, over S_uu under none (`ClosedLoop.ratio`).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,9 +12,11 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from airtouch.gap.edges.edge_response import EdgeFloor
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of
 from airtouch.gap.loop.axis_plant import PlantRow, axis_plant
+from airtouch.gap.loop.command_response import fitted_step
 from airtouch.gap.loop.command_spectra import (
     LENGTH,
     block_spectra,
@@ -25,11 +26,10 @@ from airtouch.gap.loop.command_spectra import (
     through_window,
 )
 from airtouch.gap.loop.controller import AXES, Controller, firmware_of
-from airtouch.gap.loop.edge_response import EdgeFloor
 from airtouch.gap.loop.loop_model import AxisLoop, excess_phase, torque_per_command
 from airtouch.gap.loop.noise_spectra import noise_power
+from airtouch.gap.loop.set_point_steps import NO_STEP, Step
 from airtouch.gap.loop.torque_share import AxisTorque, Change, axis_torque, change_of
-from airtouch.gap.loop.turning import NO_STEP, Step, step_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -43,9 +43,8 @@ UNSTABLE = 30.0
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 PLANTS = 500  #: hypotheses whose plant is cached, chosen by memory: about 2 kB each
+LEAST_NOISE_RADPS = 1e-9  #: rad/s, of a gyro that another is divided by
 LOOPS = 1000  #: spectra of an axis that are cached, chosen by memory: about 10 kB each
-#: effects that change the commands alone: replayed motor commands hold nothing of them
-COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
 
 
 class Hypothesis(NamedTuple):
@@ -57,10 +56,13 @@ class Hypothesis(NamedTuple):
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """The nominal loops: a controller, noise strengths (sources,) and floor (bins,) for each of AXES.
+    """The loops of nominal flights, of each of AXES.
 
-    floor: PSD of the commands, N^2/Hz, of `blocks` blocks as hard as nominal ones; slopes: of its power with how
-    hard the vehicle is flown; steps: of roll and pitch, in blocks in which a set-point stepped.
+    calibration: effects that make the vehicle as declared the nominal one; controllers: the firmware's (by_firmware)
+    or ones fitted to the flights; strengths (sources,) each: of the noise, sources as in `noise_spectra.noise_power`;
+    floor (bins, AXES): PSD of the commands, N^2/Hz, of `blocks` blocks as hard as nominal ones; slopes: of its power
+    with how hard the vehicle is flown; edges: responses at edges, None where nominal flights cross none; steps: of the
+    set-points of roll and pitch, in blocks in which one stepped.
     """
 
     vehicle: Vehicle
@@ -106,6 +108,22 @@ class ClosedLoop:
         """Whether the roll and pitch loops are the same under two hypotheses."""
         return _same_loop(self._hypothesis(one).row, self._hypothesis(other).row)
 
+    def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
+        """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
+        logged = commands(flight, self.vehicle)
+        ratio = self.ratio(active)
+        if np.all(ratio == 1.0):
+            return logged
+        f = np.fft.rfftfreq(len(logged), PERIOD_S)
+        spectrum = np.fft.rfft(logged, axis=0)
+        for i in range(len(AXES)):
+            spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
+        return np.fft.irfft(spectrum, len(logged), axis=0)
+
+    def nominal_power(self) -> np.ndarray:
+        """Power of the commands (bins, AXES) that the model makes of the vehicle as calibrated."""
+        return self.workspace.once("power", (), lambda: self._power(self._nominal_row))
+
     def with_steps(self, share: np.ndarray, excess: np.ndarray, f: np.ndarray) -> "ClosedLoop":
         """The same loop with `steps`, from blocks of nominal flights in which a set-point stepped.
 
@@ -117,8 +135,8 @@ class ClosedLoop:
 
         def of_axis(i: int) -> Step:
             loop = self._loops(self._nominal_row)[i]
-            turning = share[:, i - 1] * torque_per_command(loop.firmware, loop.plant, f)
-            return step_of(loop.firmware, loop.plant, self.strengths[i], f, excess[:, i - 1], turning)
+            measured = share[:, i - 1] * torque_per_command(loop.firmware, loop.plant, f)
+            return fitted_step(loop.firmware, loop.plant, self.strengths[i], f, excess[:, i - 1], measured)
 
         return replace(self, steps=(of_axis(AXES.index("roll")), of_axis(AXES.index("pitch"))))
 
@@ -156,22 +174,6 @@ class ClosedLoop:
         """A value of a loop at frequencies f, the same for all plant rows with that loop; cached."""
         return self.workspace.once("axis", (what, loop, f.tobytes()), make, LOOPS)
 
-    def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
-        """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
-        logged = commands(flight, self.vehicle)
-        ratio = self.ratio(active)
-        if np.all(ratio == 1.0):
-            return logged
-        f = np.fft.rfftfreq(len(logged), PERIOD_S)
-        spectrum = np.fft.rfft(logged, axis=0)
-        for i in range(len(AXES)):
-            spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
-        return np.fft.irfft(spectrum, len(logged), axis=0)
-
-    def nominal_power(self) -> np.ndarray:
-        """Power of the commands (bins, AXES) that the model makes of the vehicle as calibrated."""
-        return self.workspace.once("power", (), lambda: self._power(self._nominal_row))
-
     def _power(self, row: PlantRow) -> np.ndarray:
         """Modelled power of the commands (bins, AXES) of a plant row, N^2/Hz; far above any where it would not fly."""
         f = fine_frequencies()
@@ -187,7 +189,7 @@ class ClosedLoop:
 
     def _gyro_noise(self) -> np.ndarray:
         """Rms (3,) of the calibrated gyro's noise, rad/s."""
-        return np.maximum(self._nominal_row["gyro_noise"], 1e-9)
+        return np.maximum(self._nominal_row["gyro_noise"], LEAST_NOISE_RADPS)
 
 
 def _power_and_phase(loop: AxisLoop, f: np.ndarray) -> tuple[np.ndarray, float]:

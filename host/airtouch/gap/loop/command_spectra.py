@@ -1,4 +1,4 @@
-"""Spectra of the logged commands, block by block, in level flight."""
+"""Spectra of the logged commands, block by block, in level flight, and how blocks show a modelled spectrum."""
 
 from functools import cache
 
@@ -26,16 +26,90 @@ FINE, REACH = 4, 2  #: points a bin; bins that a window's leakage is followed, i
 FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
 #: power of a block over the median of its flight's blocks, above which a set-point stepped in it; chosen
 STEPPED = 5.0
+FEWEST = 3  #: blocks of a flight of which one can be unlike the others
+TINY = 1e-30  #: least power that is divided by, far below any measured
 STEPS = 12  #: iterations to the power of highest likelihood; chosen
-SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
-#: nepers of power, standard deviation of the amounts of these shapes: of the level, of the others; chosen
-SPREAD = (0.10, 0.04)
+
+
+def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
+    return flight.workspace.once("command spectra", vehicle, lambda: _block_spectra(flight, vehicle))
+
+
+def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """`block_spectra`, worked out."""
+    first = starts(flight)
+    window, scale = hann_window(LENGTH)
+    logged = commands(flight, vehicle)[:, :len(AXES)]
+    cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
+    spectra = np.fft.rfft(cut * window, axis=1)[:, _judged()] * scale
+    level = _without_step(np.abs(spectra) ** 2)
+    return first[level], spectra[level]
+
+
+def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
+    """Collective, roll, pitch and yaw commands (n, 4), N per motor, above HIGHPASS_HZ."""
+    return flight.workspace.once("commands", vehicle, lambda: highpassed(vehicle.thrust(flight.pwm) @ MIX.T))
+
+
+def highpassed(values: np.ndarray) -> np.ndarray:
+    """Values (n,) or (n, c) without what changes slower than HIGHPASS_HZ."""
+    low = lowpass(HIGHPASS_HZ * 2.0 * PERIOD_S)
+    return values - both_ways(low, values, min(PADDING, len(values) - 2))
+
+
+def starts(flight: Flight) -> np.ndarray:
+    """First samples of the blocks, half overlapping."""
+    return half_overlapping(count_within(~steady(flight), LENGTH) == 0, LENGTH)
+
+
+def steady(flight: Flight) -> np.ndarray:
+    """Samples (n,) of level flight away from edges, take-off and landing."""
+    level = np.isin(flight.phase, STEADY) & (flight.usable | flight.bridged)
+    over = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
+    moving = np.where(flight.phase == KINDS.index("hover"), 0, 1)
+    for change, span in ((np.diff(over), EDGE_S), (np.diff(moving), START_S)):
+        before, after = (int(x / PERIOD_S) for x in span)
+        for k in np.flatnonzero(change) + 1:
+            level[max(k - before, 0):k + after] = False
+    return level
+
+
+def _without_step(power: np.ndarray) -> np.ndarray:
+    """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
+    if len(power) < FEWEST:
+        return np.ones(len(power), bool)
+    mean = np.median(power, axis=0) / np.log(2.0)  # of an exponential law, as that of a bin's power
+    return ((power / np.maximum(mean, TINY)).mean(axis=1) < STEPPED).all(axis=1)
+
+
+def typical(power: np.ndarray) -> np.ndarray:
+    """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), with Student-like tails.
+
+    Fixed point of the likelihood's slope, as `signals.command_view` has it. The mean would follow the few blocks in
+    which a set-point stepped.
+    """
+    estimate = power.mean(axis=0)
+    for _ in range(STEPS):
+        e = power / estimate
+        estimate = estimate * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
+    return estimate
 
 
 @cache
 def frequencies() -> np.ndarray:
     """Hz of the bins that are judged; not to be changed."""
     return _constant(_all_frequencies()[_judged()])
+
+
+def _all_frequencies() -> np.ndarray:
+    """Frequencies (LENGTH / 2 + 1,) of a block, Hz."""
+    return np.fft.rfftfreq(LENGTH, PERIOD_S)
+
+
+def _judged() -> np.ndarray:
+    """Which of them are in BAND_HZ, bool."""
+    return (_all_frequencies() >= BAND_HZ[0]) & (_all_frequencies() <= BAND_HZ[1])
 
 
 @cache
@@ -66,84 +140,3 @@ def _constant(values: np.ndarray) -> np.ndarray:
     """The values, which nobody can write to any more."""
     values.flags.writeable = False
     return values
-
-
-def _all_frequencies() -> np.ndarray:
-    """Frequencies (LENGTH / 2 + 1,) of a block, Hz."""
-    return np.fft.rfftfreq(LENGTH, PERIOD_S)
-
-
-def _judged() -> np.ndarray:
-    """Which of them are in BAND_HZ, bool."""
-    return (_all_frequencies() >= BAND_HZ[0]) & (_all_frequencies() <= BAND_HZ[1])
-
-
-def highpassed(values: np.ndarray) -> np.ndarray:
-    """Values (n,) or (n, c) without what changes slower than HIGHPASS_HZ."""
-    low = lowpass(HIGHPASS_HZ * 2.0 * PERIOD_S)
-    return values - both_ways(low, values, min(PADDING, len(values) - 2))
-
-
-def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
-    """Collective, roll, pitch and yaw commands (n, 4), N per motor, above HIGHPASS_HZ."""
-    return flight.workspace.once("commands", vehicle, lambda: highpassed(vehicle.thrust(flight.pwm) @ MIX.T))
-
-
-def steady(flight: Flight) -> np.ndarray:
-    """Samples (n,) of level flight away from edges, take-off and landing."""
-    level = np.isin(flight.phase, STEADY) & (flight.usable | flight.bridged)
-    over = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
-    moving = np.where(flight.phase == KINDS.index("hover"), 0, 1)
-    for change, span in ((np.diff(over), EDGE_S), (np.diff(moving), START_S)):
-        before, after = (int(x / PERIOD_S) for x in span)
-        for k in np.flatnonzero(change) + 1:
-            level[max(k - before, 0):k + after] = False
-    return level
-
-
-def starts(flight: Flight) -> np.ndarray:
-    """First samples of the blocks, half overlapping."""
-    return half_overlapping(count_within(~steady(flight), LENGTH) == 0, LENGTH)
-
-
-def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
-    """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
-    return flight.workspace.once("command spectra", vehicle, lambda: _block_spectra(flight, vehicle))
-
-
-def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
-    """`block_spectra`, worked out."""
-    first = starts(flight)
-    window, scale = hann_window(LENGTH)
-    logged = commands(flight, vehicle)[:, :len(AXES)]
-    cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
-    spectra = np.fft.rfft(cut * window, axis=1)[:, _judged()] * scale
-    calm = _calm(np.abs(spectra) ** 2)
-    return first[calm], spectra[calm]
-
-
-def _calm(power: np.ndarray) -> np.ndarray:
-    """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
-    if len(power) < 3:
-        return np.ones(len(power), bool)
-    typical_power = np.median(power, axis=0) / np.log(2.0)
-    return ((power / np.maximum(typical_power, 1e-30)).mean(axis=1) < STEPPED).all(axis=1)
-
-
-def typical(power: np.ndarray) -> np.ndarray:
-    """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), tails as CommandView has them.
-
-    The mean would follow the few blocks in which a set-point stepped.
-    """
-    estimate = power.mean(axis=0)
-    for _ in range(STEPS):
-        e = power / estimate
-        estimate = estimate * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
-    return estimate
-
-
-def shapes() -> np.ndarray:
-    """Smooth shapes (SHAPES, bins) over the logarithm of frequency: level, slope, slow waves."""
-    x = np.log(frequencies())
-    x = (x - x[0]) / (x[-1] - x[0])
-    return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])

@@ -1,4 +1,8 @@
-"""Gains of the controller, axis by axis, in newtons per motor: crazyflie-firmware's own, from a plant row."""
+"""Gains of the controller, axis by axis, in newtons per motor: crazyflie-firmware's own, from a plant row.
+
+A cascade: the velocity's error asks for an angle, the angle's error for a rate, the rate's error for a command
+(thrust: height, climb, command).
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -42,65 +46,77 @@ class Controller:
 
 
 def newtons_per_pwm(row: PlantRow) -> float:
-    """Slope of a motor's thrust over its command in hover, N."""
+    """Slope of a motor's thrust over its command in hover, N.
+
+    Thrust is c0 + c1 x + c2 x^2 of the command x, whose slope is the root of c1^2 + 4 c2 (thrust - c0).
+    """
     c0, c1, c2 = (float(c) for c in row["thrust_curve"])
-    each = float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"])))
-    return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (each - c0), 1e-30)))
+    return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (_hover_thrust(row) - c0), 1e-30)))
 
 
 def newtons_per_command(row: PlantRow) -> float:
     """Slope of a motor's thrust over the command that the firmware's battery compensation turns into PWM, N."""
     c0, c1, c2 = (float(c) for c in row["thrust_curve"])
     slope = newtons_per_pwm(row)
-    hover = (slope - c1) / (2.0 * c2) if c2 else (
-        float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"]))) - c0) / c1
+    hover = (slope - c1) / (2.0 * c2) if c2 else (_hover_thrust(row) - c0) / c1
     return slope * battery_compensation.slope(row["firmware"], row, hover)
 
 
+def _hover_thrust(row: PlantRow) -> float:
+    """Nominal thrust of one motor in hover, N."""
+    return float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"])))
+
+
 def firmware(row: PlantRow, axis: str) -> Controller:
-    """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
-    return _firmware(row, axis, newtons_per_command(row))
+    """crazyflie-firmware's gains of one of AXES (simulation.firmware), with battery compensation where it is on."""
+    return firmware_of(row)[AXES.index(axis)]
 
 
 def firmware_of(row: PlantRow) -> list[Controller]:
     """`firmware` of each of AXES."""
     slope = newtons_per_command(row)
-    return [_firmware(row, axis, slope) for axis in AXES]
+    return [_height(row, slope), _attitude(row, 0, slope), _attitude(row, 1, slope)]
 
 
-def _firmware(row: PlantRow, axis: str, slope: float) -> Controller:
-    """`firmware` of an axis. slope: `newtons_per_command`, the same for all axes."""
-    loops = row["firmware"]["loops"]
-    release = row["firmware"]
-    periods = release["periods"]
-    hold, reading = 0.001 * float(periods["prediction_ms"]), 0.001 * float(periods["range_ms"])
-    if axis == "thrust":
-        climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
-        gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
-        return Controller(
-            gain=gain, angle=float(height["p"]), integral=_share(climb["i"], climb["p"]),
-            angle_integral=_share(height["i"], height["p"]), hold_s=hold,
-            range_gains=_range_gains(reading, float(release["range"]["std_m"]),
-                                     float(release["kalman"]["noise_acc_z_mps2"])),
-            range_s=reading, acc_hz=float(release["filters"]["acc_hz"]))
-    i, attitude = AXES.index(axis) - 1, 0.001 * float(periods["attitude_ms"])
+def _height(row: PlantRow, slope: float) -> Controller:
+    """The firmware's height loop: height -> climb -> thrust. slope: `newtons_per_command`."""
+    release, loops = row["firmware"], row["firmware"]["loops"]
+    climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
+    reading = 0.001 * float(release["periods"]["range_ms"])
+    return Controller(
+        gain=float(climb["p"]) * float(row["thrust_scale"]) * slope, angle=float(height["p"]),
+        integral=_share(climb["i"], climb["p"]), angle_integral=_share(height["i"], height["p"]),
+        hold_s=_hold_s(row), range_s=reading, acc_hz=float(release["filters"]["acc_hz"]),
+        range_gains=_range_gains(reading, float(release["range"]["std_m"]),
+                                 float(release["kalman"]["noise_acc_z_mps2"])))
+
+
+def _attitude(row: PlantRow, i: int, slope: float) -> Controller:
+    """The firmware's loop of roll (i = 0) or pitch (1): velocity -> angle -> rate -> command; slope: as `_height`."""
+    release, loops = row["firmware"], row["firmware"]["loops"]
     rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
     speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
-    gain = 0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope
+    period, hold = 0.001 * float(release["periods"]["attitude_ms"]), _hold_s(row)
     return Controller(
-        gain=gain, angle=float(angle["p"]), velocity=float(speed["p"]) / DEGREES,
-        derivative=_share(rate["d"], rate["p"]), integral=_share(rate["i"], rate["p"]),
-        angle_integral=_share(angle["i"], angle["p"]), velocity_integral=_share(speed["i"], speed["p"]),
-        period_s=attitude, lowpass_hz=float(row["gyro_lowpass"]),
+        gain=0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope, angle=float(angle["p"]),
+        velocity=float(speed["p"]) / DEGREES, derivative=_share(rate["d"], rate["p"]),
+        integral=_share(rate["i"], rate["p"]), angle_integral=_share(angle["i"], angle["p"]),
+        velocity_integral=_share(speed["i"], speed["p"]), period_s=period, lowpass_hz=float(row["gyro_lowpass"]),
         on_error=bool(release["controller"]["derivative_on_error"]),
-        kicked=float(row["controller_ahead"]) % hold < 0.5 * attitude, hold_s=hold,
+        kicked=float(row["controller_ahead"]) % hold < 0.5 * period, hold_s=hold,
         chip_hz=float(row["gyro_bandwidth"]))
+
+
+def _hold_s(row: PlantRow) -> float:
+    """Period of the firmware's estimator, s."""
+    return 0.001 * float(row["firmware"]["periods"]["prediction_ms"])
 
 
 @lru_cache(16)
 def _range_gains(period: float, std: float, acceleration: float) -> tuple[float, float]:
     """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s).
 
+    By iterating its Riccati equation; the filter is that of Mueller, Hamer, D'Andrea, ICRA 2015.
     period: s, of the readings; std: m, that it gives them; acceleration: its process noise, m/s^2 a millisecond.
     """
     variance, noise = std ** 2, 1000.0 * period * (0.001 * acceleration) ** 2

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, arm_of, axis_plant
 from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command
-from airtouch.gap.loop.loop_model import LOWEST_HZ, fixed_of, loop_parts, plant_of, sensed_late
+from airtouch.gap.loop.loop_model import LOWEST_HZ, factors_of, loop_parts, plant_of, sensed_late
 from airtouch.gap.loop.noise_spectra import kick_of
 from airtouch.simulation.firmware import settings
 
@@ -28,27 +28,32 @@ class Disturbed(NamedTuple):
     commanded: np.ndarray
 
 
+class AxisTransfers(NamedTuple):
+    """Transfer functions of an axis, complex (bins,): P, K and K_log (`gap.loop`)."""
+
+    plant: np.ndarray
+    controller: np.ndarray
+    logged: np.ndarray
+
+
 def disturbed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -> Disturbed:
     """At frequencies f (bins,), Hz. controllers: of AXES.
 
-    The yaw loop is the firmware's, at the pace of the roll loop.
+    The vehicle turns by S of an outside acceleration, S = 1 / (1 + P K), and the log has the command -K_log S / s of
+    it. The yaw loop is the firmware's, at the pace of the roll loop.
     """
     f = np.maximum(f, LOWEST_HZ)
-    roll, pitch = (_loop(c, axis_plant(row, axis), f) for c, axis in zip(controllers[1:], AXES[1:], strict=True))
-    axes = [_responses(c, f, *loop) for c, loop in zip((controllers[1], controllers[2], controllers[1]),
-                                                   (roll, pitch, _yaw(controllers[1], row, f)), strict=True)]
+    _, roll, pitch = controllers
+    axes = [_responses(roll, f, _tilt(roll, axis_plant(row, AXES[1]), f)),
+            _responses(pitch, f, _tilt(pitch, axis_plant(row, AXES[2]), f)),
+            _responses(roll, f, _yaw(roll, row, f))]
     return Disturbed(*(np.stack(x, axis=1) for x in zip(*axes, strict=True)))
 
 
-def _responses(c: Controller, f: np.ndarray, plant: np.ndarray, whole: np.ndarray, logged: np.ndarray,
-            ) -> tuple[np.ndarray, np.ndarray]:
-    """The two responses of `Disturbed` of one axis, (bins,) each.
-
-    plant: command to rate; whole: measured rate to command; logged: measured rate to the command of the log, which the
-    model holds over a sample of the log.
-    """
-    sensitivity = 1.0 / (1.0 + plant * whole)
-    return sensitivity, -plant * logged_over_flown(c, f) * logged * sensitivity
+def _responses(c: Controller, f: np.ndarray, axis: AxisTransfers) -> tuple[np.ndarray, np.ndarray]:
+    """The two responses of `Disturbed` of one axis, (bins,) each."""
+    sensitivity = 1.0 / (1.0 + axis.plant * axis.controller)
+    return sensitivity, -axis.plant * logged_over_flown(c, f) * axis.logged * sensitivity
 
 
 def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
@@ -58,36 +63,37 @@ def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
     two samples is compared with a difference of the measured rate.
     """
     f = np.maximum(f, LOWEST_HZ)
-    over_hold = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / fixed_of(c, f).hold
+    over_hold = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / factors_of(c, f).hold
     return over_hold * np.cos(np.pi * f * PERIOD_S) / np.sinc(f * PERIOD_S)
 
 
-def _loop(c: Controller, plant: AxisPlant, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plant, whole controller and logged command of roll or pitch, as `_responses` takes them."""
-    to_rate, rate, angle, velocity, whole = loop_parts(c, plant, f)
-    return to_rate, whole, rate + kick_of(c, fixed_of(c, f)) * (angle + velocity)
+def _tilt(c: Controller, plant: AxisPlant, f: np.ndarray) -> AxisTransfers:
+    """The transfer functions of roll or pitch."""
+    parts = loop_parts(c, plant, f)
+    return AxisTransfers(parts.plant, parts.controller, parts.logged_controller(kick_of(c, factors_of(c, f))))
 
 
-def _yaw(c: Controller, row: PlantRow, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plant, whole controller and logged command of the firmware's yaw: rate within angle, whose derivative steps.
+def _yaw(c: Controller, row: PlantRow, f: np.ndarray) -> AxisTransfers:
+    """The transfer functions of the firmware's yaw: rate within angle. c: of the roll loop, whose filters it shares.
 
-    It steps when the estimator renews the angle.
-
-    c: of the roll loop, whose filters and periods it shares. A rotor's torque on yaw is its drag and what speeds it up.
+    The angle's derivative is that of a step, as the estimator renews the angle in steps. A rotor's torque on yaw is its
+    drag and what speeds it up.
     """
-    fixed = fixed_of(c, f)
-    s, loops, roll = fixed.s, row["firmware"]["loops"], axis_plant(row, "roll")
+    factors = factors_of(c, f)
+    s, loops, roll = factors.s, row["firmware"]["loops"], axis_plant(row, "roll")
     of_rate, of_angle = loops[settings.RATE_YAW], loops[settings.YAW]
     gain = float(of_rate["p"]) * DEGREES * float(row["rate_scale"]) * float(row["rate_gain"]) * newtons_per_command(row)
-    filtered = sensed_late(c, roll, f) / fixed.lowpass / fixed.chip
+    filtered = sensed_late(c, roll, f) / factors.lowpass / factors.chip
     rate = gain * (1.0 + float(of_rate["i"]) / float(of_rate["p"]) / s) * filtered
 
     def angle(differences: np.ndarray) -> np.ndarray:
+        """The path of the angle whose derivative makes these differences, 1/s."""
         steered = float(of_angle["p"]) + float(of_angle["i"]) / s + float(of_angle["d"]) * differences
-        return rate * steered * fixed.renewed / s
+        return rate * steered * factors.renewed / s
 
     speed = np.sqrt(float(row["mass"]) * float(row["gravity"]) / (4.0 * float(row["thrust_per_speed2"])))
     lever = float(row["yaw_torque_over_thrust"]) + s * float(row["rotor_inertia"]) / (
         2.0 * float(row["thrust_per_speed2"]) * speed)
     plant = plant_of(c, roll, f) * lever / arm_of(row, 0) * float(row["inertia"][0]) / float(row["inertia"][2])
-    return plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s), rate + angle(c.kicked * fixed.outer)
+    return AxisTransfers(plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s),
+                      rate + angle(c.kicked * factors.outer))

@@ -1,9 +1,12 @@
 """The torque-share decision: what part of the torque of logged commands turns the vehicle, with and without effects.
 
 A log at 100 Hz holds one command in five of a 500 Hz loop, so of the torque that the motors make of logged commands
-only a share, by frequency and axis, is in the rotation. For roll and pitch `axis_torque` has that share from the loop
-model, level and where a set-point stepped; `change_of` compares the shares with and without effects. Yaw has no model:
-its share is 1.
+only a share, by frequency and axis, is in the rotation:
+
+    q = (S_yu / S_uu) / (s P)      angular acceleration expected per logged command, over the torque per command
+
+For roll and pitch `axis_torque` has q from the loop model, level and where a set-point stepped; `change_of` compares
+the shares with and without effects. Yaw has no model: its share is 1.
 """
 
 from collections.abc import Sequence
@@ -12,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.loop.axis_plant import AxisPlant
+from airtouch.gap.loop.command_response import accelerations_per_command, unexplained_acceleration
 from airtouch.gap.loop.disturbed import logged_over_flown
 from airtouch.gap.loop.loop_model import AxisLoop, torque_per_command
-from airtouch.gap.loop.turning import NO_STEP, Step, step_under, turning_beside_command, turnings_per_command
+from airtouch.gap.loop.set_point_steps import NO_STEP, Step, step_under
 
 SMOOTH = 2.0  #: bins, standard deviation of the Gaussian over frequency: a block's Hann window and `response.SMOOTH`
 #: largest ratio that effects may make of a share; beyond, the loop model is not trusted; chosen
@@ -62,9 +66,9 @@ def axis_torque(loop: AxisLoop, nominal: AxisPlant, strengths: np.ndarray, nomin
     """
     motors = torque_per_command(loop.firmware, loop.plant, f)
     step = step_under(nominal_step, loop.controller, nominal, loop.plant)
-    level, stepped, stepped_as_nominal = turnings_per_command(
+    level, stepped, stepped_as_nominal = accelerations_per_command(
         loop.controller, loop.plant, strengths, f, SMOOTH, (NO_STEP, step, nominal_step))
-    unexplained = (turning_beside_command(loop.controller, loop.plant, strengths, f, SMOOTH) if loop.by_firmware
+    unexplained = (unexplained_acceleration(loop.controller, loop.plant, strengths, f, SMOOTH) if loop.by_firmware
                    else np.ones(len(f)))
     return AxisTorque(motors, np.stack([level, stepped, stepped_as_nominal]) / motors, unexplained)
 

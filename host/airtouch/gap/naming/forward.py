@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import TEMPERATURE, Hypothesis, Judged
+from airtouch.gap.naming.selection import TEMPERATURE, Candidate
 from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.naming.thresholds import needed_beside, random_by_misfit
 from airtouch.gap.signatures.candidates import is_random
+from airtouch.gap.signatures.term import Terms
 
 MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
 MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`_worth_adding`); chosen
@@ -26,8 +27,8 @@ class Search:
     """
 
     on: Trial
-    candidates: Mapping[str, Sequence[Hypothesis]]
-    alone: Mapping[str, Judged]
+    candidates: Mapping[str, Sequence[Terms]]
+    alone: Mapping[str, Candidate]
     least: Mapping[str, float]
     progress: Callable[[str], None]
 
@@ -41,10 +42,10 @@ class State:
     effect was named; least: nats that each must gain as the first effect.
     """
 
-    steps: tuple[Judged, ...]
-    tried: Mapping[str, Judged]
+    steps: tuple[Candidate, ...]
+    tried: Mapping[str, Candidate]
     need: Mapping[str, float]
-    singles: Mapping[str, Judged]
+    singles: Mapping[str, Candidate]
     least: Mapping[str, float]
 
     @property
@@ -63,7 +64,7 @@ class State:
         return len(self.steps) - len(self.named)
 
 
-def forward(search: Search, passing: Judged | None) -> State:
+def forward(search: Search, passing: Candidate | None) -> State:
     """Effects added one by one, after one that comes and goes where there is such; with what each adds to the others.
 
     passing: the effect that comes and goes.
@@ -77,7 +78,7 @@ def forward(search: Search, passing: Judged | None) -> State:
     return replace(state, steps=tuple(with_shares(search.on, state.steps)))
 
 
-def _begun(search: Search, passing: Judged | None) -> State:
+def _begun(search: Search, passing: Candidate | None) -> State:
     """The state before the first effect is added, with an effect that comes and goes as a step already."""
     if passing is None:
         return State((), search.alone, search.least, search.alone, search.least)
@@ -86,7 +87,7 @@ def _begun(search: Search, passing: Judged | None) -> State:
     return State((passing,), tried, need, singles, {**search.least, passing.name: LEAST_GAIN})
 
 
-def _worth_adding(state: State) -> dict[str, Judged]:
+def _worth_adding(state: State) -> dict[str, Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
     enough = {n: j for n, j in state.tried.items() if j.gain - state.gain >= state.need[n]}
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
@@ -94,7 +95,7 @@ def _worth_adding(state: State) -> dict[str, Judged]:
     return enough
 
 
-def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
+def _best_of(judged: Mapping[str, Candidate]) -> Candidate | None:
     """The best of those that were fitted, and not only looked at; None where there is none.
 
     Likelihoods of real flights are too sure of themselves (TEMPERATURE): of two that gain nearly as much, that whose
@@ -104,7 +105,7 @@ def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
                key=lambda j: j.gain / TEMPERATURE + min(j.evidence, CERTAIN))
 
 
-def _added(search: Search, state: State, best: Judged) -> State:
+def _added(search: Search, state: State, best: Candidate) -> State:
     """The state with a further step: named, or a deviation where its evidence or its gain is too small for a name."""
     singles = state.singles
     if not state.named:  # what nominal flights have as well stands beside every candidate
@@ -120,8 +121,8 @@ def _added(search: Search, state: State, best: Judged) -> State:
     return replace(after, tried=tried, need=need)
 
 
-def _beside(search: Search, steps: Sequence[Judged], before: Mapping[str, Judged],
-            ) -> tuple[dict[str, Judged], dict[str, float]]:
+def _beside(search: Search, steps: Sequence[Candidate], before: Mapping[str, Candidate],
+            ) -> tuple[dict[str, Candidate], dict[str, float]]:
     """Candidates judged beside the steps so far, and the nats that each must gain.
 
     before: as judged before the newest step, with their gain over the steps then. Beside a deviation of nominal flights

@@ -10,14 +10,13 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import Fit, cell_gains, fit, judge
-from airtouch.gap.evidence.problem import Part
-from airtouch.gap.naming.screen import Screen
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
@@ -28,7 +27,6 @@ LEAST_GAIN = 12.0
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
 STRETCHED = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
-ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 
 
 @dataclass(frozen=True)
@@ -36,22 +34,21 @@ class Trial:
     """What hypotheses are judged on.
 
     parts: the two halves of the flights; base: log likelihood (2, 2) of no effect, as sure of the commands' floor as
-    without and with random effects, on each half; screen: what the first look has made so far.
+    without and with random effects, on each half.
     """
 
     data: Data
-    parts: tuple[Part, Part]
+    parts: tuple[BlockSet, BlockSet]
     base: Sequence[Sequence[float]]
-    screen: Screen
 
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
     parts = halves(data)
-    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)], Screen(data))
+    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)])
 
 
-def halves(data: Data) -> tuple[Part, Part]:
+def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     first, second = [], []
     numbers = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
@@ -64,7 +61,7 @@ def halves(data: Data) -> tuple[Part, Part]:
             even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
             first.append((i, regime, even))
             second.append((i, regime, ~even))
-    return Part(tuple(first)), Part(tuple(second))
+    return BlockSet(tuple(first)), BlockSet(tuple(second))
 
 
 def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
@@ -75,36 +72,37 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
 
 def price_of(terms: Sequence[Term]) -> float:
     """Held-out nats that parameters beyond an effect's first must earn."""
-    return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
+    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
+def cross_validated(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
-    name, terms: the effect, and its variant; choice: nats that the choice among its variants costs. Its gain is that of
-    all effects over none, less what their parameters and the choice of their variants cost. Effects that are seen in
-    the commands alone gain less beside the first random one; it is not charged with that (`_gained_while_certain`).
+    name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs. Its gain is
+    that of all effects over none, less what their parameters and the choice of their variants cost. Effects that are
+    seen in the commands alone gain less beside the first random one; it is not charged with that
+    (`_lost_to_uncertainty`).
     """
-    held = chosen.terms if chosen else ()
-    paid = choice + (chosen.choice if chosen else 0.0)
-    beyond = (chosen.beyond if chosen else 0.0) + _gained_while_certain(on, terms, chosen)
-    if chosen and all(t.kind == CLOCK for t in terms):  # nothing changes in the spectra
+    before = chosen.terms if chosen else ()
+    paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
+    certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(on, terms, chosen)
+    if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
-        spectral = [t for t in (*held, *terms) if t.kind != CLOCK]
+        spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(on, half, spectral, chosen) for half in (0, 1))
-        gain = clock_gains(on.data, held)
+        gain = clock_gains(on.data, before)
         for train, test in ROUND_TRIP:
             gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
-        gain += beyond - price_of(fits[-1].terms) - paid
-    of_clock = [clock_gain(on.data, t)[0] for t in (*held, *terms) if t.kind == CLOCK]
+        gain += certain - price_of(fits[-1].terms) - paid
+    of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Judged(name, fitted, gain + clock_gains(on.data, terms), fits, choice=paid, strength=strength,
-                  covariance=covariance, apart=apart, beyond=beyond)
+    return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice_cost=paid, strength=strength,
+                     covariance=covariance, apart=apart, gained_while_certain=certain)
 
 
-def _gained_while_certain(on: Trial, terms: Hypothesis, chosen: Judged | None) -> float:
+def _lost_to_uncertainty(on: Trial, terms: Terms, chosen: Candidate | None) -> float:
     """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
 
     Beside a random effect the commands' floor is less certain.
@@ -115,8 +113,8 @@ def _gained_while_certain(on: Trial, terms: Hypothesis, chosen: Judged | None) -
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Judged | None) -> Fit:
-    """Effects fitted on a half, from where those that are chosen were found there."""
+def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None) -> FittedTerms:
+    """Effects fitted on a half, from where those that are chosen ended there."""
     part = on.parts[half]
     return _refined(on.data, part, fit(on.data, part, terms, _start(chosen, terms, half)))
 
@@ -129,30 +127,32 @@ def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> 
     return judge(on.data, on.parts[half], terms, wide) - on.base[wide or bool(random_of(terms))][half]
 
 
-def held_out_cell_gains(on: Trial, hypothesis: Judged) -> np.ndarray:
-    """Nats (GROUPS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
+def held_out_cell_gains(on: Trial, hypothesis: Candidate) -> np.ndarray:
+    """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(on.data, on.parts[test], hypothesis.fits[train].terms) for train, test in ROUND_TRIP],
                   axis=0)
 
 
-def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],
+                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Strength, covariance and difference between the halves of the scaled parameters of one term of a hypothesis.
 
     strength (k,): the mean of both halves; covariance (k, k): 0 but for mean effects; difference (k,): half of what the
     halves differ by. k: of all parameters that the effect may have free; those that this variant leaves alone are 0,
     and nobody knows how far they lie from it. fitted: the hypothesis' terms; fits: those of its spectra on each half.
     """
-    hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
+    hypotheses = [fitted] if term.shows_in == CLOCK or not fits else [f.terms for f in fits]
+    own = term.identity, term.shows_in
+    same = [next(t for t in terms if (t.identity, t.shows_in) == own) for terms in hypotheses]
     k = len(term.free)
     each = np.array([t.scaled(t.values)[:k] for t in same])
     strength = term.among_all(each.mean(axis=0))
-    if term.kind != MEAN:
+    if term.shows_in != MEAN:
         return strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength))
     covariance = np.zeros((k, k))
     for f, t in zip(fits, same, strict=True):
-        place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
-        covariance += f.covariance[place:place + k, place:place + k] / len(fits) ** 2
+        first = f.place(t).start
+        covariance += f.covariance[first:first + k, first:first + k] / len(fits) ** 2
     return strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1]))
 
 
@@ -168,23 +168,18 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
     return out
 
 
-def _kind_of(term: Term) -> tuple:
-    """What tells a term from others of a hypothesis."""
-    return term.name, term.kind, term.values.get("rotor")
-
-
-def _refined(data: Data, part: Part, found: Fit) -> Fit:
+def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
     """A fit with the parameters free too that only a fit close to the truth can find."""
-    terms = [t.refined() for t in found.terms]
-    if all(a.free == b.free for a, b in zip(terms, found.terms, strict=True)):
-        return found
-    return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
+    terms = [t.refined() for t in fitted.terms]
+    if all(a.free == b.free for a, b in zip(terms, fitted.terms, strict=True)):
+        return fitted
+    return fit(data, part, terms, mean_parameters(terms))
 
 
-def _start(chosen: Judged | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
-    """The scaled parameters (k,) found on a half before, NaN for those of the new effects; None where none were."""
+def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+    """The scaled parameters (k,) fitted to a half before, NaN for those of the new effects; None where none are."""
     if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[half].scaled
-    size = sum(len(t.free) for t in terms if t.kind == MEAN)
+    size = sum(len(t.free) for t in terms if t.shows_in == MEAN)
     return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -6,25 +6,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.fit import left_over
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
-from airtouch.gap.naming.screen import first_order, random_look
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Term, Terms
 
 HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer in this view; chosen
 
 
-class Variant(NamedTuple):
-    """A variant of an effect; choice: nats that the choice among the effect's variants costs."""
+class PricedVariant(NamedTuple):
+    """A variant of an effect; choice_cost: nats that the choice among the effect's variants costs."""
 
     name: str
-    terms: Hypothesis
-    choice: float
+    terms: Terms
+    choice_cost: float
 
 
 class RandomLook(NamedTuple):
@@ -32,21 +30,16 @@ class RandomLook(NamedTuple):
 
     gain: float
     strength: np.ndarray
-    variant: Variant
+    variant: PricedVariant
 
 
 @dataclass(frozen=True)
-class Start:
-    """What a round begins from: the hypothesis that is chosen, and what it leaves of each half.
-
-    residuals: flattened values (n,) of each half that the hypothesis, fitted on the other half, leaves; extra_power
-    (n,): what it adds to their expected power.
-    """
+class RoundStart:
+    """What a round begins from: the hypothesis that is chosen, and what it leaves of each half."""
 
     on: Trial
-    chosen: Judged | None
-    residuals: Sequence[np.ndarray]
-    extra_power: Sequence[np.ndarray]
+    chosen: Candidate | None
+    halves: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
@@ -54,8 +47,8 @@ class Start:
         return self.chosen.gain if self.chosen else 0.0
 
     @property
-    def held(self) -> Hypothesis:
-        """Its terms."""
+    def terms(self) -> Terms:
+        """The terms of the hypothesis that is chosen."""
         return self.chosen.terms if self.chosen else ()
 
 
@@ -67,51 +60,46 @@ class Looks:
     `random_looks` looks; unseen: those that only a fit can judge.
     """
 
-    means: list[Judged] = field(default_factory=list)
-    random: list[Variant] = field(default_factory=list)
-    unseen: list[Variant] = field(default_factory=list)
+    means: list[Candidate] = field(default_factory=list)
+    random: list[PricedVariant] = field(default_factory=list)
+    unseen: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(on: Trial, chosen: Judged | None) -> Start:
+def start_of(on: Trial, chosen: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
-    residuals, extra_power = [], []
-    for half, part in enumerate(on.parts):
-        fitted = chosen.fits[1 - half].terms if chosen and chosen.fits else ()
-        problem, values, power = left_over(on.data, part, fitted)
-        residuals.append(values)
-        extra_power.append(power - problem.power)
-    return Start(on, chosen, residuals, extra_power)
+    fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    return RoundStart(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
 
 
-def first_looks(start: Start, candidates: Mapping[str, Sequence[Hypothesis]], progress: Callable[[str], None]) -> Looks:
+def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
     """A first look at every variant that may be added. progress: is told the name of every candidate."""
     looks = Looks()
     for name, variants in candidates.items():
         progress(name)
-        for variant in addable(name, variants, start.held):
+        for variant in addable(name, variants, start.terms):
             _look_at(start, variant, looks)
     return looks
 
 
-def addable(name: str, variants: Sequence[Hypothesis], held: Hypothesis) -> list[Variant]:
-    """The variants of an effect that may stand beside those that are held.
+def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
+    """The variants of an effect that may stand beside those that are chosen.
 
-    Not those of which a part is held already, of another rotor but for this one; none where another name for the same
-    thing is held. Each costs log n for the choice among the n variants with as many terms: else many would beat one.
+    Not those of which a part is chosen already, of another rotor but for this one; none where another name for the same
+    thing is chosen. Each costs log n for the choice among the n variants with as many terms: else many would beat one.
     """
-    own = [t for t in held if not t.companion]
+    own = [t for t in chosen if not t.companion]
     if any(t.name != name and interchangeable(name, t.name) for t in own):
         return []
-    there = {(t.name, t.values.get("rotor")) for t in own}
-    return [Variant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
-            if not any((t.name, t.values.get("rotor")) in there for t in terms)]
+    there = {t.identity for t in own}
+    return [PricedVariant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
+            if not any(t.identity in there for t in terms)]
 
 
-def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
+def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
     """Add a variant to the looks, where a look can judge it with what that says."""
     if random_of(variant.terms):
         looks.random.append(variant)
-    elif any(t.kind != MEAN or t.name in COMMAND_ONLY for t in variant.terms):
+    elif any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         looks.unseen.append(variant)
     else:
         look = _mean_look(start, variant)
@@ -121,16 +109,15 @@ def _look_at(start: Start, variant: Variant, looks: Looks) -> None:
             looks.means.append(look)
 
 
-def _mean_look(start: Start, variant: Variant) -> Judged:
+def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
-    on, terms = start.on, variant.terms
-    gain, fitted, variances = first_order(on.screen, on.parts, start.residuals, start.extra_power, terms, start.held)
-    gain += start.gain - price_of(terms) - variant.choice
-    own, k = terms[0], len(terms[0].free)
-    halves = np.array(fitted)[:, :k]
-    return Judged(variant.name, (*start.held, *terms), gain, full=False, choice=variant.choice,
-                  strength=own.among_all(halves.mean(axis=0)),
-                  covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, variances, k))))
+    terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
+    look = first_order(start.on.data, start.halves, terms, start.terms)
+    gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
+    halves = np.array(look.fitted)[:, :k]
+    return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
+                     strength=own.among_all(halves.mean(axis=0)),
+                     covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
 
 
 def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
@@ -138,22 +125,22 @@ def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: in
     return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
 
 
-def _only_in_commands(on: Trial, terms: Hypothesis) -> bool:
+def _only_in_commands(on: Trial, terms: Terms) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
     law = on.data.study.controller
     moved = [t.active(np.ones(len(t.free))) for t in terms]
-    return law is not None and not any(on.screen.shows(t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
+    return law is not None and not any(shows(on.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
-def random_looks(start: Start, variants: Sequence[Variant], means: Sequence[Judged], thorough: bool,
-                 ) -> tuple[list[Judged], list[Variant]]:
+def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
+                 ) -> tuple[list[Candidate], list[PricedVariant]]:
     """Looks at variants with a random effect: candidates that promise little, and the variants to fit of the others.
 
     Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that looks best is
     fitted, with the longer ones that begin with the same term. means: looks at mean effects, best first; a candidate
     that is among them says by that how little it promises.
     """
-    mean_of = {j.name: j for j in reversed(means) if len(j.terms) == len(start.held) + 1}
+    mean_of = {j.name: j for j in reversed(means) if len(j.terms) == len(start.terms) + 1}
     unpromising, to_fit = [], []
     for name, looks in _by_name(start, variants, mean_of).items():
         best = max(looks, key=lambda look: look.gain)
@@ -165,33 +152,34 @@ def random_looks(start: Start, variants: Sequence[Variant], means: Sequence[Judg
     return unpromising, to_fit
 
 
-def _by_name(start: Start, variants: Iterable[Variant], mean_of: Mapping[str, Judged]) -> dict[str, list[RandomLook]]:
+def _by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
+             ) -> dict[str, list[RandomLook]]:
     """Looks at the variants of every candidate whose random part stands alone or beside one mean term.
 
     Where that mean effect was looked at, only beside its best variant.
     """
-    on, looks = start.on, {}
+    looks: dict[str, list[RandomLook]] = {}
     for variant in variants:
-        name, terms, choice = variant
+        name, terms, cost = variant
         if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
             continue
-        if len(terms) == 1 or terms[0].kind == MEAN:
-            gain, strength = random_look(on.screen, on.parts, start.residuals, start.extra_power, random_of(terms)[0])
-            looks.setdefault(name, []).append(RandomLook(gain - choice, strength, variant))
+        if len(terms) == 1 or terms[0].shows_in == MEAN:
+            gain, strength = random_look(start.halves, random_of(terms)[0])
+            looks.setdefault(name, []).append(RandomLook(gain - cost, strength, variant))
     return looks
 
 
-def _longer(variant: Variant, variants: Iterable[Variant]) -> list[Variant]:
+def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[PricedVariant]:
     """The variants of the same effect that have more terms and begin with the same one."""
     return [v for v in variants if v.name == variant.name and len(v.terms) > len(variant.terms)
             and _same(v.terms[0], variant.terms[0])]
 
 
-def _as_judged(start: Start, look: RandomLook) -> Judged:
+def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
-    name, terms, choice = look.variant
-    return Judged(name, (*start.held, *terms), start.gain + min(look.gain, 0.0), full=False, choice=choice,
-                  strength=strength_term(terms).among_all(look.strength))
+    name, terms, cost = look.variant
+    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice_cost=cost,
+                     strength=strength_term(terms).among_all(look.strength))
 
 
 def _same(one: Term, other: Term) -> bool:

@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
-from airtouch.gap.naming.selection import Judged
-from airtouch.gap.passing.gates import TOLD, Gated, gated
-from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
+from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.unnamed.generic import height_gain
 
 
-def passing_effect(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float], without: Sequence[str],
-                   ) -> Judged | None:
+def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
+                   ) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
     It must gain LEAST_GAIN more than every effect that always acts and has its evidence, and than what follows the
@@ -25,25 +24,25 @@ def passing_effect(on: Trial, singles: Mapping[str, Judged], least: Mapping[str,
     if on.data.study.scatter is None:
         return None
     steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
-    passing = [g for g in gated(on.data, without).values()
+    passing = [g for g in gated_effects(on.data, without).values()
                if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
-    overhead = [g for g in passing if g.key == TOLD]
+    overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
     return _as_judged(on, max(overhead or passing, key=lambda g: g.gain))
 
 
-def _as_judged(on: Trial, effect: Gated) -> Judged:
+def _as_judged(on: Trial, effect: GatedEffect) -> Candidate:
     """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
-    return Judged(effect.name, terms, gain, (effect.fitted, effect.fitted), choice=effect.cost,
-                  strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
-                  key=effect.key)
+    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
+                     strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
+                     key=effect.key)
 
 
-def as_in_nominal_flights(data: Data, passing: Judged, steps: Sequence[Judged]) -> bool:
-    """Whether an effect that comes and goes adds no more to the effects found after it than in nominal flights."""
+def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:
+    """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
                and news(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
 
@@ -51,12 +50,7 @@ def as_in_nominal_flights(data: Data, passing: Judged, steps: Sequence[Judged]) 
 def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     """Evidence, nats, for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights have as much.
 
-    key: `Gated.key`; gain: nats; strength (k,): of its parameters, in natural steps.
+    key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / seconds(data), strength)))
-
-
-def seconds(data: Data) -> float:
-    """How long the flights last together, s."""
-    return sum(len(f) for f in data.flights) * PERIOD_S
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / data.seconds, strength)))

@@ -6,9 +6,8 @@ Between two days the gains of a loop differ a little, and nominal flights meet g
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.naming.selection import Selection
-from airtouch.gap.passing.gates import TOLD
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import MEAN
 
 #: share of the gap that the effect named must close: as much as the loop model may be wrong by, `problem.DOUBT`; chosen
@@ -25,7 +24,7 @@ def must_close_the_gap(data: Data, selection: Selection) -> bool:
     """
     if not data.study.recorded:
         return False
-    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != TOLD)
+    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != KNOWN_OVERHEAD)
 
 
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
@@ -39,7 +38,7 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
 
 def without_names(selection: Selection) -> Selection:
     """The same flights with no effect named; what a model without names gains is that of none."""
-    return replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+    return replace(selection, steps=(), nameless_beside=selection.nameless_alone, assumed=False)
 
 
 def comes_and_goes(selection: Selection) -> bool:
@@ -53,5 +52,5 @@ def changes_the_loop(data: Data, selection: Selection) -> bool:
     law, chosen = data.study.controller, selection.chosen
     if law is None or chosen is None or len(selection.named) != 1:
         return False
-    terms = [t for t in chosen.terms if t.kind == MEAN and not t.gate]
-    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
+    terms = [t for t in chosen.terms if t.shows_in == MEAN and not t.gate]
+    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.signature.loop_only for t in terms))

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
+from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.inference import Inference, infer
-from airtouch.gap.signatures.random_draws import SHAPED
+from airtouch.gap.signatures.term import Terms
 
 
 def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
@@ -28,13 +28,13 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(known))
 
 
-def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Mapping[str, Judged],
+def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
     candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
     """
-    steps: list[Judged] = []
+    steps: list[Candidate] = []
     for effect in dict.fromkeys(of.effect for of in inference.classes):
         own = [of for of in inference.classes if of.effect == effect]
         variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
@@ -55,11 +55,11 @@ def signs_not_shown(selection: Selection) -> list[str]:
             for name in selection.inference.without_sign if name in names]
 
 
-def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:
+def matching(of: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
     alone = of.name.partition(" ")[2]
     if alone:
         return [v for v in variants if v[0].free == (alone,)]
     if of.shape is None:
         return list(variants)
-    return [v for v in variants if v[0].values[SHAPED[of.name]] == of.shape]
+    return [v for v in variants if v[0].values[v[0].signature.class_by] == of.shape]

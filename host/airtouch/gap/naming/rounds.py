@@ -8,21 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, crossed
-from airtouch.gap.naming.looks import Variant, first_looks, random_looks, start_of
-from airtouch.gap.naming.selection import Hypothesis, Judged
+from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, cross_validated
+from airtouch.gap.naming.looks import PricedVariant, first_looks, random_looks, start_of
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import strength_term
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
+from airtouch.gap.signatures.term import Terms
 
 FULL = 5  #: candidates that are fitted in full, after a first look at all; chosen for time
 PROMISING = 0.5  #: of FIRST_GAIN, that one of these must gain at a first look; chosen for time
 
 
-def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
+def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,
              progress: Callable[[str], None] = lambda _: None, thorough: bool = False,
-             promising: Container[str] = ()) -> dict[str, Judged]:
+             promising: Container[str] = ()) -> dict[str, Candidate]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
 
     candidates: variants by name; progress: is told every name. thorough: random effects in full, however little they
@@ -34,23 +35,25 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     means = _best_variants(looks.means)
     unpromising, random = random_looks(start, looks.random, means, thorough)
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
-    waiting = [*looks.unseen, *random, *(Variant(j.name, j.terms[len(start.held):], j.choice) for j in to_fit)]
-    fitted = shared(lambda v: crossed(on, v.name, v.terms, chosen, v.choice), waiting)
-    best = _best_of_each([*fitted, *looked_at], len(start.held))
+    means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
+    waiting = [*looks.unseen, *random, *means_to_fit]
+    fitted = shared(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
+    best = _best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, start.gain)
 
 
-def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
+def _best_variants(looked: Sequence[Candidate]) -> list[Candidate]:
     """The best of each candidate's variants of one length, best first."""
-    best: dict[tuple[str, int], Judged] = {}
+    best: dict[tuple[str, int], Candidate] = {}
     for j in sorted(looked, key=lambda j: -j.gain):
         best.setdefault((j.name, len(j.terms)), j)
     return list(best.values())
 
 
-def _split(looked: Sequence[Judged], gain: float, promising: Container[str]) -> tuple[list[Judged], list[Judged]]:
+def _split(looked: Sequence[Candidate], gain: float, promising: Container[str],
+           ) -> tuple[list[Candidate], list[Candidate]]:
     """Looks, the best of mean effects first, that a fit is worth, and the others.
 
     gain: nats of what is chosen, over which a look must gain to be among the FULL best; promising: names that need not.
@@ -60,13 +63,13 @@ def _split(looked: Sequence[Judged], gain: float, promising: Container[str]) -> 
     return [j for j, fit in pairs if fit], [j for j, fit in pairs if not fit]
 
 
-def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
+def _best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
     """The best hypothesis of each candidate, on top of so many terms that were there before.
 
     One with a random part or a companion must earn it, LEAST_GAIN; where its companion alone gains as much, it is that
     which gains.
     """
-    best: dict[str, Judged] = {}
+    best: dict[str, Candidate] = {}
     for j in judged:
         old = best.get(j.name)
         need = LEAST_GAIN if old is not None and len(j.terms) > len(old.terms) else 0.0
@@ -74,12 +77,12 @@ def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
             best[j.name] = j
     for name, other in COMPANIONS.items():
         both, alone = best.get(name), best.get(other)
-        if both and alone and len(both.terms) > held + 1 and both.gain < alone.gain + LEAST_GAIN:
+        if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))
     return best
 
 
-def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
+def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
     """A candidate whose parameters (k,) were all tried alone, with the strength that each has there."""
     alone = {int(np.argmin(j.variance)): j for j in variants if np.isfinite(j.variance).sum() == 1}
     together = next((j for j in variants if np.isfinite(j.variance).all()), best)
@@ -89,7 +92,7 @@ def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
                    covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]), apart=0.0)
 
 
-def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
+def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], before: float) -> dict[str, Candidate]:
     """Every candidate with its evidence: what it gains over `before`, nats, and no more than its strength says.
 
     None where the strength is the largest that can be: there the effect stands in for another. scatter: of strengths in
@@ -99,7 +102,7 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: 
     for n, j in best.items():
         mine = [t for t in j.terms if t.name == n]
         own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
-        stretched = own.kind == MEAN and at_bound(own, j.strength).any()
+        stretched = own.shows_in == MEAN and at_bound(own, j.strength).any()
         rarity = scatter.evidence(n, j.strength, j.covariance, j.apart) if scatter else np.inf
         out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else rarity))
     return out

@@ -15,14 +15,15 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.contradiction import contradicted
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
-from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, seconds
+from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import UNKNOWN_GAIN, Hypothesis, Judged, Selection
+from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import OVERHEAD, SHAKES
+from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
+from airtouch.gap.signatures.term import Terms
 from airtouch.gap.unnamed.generic import generic_gain
 from airtouch.simulation import effects
 
@@ -33,7 +34,7 @@ WAKE_SHARE = 0.05
 NAMES = frozenset(effects.NAMES)  #: of the package's effects; the others are a user's own
 
 
-def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
+def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
     """Judge every candidate, then name effects.
 
@@ -70,12 +71,12 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
         return answer
     state = forward(search, passing)
     first = next(iter(state.named), "")
-    if first not in (*SHAKES, inference.likeliest):
+    if first not in (*ALWAYS_RANDOM, inference.likeliest):
         return answer
     return _by_replay(search, state, passing)
 
 
-def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
+def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
 
     A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
@@ -84,10 +85,10 @@ def replay_may_name(passing: Judged | None, inference: Inference) -> bool:
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True
     most = inference.evidence.get(inference.likeliest, 0.0)
-    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in SHAKES)
+    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in ALWAYS_RANDOM)
 
 
-def _by_replay(search: Search, state: State, passing: Judged | None) -> Selection:
+def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:
     """The selection that a forward search ended in, with what it leaves.
 
     passing: the effect that comes and goes of its first step; it is taken back where beside the others it is no more
@@ -103,18 +104,17 @@ def _by_replay(search: Search, state: State, passing: Judged | None) -> Selectio
         state.singles, state.steps, before, after, on.parts, state.least, study.nominal,
         assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
         nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
-        of_times=clock_left(on.data, [t.name for t in last]))
+        left_of_times=clock_left(on.data, last))
     return replace(selection, contradicted=contradicted(on, selection.chosen)) if study.simulated else selection
 
 
-def nameless(on: Trial, chosen: Judged | None) -> float:
+def nameless(on: Trial, chosen: Candidate | None) -> float:
     """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    named = [t.name for t in chosen.terms] if chosen else ()
-    return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, named)
+    return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())
 
 
 def _nominal_gain(data: Data) -> float:
     """Nats that a model without names gains in nominal flights as long as these."""
     scatter = data.study.scatter
-    return scatter.allowed(seconds(data), UNKNOWN_GAIN) if scatter else 0.0
+    return scatter.allowed(data.seconds, UNKNOWN_GAIN) if scatter else 0.0

@@ -1,15 +1,15 @@
-"""What a selection of effects found: hypotheses judged, the steps, and the probability of each candidate."""
+"""The result of a selection of effects: candidates judged, the steps, and what speaks against the effects named."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.evidence.fit import Fit
-from airtouch.gap.evidence.problem import Part
+from airtouch.gap.evidence.fit import FittedTerms
+from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.signatures.term import Terms
 
 #: nats that a nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
 #: floor, and where none did; both chosen (host/docs/gap.md, "What `unknown` means")
@@ -19,14 +19,10 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
 SAME_MODELS = 0.5  #: of these in flights of this project's simulator: twice what right names left there, 78 flights
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves; chosen
-BEHIND = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
-#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as BEHIND
-BELOW = 0.9
-Hypothesis = tuple[Term, ...]  #: terms that act together
 
 
 @dataclass(frozen=True)
-class Judged:
+class Candidate:
     """A hypothesis with its gain over no effect, held-out nats, and its fits of both halves.
 
     name: its newest effect; terms: all of them, with their values. strength: scaled parameters (k,) of the newest
@@ -37,19 +33,19 @@ class Judged:
     """
 
     name: str
-    terms: Hypothesis
+    terms: Terms
     gain: float
-    fits: tuple[Fit, ...] = ()
+    fits: tuple[FittedTerms, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
-    choice: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
+    choice_cost: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
     #: nats of the gain that effects before the first random one gained while the commands' floor was more certain
-    beyond: float = 0.0
+    gained_while_certain: float = 0.0
     strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     apart: np.ndarray | float = 0.0
     evidence: float = 0.0
     named: bool = True
-    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is held against
+    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is compared with
     share: float = np.inf  #: where several effects are named: nats over the hypothesis of the others alone
 
     @property
@@ -63,47 +59,51 @@ class Judged:
     @property
     def of_the_log(self) -> bool:
         """Whether the newest effect is one that the log has done to itself."""
-        return any(t.name == self.name and t.kind == CLOCK for t in self.terms)
+        return any(t.name == self.name and t.shows_in == CLOCK for t in self.terms)
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What a selection of effects found; gains are in held-out nats.
+    """The result of a selection of effects; gains are in held-out nats.
 
-    singles: the best variant of every candidate; steps: effects added one after another. free_before, free_after: gain
-    of the nameless model over no effect and over the last step; of_times: of the latter, what the logged times hold;
-    contradicted: what the effects named lose in cells where they say what the flights do not show, and the worst of
-    these cells. parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
-    assumed: whether a chosen effect is random, or changes the loop in recorded flights.
+    singles: the best variant of every candidate; steps: effects added one after another. nameless_alone,
+    nameless_beside: gain of a model without names over no effect and over the last step; left_of_times: of the latter,
+    what the logged times hold; contradicted: what the effects named lose in cells where they say what the flights do
+    not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: evidence
+    that each candidate needs as the first; inference: what named the effects, where the relations of signals did.
+
+    Of the study: nominal: how many flights gave the floor; nominal_gain: what a model without names gains in nominal
+    flights as long as these; assumed: whether a chosen effect is random, or changes the loop in recorded flights;
+    simulated, same_models: as the study has them.
     """
 
-    singles: Mapping[str, Judged]
-    steps: tuple[Judged, ...]
-    free_before: float
-    free_after: float
-    parts: tuple[Part, Part]
-    least: Mapping[str, float]  #: evidence that each candidate needs as the first
+    singles: Mapping[str, Candidate]
+    steps: tuple[Candidate, ...]
+    nameless_alone: float
+    nameless_beside: float
+    parts: tuple[BlockSet, BlockSet]
+    least: Mapping[str, float]
     nominal: int
     assumed: bool
-    nominal_gain: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+    nominal_gain: float
     simulated: bool = False
-    same_models: bool = False  #: whether the flights come from the models that effects are fitted with
-    of_times: float = 0.0
+    same_models: bool = False
+    left_of_times: float = 0.0
     contradicted: tuple[float, str] = (0.0, "")
-    inference: Inference | None = None  #: what named the effects, where the relations of signals did
+    inference: Inference | None = None
 
     @property
-    def whole(self) -> Judged | None:
+    def whole(self) -> Candidate | None:
         """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
         return self.steps[-1] if self.steps else None
 
     @property
-    def named(self) -> tuple[Judged, ...]:
+    def named(self) -> tuple[Candidate, ...]:
         """The steps whose effects are named, what adds most to the others first, what the log did to itself last."""
         return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
 
     @property
-    def chosen(self) -> Judged | None:
+    def chosen(self) -> Candidate | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
         names, whole = {s.name for s in self.named}, self.whole
         if not names or whole is None:
@@ -114,7 +114,7 @@ class Selection:
         fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
         return replace(whole, terms=tuple(terms), fits=tuple(fits))
 
-    def gained(self, one: Judged) -> float:
+    def gained(self, one: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
         return float(self.inference.evidence[one.name] if self.inference is not None else one.gain)
 
@@ -127,7 +127,7 @@ class Selection:
         if self.inference is not None:
             return self.inference.limit
         if self.nominal < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.nominal_gain)
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless_alone, self.nominal_gain)
         gained = self.whole.gain if self.whole else 0.0
         share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.same_models else 1.0)
         return max(self.least_left, share * gained, 0.0 if self.simulated else self.nominal_gain)
@@ -140,7 +140,7 @@ class Selection:
     @property
     def unlike(self) -> float:
         """How much speaks against the effects named, of what may: what is left, or what they lose; 1 is the limit."""
-        return max(float(np.logaddexp(self.free_after, 0.0)) / self.allowed, self.loss)
+        return max(float(np.logaddexp(self.nameless_beside, 0.0)) / self.allowed, self.loss)
 
     @property
     def loss(self) -> float:
@@ -151,67 +151,3 @@ class Selection:
     def explained(self) -> bool:
         """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
         return self.unlike < 1.0
-
-
-def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
-    """Of every single candidate, `none` and `unknown`; they sum to 1.
-
-    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
-
-    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
-    effect or `none` is the answer it stays below that.
-    """
-    names = list(selection.singles)
-    weight = _weights(selection, names)
-    share = weight / weight.sum()
-    odds = selection.unlike ** 2
-    unknown = odds / (1.0 + odds)
-    if selection.chosen is not None and selection.explained:
-        unknown = _below(unknown, share[names.index(selection.named[0].name)])
-    if at_floor:
-        unknown = _below(unknown, share[-1])
-    known = (1.0 - unknown) * weight / weight.sum()
-    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
-
-
-def _below(unknown: float, share: float) -> float:
-    """Probability of `unknown`, BELOW that of an answer at most, which has this share of all others."""
-    return min(unknown, BELOW * share / (1.0 + BELOW * share))
-
-
-def _weights(selection: Selection, names: Sequence[str]) -> np.ndarray:
-    """Weight (k + 1,) of each of k candidates, and of `none`, beside one another."""
-    if selection.inference is not None:
-        alone = selection.inference.probabilities()
-        return np.array([alone[n] for n in (*names, "none")])
-    score = np.array([*_scores(selection, names), 0.0])
-    return np.exp((score - score.max()) / TEMPERATURE)
-
-
-def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
-    """Score of every single candidate beside 0 for `none`, nats; those that could be named keep the order of gains.
-
-    The first effect named leads them by BEHIND at least.
-    """
-    singles = selection.singles
-    out = [_against_none(singles[n].evidence, selection.least[n], len(names)) for n in names]
-    if not selection.named or selection.named[0].name not in names:
-        return out
-    first = names.index(selection.named[0].name)
-
-    def beside_first(i: int) -> float:
-        """Score of a candidate that could be named, or of the first effect itself."""
-        behind = max(singles[names[first]].gain - singles[names[i]].gain, BEHIND) if i != first else 0.0
-        return max(out[first] - behind, -TEMPERATURE)
-
-    return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
-
-
-def _against_none(gain: float, least: float, many: int = 1) -> float:
-    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
-
-    gain: the evidence, nats, over `none` and over what nominal flights show; least: what is needed.
-    """
-    if gain < least:
-        return TEMPERATURE * (gain - least - np.log(many))
-    return gain - least

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS, sensor_cells
+from airtouch.gap.evidence.cells import CELLS, sensor_cells
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, held_out_cell_gains
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import is_random, random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
@@ -26,7 +26,7 @@ ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 RANDOM_SHARE = 0.25
 
 
-def needed_beside(on: Trial, base: Judged, more: Judged) -> float:
+def needed_beside(on: Trial, base: Candidate, more: Candidate) -> float:
     """Held-out nats that a further effect must gain to be added.
 
     base: the hypothesis of the effects before it; more: the same with the further one.
@@ -39,12 +39,12 @@ def needed_beside(on: Trial, base: Judged, more: Judged) -> float:
     return misfit(on, base, more, share, everywhere=is_random(more.name))
 
 
-def random_by_misfit(on: Trial, base: Judged, more: Judged) -> bool:
+def random_by_misfit(on: Trial, base: Candidate, more: Candidate) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
     return is_random(more.name) and more.gain - base.gain < misfit(on, base, more, RANDOM_SHARE)
 
 
-def misfit(on: Trial, base: Judged, more: Judged, share: float, everywhere: bool = False) -> float:
+def misfit(on: Trial, base: Candidate, more: Candidate, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the effects before it are wrong by a share of theirs.
 
     base, more: as for `needed_beside`. What the effects on the logged times gain is no model's and does not count. In
@@ -62,11 +62,11 @@ def misfit(on: Trial, base: Judged, more: Judged, share: float, everywhere: bool
 def gained_where_more_is(base: np.ndarray, more: np.ndarray) -> float:
     """Nats that a hypothesis gains in those cells in which a longer one gains more than CELL_GAIN beyond it.
 
-    base, more (GROUPS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one cell:
+    base, more (CELLS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one cell:
     an effect that pushes forward and one that pushes up act on one body.
     """
     sensor = sensor_cells()
-    before, further = (np.bincount(sensor, gains, GROUPS) for gains in (base, more - base))
+    before, further = (np.bincount(sensor, gains, CELLS) for gains in (base, more - base))
     return float(np.maximum(before[further > CELL_GAIN], 0.0).sum())
 
 
@@ -78,4 +78,4 @@ def assumes(data: Data, terms: Sequence[Term]) -> bool:
 def changes_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether one of the mean effects, at its values, changes the control loop; False where no loop is modelled."""
     law = data.study.controller
-    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.kind == MEAN)
+    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.shows_in == MEAN)

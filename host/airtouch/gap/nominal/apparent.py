@@ -5,20 +5,20 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
-from airtouch.gap.naming.passing_effect import seconds
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
-from airtouch.gap.naming.selection import Judged
+from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
-from airtouch.gap.passing.gates import gated
+from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.second_process import shared
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
-from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, size_of
+from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
 from airtouch.gap.signatures.term import Term
@@ -30,7 +30,7 @@ NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the dat
 RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
 
 
-def nominal_scatter(study: Study, flights: Sequence[Flight], without: Sequence[str] = ()) -> Scatter:
+def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[str] = ()) -> Scatter:
     """How far the apparent strengths of every effect but those of `without` scatter among the nominal flights.
 
     It is measured in FLIGHTS of them, each held against the study of all.
@@ -39,16 +39,15 @@ def nominal_scatter(study: Study, flights: Sequence[Flight], without: Sequence[s
                       any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
 
 
-def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
+def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
     singles = round_of(on, all_candidates(without), None, thorough=True)
-    passing = gated(data, without)
+    passing = gated_effects(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
-    return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                    nameless(on, None) / seconds(data),
-                    {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
-                     for n in GATED})
+    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
+    return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
+                             nameless(on, None) / data.seconds, sizes)
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
@@ -63,17 +62,17 @@ def is_recorded(flight: Flight) -> bool:
     return any(str(flight.log.meta.get(key, "")).split("-")[0] in RECORDERS for key in ("format", "origin_format"))
 
 
-def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Apparent:
+def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:
     """The apparent strengths of one nominal flight."""
     return apparent(Data(study, [flight]), without)
 
 
-def _error(data: Data, judged: Judged) -> np.ndarray:
+def _error(data: Data, judged: Candidate) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
     term = strength_term(judged.terms)
-    if term.kind == CLOCK:
+    if term.shows_in == CLOCK:
         return np.zeros(len(judged.strength))
-    if term.kind == SPECTRUM:
+    if term.shows_in == SPECTRUM:
         return _error_of_random(data, judged, term)
     low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
     pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
@@ -81,9 +80,9 @@ def _error(data: Data, judged: Judged) -> np.ndarray:
                     np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
 
 
-def _error_of_random(data: Data, judged: Judged, term: Term) -> np.ndarray:
+def _error_of_random(data: Data, judged: Candidate, term: Term) -> np.ndarray:
     """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
-    same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
+    same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
     return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))

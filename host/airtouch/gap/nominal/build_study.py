@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.disturbed import disturbed
@@ -15,6 +14,7 @@ from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
+from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -65,7 +65,7 @@ def sensor_noise(vehicle: Vehicle) -> np.ndarray:
     """White noise (COUNT,) that the vehicle's sensors are declared to have, rms at 100 Hz: m/s^2, and rad/s twice."""
     acc = vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
     gyro = vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
-    return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - 9)])
+    return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - COMMAND.start)])
 
 
 def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_loop.ClosedLoop | None,

@@ -12,16 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.fit import Fit, fit
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.nominal.apparent import nominal_scatter
+from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
 from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, split_unlike
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.generic import unnamed_floor
@@ -65,7 +66,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     study, fitted = _fitted_vehicle(declared, flights)
     study = replace(study, unnamed_floor=unnamed_floor(Data(study, flights)))
     if scatter:
-        study = replace(study, scatter=nominal_scatter(study, flights, without))
+        study = replace(study, scatter=baseline_scatter(study, flights, without))
     if study.simulated:
         alike, unlike = split_unlike(vehicle, flights, FAR_SIMULATED)
         if unlike:
@@ -76,7 +77,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
                               None if left_out else declared)
 
 
-def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, Fit]:
+def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:
     """The study of the vehicle with the parameters of PRIORS fitted to nominal flights, and their fit."""
     chosen, prior = _terms_and_priors()
     study = declared
@@ -123,13 +124,12 @@ def _scaled(term: Term, calibration: Sequence[Active]) -> np.ndarray:
     return np.zeros(len(term.free))
 
 
-def _quantities(fitted: Fit) -> dict[str, Quantity]:
+def _quantities(fitted: FittedTerms) -> dict[str, Quantity]:
     """The calibrated parameters with unit and interval, by effect, rotor and parameter: `weak_motor 3 thrust_loss`."""
-    out, first = {}, 0
+    out = {}
     for term in fitted.terms:
-        part = slice(first, first + len(term.free))
-        first = part.stop
-        rotor = f" {int(term.values['rotor'])}" if term.name == "weak_motor" else ""
+        part = fitted.place(term)
+        rotor = "" if term.identity[1] is None else f" {term.identity[1]:.0f}"
         quantities = term.quantities(fitted.scaled[part], fitted.covariance[part, part])
         out |= {f"{term.name}{rotor} {p}": q for p, q in quantities.items() if p in term.free}
     return out

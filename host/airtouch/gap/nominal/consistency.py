@@ -1,15 +1,19 @@
 """Whether the baseline flights agree: which are left out, which a note names, by how much all of them differ.
 
-What is compared is each flight's trim: the mean force and torque in the air that the model leaves.
+What is compared is each flight's trim: the mean force and torque in the air that the model leaves. Of other flights it
+is said when they are flown unlike the baseline.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
+from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.signals.study import Study
 from airtouch.robust import deviation
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
@@ -90,9 +94,34 @@ def differences(study: Study, flights: Sequence[Flight]) -> list[str]:
             + "; the floor is that much higher"] if apart else []
 
 
+def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
+    """A note on each flight that is flown harder or calmer than every baseline flight: its floor is extrapolated."""
+    slopes = study.floor.slopes
+    if slopes is None:
+        return []
+    notes = []
+    for f in flights:
+        hardness = hardness_of(f, starts(f, AIR), LENGTH[AIR])
+        middle = float(np.median(hardness)) if len(hardness) else slopes.usual
+        if slopes.calmest <= middle <= slopes.hardest:
+            continue
+        word, end, limit = (("harder", slopes.hardest, "at most") if middle > slopes.hardest
+                            else ("calmer", slopes.calmest, "at least"))
+        own, theirs = (tilt_degrees(x) for x in (middle, end))
+        notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs "
+                     f"by {limit} {theirs:.1f}): the floor is extrapolated; fly the baseline like the test")
+    return notes
+
+
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:
-    """Trim (flights, 6) of each flight, m/s^2 and rad/s^2."""
-    return np.array([_in_air(f, vehicle, calibration).mean(axis=0) for f in flights])
+    """Trim (flights, 6) of each flight, m/s^2 and rad/s^2; worked out once for a flight and a vehicle."""
+    key = vehicle, tuple((a.effect.name, *a.values.values()) for a in calibration)
+    return np.array([f.workspace.once("trim", key, partial(_trim, f, vehicle, calibration)) for f in flights])
+
+
+def _trim(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active]) -> np.ndarray:
+    """Trim (6,) of a flight."""
+    return _in_air(flight, vehicle, calibration).mean(axis=0)
 
 
 def _in_air(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active]) -> np.ndarray:

@@ -5,11 +5,13 @@ A wake that is flown through lasts shorter than a block, and the spectra of bloc
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, Gate, best_stretches, price_of_stretches
+from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, price_of_stretches
 from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.study import Study
+from airtouch.simulation.effects.effect import Gate
 
 #: no number here has a source: all were chosen
 PIECE_S = 0.16  #: s, length of the pieces of the force along the thrust in which bursts are sought
@@ -32,7 +34,7 @@ def bursts(data: Data) -> tuple[Gate, float]:
         gate += [(flight.name, a * PIECE_S, (b + 1) * PIECE_S) for a, b in stretches]
         price += price_of_stretches(known) * len(stretches)
     seconds = sum(end - begin for _, begin, end in gate)
-    whole = seconds > WHOLE * sum(len(f) for f in data.flights) * PERIOD_S
+    whole = seconds > WHOLE * data.seconds
     return ((), 0.0) if whole else (tuple(gate), price)
 
 

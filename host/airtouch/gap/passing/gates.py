@@ -11,27 +11,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import Fit, fit, judge
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.fit import FittedTerms, fit, judge
+from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import bursts
-from airtouch.gap.passing.stretches import LEAST_BLOCKS, Gate, each_block, stretches_of
+from airtouch.gap.passing.stretches import LEAST_BLOCKS, each_block, stretches_of
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Term
+from airtouch.simulation.effects.effect import Gate
 
-TOLD = "told"  #: a wake in seconds in which another vehicle is known to be overhead
+KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle is known to be overhead
 
 
 @dataclass(frozen=True)
-class Gated:
+class GatedEffect:
     """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs, nats."""
 
     name: str
-    fitted: Fit
+    fitted: FittedTerms
     gain: float
     cost: float
-    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or TOLD
+    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or KNOWN_OVERHEAD
 
     @property
     def strength(self) -> np.ndarray:
@@ -40,7 +41,7 @@ class Gated:
 
 
 @dataclass(frozen=True)
-class Ungated:
+class NoEffect:
     """Flights without any effect, against which one that comes and goes is held.
 
     whole: all their blocks; each (b,): log likelihood of every block in the air; level: that of the flights, as sure of
@@ -48,56 +49,56 @@ class Ungated:
     """
 
     data: Data
-    whole: Part
+    whole: BlockSet
     each: np.ndarray
     level: Mapping[bool, float]
 
 
-def ungated(data: Data) -> Ungated | None:
+def no_effect(data: Data) -> NoEffect | None:
     """Flights without any effect; None where they are too short to say when an effect acts."""
     whole = whole_of(data)
     each = each_block(data, whole, ())
     if len(each) < LEAST_BLOCKS:
         return None
-    return Ungated(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
+    return NoEffect(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
 
 
-def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
+def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
     """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
 
     without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
-    TOLD.
+    KNOWN_OVERHEAD.
     """
-    base = ungated(data)
+    base = no_effect(data)
     if base is None:
         return {}
     lively, out = bursts(data), {}
-    for name, variants in candidates.gated(without).items():
+    for name, variants in candidates.gated_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
-            out[TOLD] = replace(_best(base, name, variants, data.study.overhead), key=TOLD)
-        tried = [(terms, gate, cost) for variant in variants for terms, gate, cost in (
-            stretches_of(data, base.whole, base.each, variant), (variant, *lively)) if gate]
-        if tried:
-            out[name] = max((_judged(base, name, *candidate) for candidate in tried), key=lambda j: j.gain)
+            out[KNOWN_OVERHEAD] = replace(_best(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
+        where = [tried for v in variants for tried in (stretches_of(data, base.whole, base.each, v), (v, *lively))]
+        acting = [_in_gate(base, name, terms, gate, cost) for terms, gate, cost in where if gate]
+        if acting:
+            out[name] = max(acting, key=lambda effect: effect.gain)
     return out
 
 
-def within(data: Data, name: str, gate: Gate) -> Gated | None:
+def within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
     """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
-    base = ungated(data)
-    return _best(base, name, candidates.gated()[name], gate) if base is not None else None
+    base = no_effect(data)
+    return _best(base, name, candidates.gated_variants()[name], gate) if base is not None else None
 
 
-def _best(base: Ungated, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> Gated:
+def _best(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
     """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
-    return max((_judged(base, name, v, gate, 0.0) for v in variants), key=lambda j: j.gain)
+    return max((_in_gate(base, name, v, gate, 0.0) for v in variants), key=lambda effect: effect.gain)
 
 
-def _judged(base: Ungated, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> Gated:
+def _in_gate(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> GatedEffect:
     """An effect fitted within a gate, whose choice costs `cost` nats."""
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(base.data, base.whole, acting)
     free = sum(len(t.free) for t in acting)
     without = base.level[bool(random_of(acting))]
     gain = judge(base.data, base.whole, fitted.terms) - without - cost - 0.5 * free * np.log(len(base.each))
-    return Gated(name, fitted, gain, cost, name)
+    return GatedEffect(name, fitted, gain, cost, name)

@@ -1,7 +1,7 @@
 """When another vehicle was overhead, from its own log, and what the rest of the flight seems to have of its wake.
 
 Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
-the other vehicle's path is known, nothing is looked for: a wake in the told seconds is held against the rest of that
+the other vehicle's path is known, nothing is looked for: a wake in the known seconds is compared with the rest of that
 flight, which may be flown harder than others. Sizes scatter about that as they do in nominal flights.
 """
 
@@ -11,25 +11,26 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.passing.gates import TOLD, within
-from airtouch.gap.passing.stretches import Gate
-from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, within
+from airtouch.gap.signals.study import Study
+from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
+from airtouch.simulation.effects.effect import Gate
 
 PLACE = ("x_m", "y_m", "z_m")
 #: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-#: the rule by which told seconds are held against the rest of a flight was chosen among seven on recorded flights
+#: the rule by which known seconds are compared with the rest of a flight was chosen among seven on recorded flights
 #: (host/docs/looks.md, 2026-11-25 04:11); of the numbers below none has a source of its own, all were chosen
 APART_S = 0.1  #: s, stretches with less between them are one
 LEAST_S = 0.05  #: s, shorter ones are none
-SHIFTS = 8  #: places of the told seconds around the rest of the flight
-MARGIN_S = 0.25  #: s around the told seconds, in which a wake may already or still act
-LEAST_SHARE = 0.5  #: of the told seconds that shifted ones must hold
+SHIFTS = 8  #: places of the known seconds around the rest of the flight
+MARGIN_S = 0.25  #: s around the known seconds, in which a wake may already or still act
+LEAST_SHARE = 0.5  #: of the known seconds that shifted ones must hold
 
 
 def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -81,16 +82,15 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
     rest = [_outside(gate, seconds) for gate in _shifted(flight, seconds)]
     sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * duration]
     middle, spread = study.scatter.passing[OVERHEAD]
-    passing = {**study.scatter.passing, TOLD: (float(np.median(sizes)) if sizes else middle, spread)}
+    passing = {**study.scatter.passing, KNOWN_OVERHEAD: (float(np.median(sizes)) if sizes else middle, spread)}
     return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
                    scatter=replace(study.scatter, passing=passing))
 
 
 def _size(data: Data, gate: Gate) -> float:
     """Size (`size_of`) that what acts overhead seems to have within a gate."""
-    found = within(data, OVERHEAD, gate)
-    long = sum(len(f) for f in data.flights) * PERIOD_S
-    return size_of(found.gain / long, found.strength) if found is not None else 0.0
+    wake = within(data, OVERHEAD, gate)
+    return size_of(wake.gain / data.seconds, wake.strength) if wake is not None else 0.0
 
 
 def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:

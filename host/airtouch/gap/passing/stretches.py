@@ -9,11 +9,12 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge, left_over
 from airtouch.gap.evidence.layout import AirBlocks
-from airtouch.gap.evidence.problem import Part, problem_of
+from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures.term import Term
 from airtouch.logs.segments import KINDS
+from airtouch.simulation.effects.effect import Gate
 
 #: no number here has a source: all were chosen
 MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
@@ -25,32 +26,31 @@ STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
-Gate = tuple[tuple[str, float, float], ...]  #: stretches (flight, from_s, to_s)
 
 
-def stretches_of(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term],
+def stretches_of(data: Data, whole: BlockSet, without: np.ndarray, terms: Sequence[Term],
                  ) -> tuple[Sequence[Term], Gate, float]:
     """An effect as fitted where it acts, the stretches of blocks in which it does, and nats that their choice costs.
 
-    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; off (b,): log likelihood of each
-    in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in which
-    it gains, ROUNDS times at most; then the stretches' ends are moved.
+    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; without (b,): log likelihood of
+    each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
+    which it gains, ROUNDS times at most; then the stretches' ends are moved.
     """
-    air, price = problem_of(data, whole).air, price_of_stretches(len(off))
+    air, price = problem_of(data, whole).air, price_of_stretches(len(without))
     at_the_ends = _at_the_ends(data, air)
-    on = _explained_worst(air, off)
+    acting = _explained_worst(air, without)
     for _ in range(ROUNDS):
-        fitted = fit(data, _part(whole, on), terms)
-        gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - off)
+        fitted = fit(data, _part(whole, acting), terms)
+        gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - without)
         stretches = best_stretches(gain, air.flight, price)
-        chosen = np.zeros(len(off), bool)
+        chosen = np.zeros(len(without), bool)
         for first, last in stretches:
             chosen[first:last + 1] = True
         if not stretches or chosen.mean() > WHOLE:
             return terms, (), 0.0
-        if (chosen == on).all():
+        if (chosen == acting).all():
             break
-        on = chosen
+        acting = chosen
     gate = tuple((data.flights[air.flight[a]].name, *_seconds(air, a, b)) for a, b in stretches)
     return fitted.terms, _sharpened(data, whole, fitted.terms, gate), price * len(stretches)
 
@@ -88,19 +88,19 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, price: float) -> tuple[i
     return stretch
 
 
-def each_block(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
+def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.power)[:problem.own]
+    each = problem.likelihood.each(values, power - problem.power)[:problem.replay_count]
     in_air = problem.air.of >= 0
     return np.bincount(problem.air.of[in_air], each[in_air])
 
 
-def _explained_worst(air: AirBlocks, off: np.ndarray) -> np.ndarray:
-    """Which blocks (b,) are explained worst: a share WORST of them, of the least log likelihood `off` of a value."""
-    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(off)), 1)
-    out = np.zeros(len(off), bool)
-    out[np.argsort(off / count)[:max(int(WORST * len(off)), LEAST_WORST)]] = True
+def _explained_worst(air: AirBlocks, without: np.ndarray) -> np.ndarray:
+    """Which blocks (b,) are explained worst: a share WORST of them, of the least log likelihood of a value."""
+    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(without)), 1)
+    out = np.zeros(len(without), bool)
+    out[np.argsort(without / count)[:max(int(WORST * len(without)), LEAST_WORST)]] = True
     return out
 
 
@@ -111,14 +111,14 @@ def _at_the_ends(data: Data, air: AirBlocks) -> np.ndarray:
     return np.array(ends, bool)
 
 
-def _part(whole: Part, on: np.ndarray) -> Part:
-    """Those blocks in the air that are on (b,)."""
+def _part(whole: BlockSet, acting: np.ndarray) -> BlockSet:
+    """The blocks in the air in which an effect acts. acting (b,): whether it does in each."""
     pieces, place = [], 0
     for flight, regime, chosen in whole.pieces:
         if regime == AIR:
-            pieces.append((flight, regime, on[place:place + len(chosen)]))
+            pieces.append((flight, regime, acting[place:place + len(chosen)]))
             place += len(chosen)
-    return Part(tuple(pieces))
+    return BlockSet(tuple(pieces))
 
 
 def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
     return float((air.begin[first] + quarter) * PERIOD_S), float((air.begin[last] + LENGTH[AIR] - quarter) * PERIOD_S)
 
 
-def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
+def _sharpened(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
 
     def level(tried: Gate) -> float:

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, two_of
 from airtouch.gap.relations.effect_class import learn_class, stands_out
-from airtouch.gap.relations.feature_space import Standard, cholesky_factor, directions, standard_of
-from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
+from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
     Drawing,
@@ -40,9 +40,9 @@ from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import load
 
-NOMINAL = 5000  #: nominal flights, twice as many as there are features, of which they give the covariance
-NAMELESS = 3000  #: flights in which something acts that has no name
-PAIRS = 300  #: flights with two effects
+NOMINAL_FLIGHTS = 5000  #: twice as many as there are features, of which they give the covariance
+NAMELESS_FLIGHTS = 3000  #: flights in which something acts that has no name
+FLIGHTS_OF_TWO = 300  #: flights with two effects
 PER_KNOT = 60  #: flights of a class for each KNOT of its strength (a factor of three); twice as many for a direction
 FACTOR_OF_KNOT = 3.0  #: in strength, that of `effect_class.KNOT`
 WEAKEST_SHIFT = 6.0  #: length of a whitened shift of a class's weakest flights, which hardly shows beside nominal ones
@@ -53,7 +53,7 @@ DIRECTIONS_OF_CLASS = 6  #: directions that are stored for each class
 RANK_OF_NAMELESS = 120  #: directions of the scatter of nameless disturbances
 RANK_OF_INTERACTION = 24  #: directions, at most, in which two effects are no sum
 CLEAR_NAMELESS = 3.0  #: length of the shift of a nameless disturbance from which its direction counts
-CLEAR_PAIR = 12.0  #: length of the smaller shift of two effects from which their sum is looked at
+CLEAR_OF_TWO = 12.0  #: length of the smaller shift of two effects from which their sum is looked at
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class PairedFlights:
 def build(scene: Scene, say: Say = lambda _: None) -> Library:
     """Fly and learn."""
     say("nominal flights")
-    flown = {i: f for i in range(NOMINAL) if (f := fly(scene, i)) is not None}
+    flown = {i: f for i in range(NOMINAL_FLIGHTS) if (f := fly(scene, i)) is not None}
     features = np.array(list(flown.values()))
     standard = standard_of(features)
     whitening = Whitening(standard, cholesky_factor(standard(features)))
@@ -99,7 +99,8 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     middle = np.mean(list(nominal.values()), axis=0)
     paired = [_paired_flights(scene, whitening, nominal, d, say) for d in all_drawings()]
     say("flights without a name")
-    nameless = np.array([whitening(f)[0] - nominal[i] for i, f in disturbed_flights(scene, NAMELESS) if i in nominal])
+    nameless = np.array([whitening(f)[0] - nominal[i]
+                         for i, f in disturbed_flights(scene, NAMELESS_FLIGHTS) if i in nominal])
     axes = directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
@@ -158,14 +159,14 @@ def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
 def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]) -> np.ndarray:
     """Directions (Q, r), times the deviation, of what two effects are beside their sum, over the smaller."""
     relative, noise = [], []
-    for i in range(PAIRS):
+    for i in range(FLIGHTS_OF_TWO):
         rng = np.random.default_rng([SEED, Stream.PAIR, i])
         a, b = two_of([p.drawing for p in paired], rng)
         f = fly(scene, i, [paired[j].draw_strong(rng) for j in (a, b)])
         if f is None:
             continue
         residual, smaller = _residual_of_two(library, library.coordinates(f[None])[0], a, b)
-        if smaller > CLEAR_PAIR:
+        if smaller > CLEAR_OF_TWO:
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
                 relative.append(residual / smaller)
@@ -184,9 +185,9 @@ def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
 def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the length of the smaller one's shift."""
     one, two = library.model.classes[a], library.model.classes[b]
-    flight = FlightFeatures(values, library.model)
+    flight = FlightHypotheses(values, library.model)
     both = flight.with_two(one, two)
-    return flight.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
+    return flight.rescaling(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
 def main() -> None:

@@ -1,5 +1,8 @@
 """Calibrate a library on simulated flights that it was not learned from: distances, shares of evidence, parameters.
 
+`calibrated` does so in three steps: the distance of nominal flights, each class by flights with its effect
+(`calibrate_class`), two effects together (`_scatter_of_two`).
+
 Counts and thresholds without another source were chosen on flights of `learning.SEED` alone (host/docs/looks.md,
 2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not recorded.
 """
@@ -11,8 +14,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
-from airtouch.gap.relations.feature_space import MIDDLE_TWO_THIRDS
-from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis
+from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
+from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Library
@@ -21,14 +24,15 @@ from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
-NOMINAL = 300  #: nominal flights, whose distances are measured
-CALIBRATION = 80  #: flights of each class (host/docs/gap.md, "How far right names lie"); those that show it count
-SECONDS = 12  #: of them, those beside whose effect a second one is tried
-PAIRS = 150  #: flights with two effects (host/docs/gap.md, there)
-FIRST_NOMINAL, FIRST_OF_PAIR, FIRST_CALIBRATION = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
-OF_CLASS = 1000  #: numbers that each class has of its own
-RANGE_OF_PAIR = 30.0  #: factor between the highest and the lowest strength of the effects of a pair
+NOMINAL_FLIGHTS = 300  #: whose distances are measured
+CLASS_FLIGHTS = 80  #: of each class (host/docs/gap.md, "How far right names lie"); those that show it count
+WITH_SECOND = 12  #: of them, those beside whose effect a second one is tried
+FLIGHTS_OF_TWO = 150  #: flights with two effects (host/docs/gap.md, there)
+FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
+NUMBERS_OF_CLASS = 1000  #: numbers that each class has of its own
+RANGE_OF_TWO = 30.0  #: factor between the highest and the lowest strength of two effects that act together
 HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
+HIGHEST_START = 0.5  #: of the highest strength, from which a class's flights begin at most
 TRIED, SHOWN = 3, 0.5  #: flights at each of these strengths, and the share of them that shows an effect which shows
 QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
 FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
@@ -47,8 +51,8 @@ def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Lib
         say(f"calibration of {own.name} {own.shape or ''}")
         found.append(calibrate_class(scene, library, place, drawing))
     library = with_calibrations(library, found)
-    say("pairs")
-    return replace(library, pair_scatter=_scatter_of_pairs(scene, library, drawings))
+    say("flights of two effects")
+    return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings))
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ class ClassCalibration:
     distance_scatter: float
 
 
-def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int = CALIBRATION,
+def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int = CLASS_FLIGHTS,
                     ) -> ClassCalibration:
     """Measure the class at a place of the library by so many flights."""
     shown = _calibration_flights(scene, library, place, drawing, count)
@@ -82,7 +86,7 @@ def with_calibrations(library: Library, found: Sequence[ClassCalibration]) -> Li
 
 def _nominal_distance(scene: Scene, library: Library) -> tuple[float, float]:
     """`Library.distance`: median and standard deviation of squared distances of nominal flights."""
-    flown = [f for i in range(NOMINAL) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
+    flown = [f for i in range(NOMINAL_FLIGHTS) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
     squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
     return float(np.median(squared)), float(0.5 * (high - low))
@@ -111,7 +115,7 @@ class _Fitted:
     """A flight with one effect, and the hypothesis of its class."""
 
     active: Active
-    flight: FlightFeatures
+    flight: FlightHypotheses
     hypothesis: Hypothesis
 
     @property
@@ -125,8 +129,8 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
     """So many flights of a class from the strength that hardly shows to the highest, of them those that show it."""
     own, high = library.model.classes[place], drawing.kind.highest
     rng = np.random.default_rng([SEED, Stream.CALIBRATION, place])
-    first = FIRST_CALIBRATION + OF_CLASS * place
-    numbers = iter(range(first, first + OF_CLASS))
+    first = FIRST_OF_CLASS + NUMBERS_OF_CLASS * place
+    numbers = iter(range(first, first + NUMBERS_OF_CLASS))
 
     def fitted(strength: float) -> _Fitted | None:
         """A flight with the effect at a strength, and the class fitted to it; None where it does not end well."""
@@ -134,12 +138,12 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
         flight = _flown(scene, library, next(numbers), [active])
         return None if flight is None else _Fitted(active, flight, flight.with_class(own))
 
-    low = min(_weakest_shown(fitted, high), 0.5 * high)
+    low = min(_weakest_shown(fitted, high), HIGHEST_START * high)
     shown: list[CalibrationFlight] = []
     for strength in np.exp(rng.uniform(np.log(low), np.log(high), count)):
         one = fitted(strength)
         if one is not None and one.shows:
-            shown.append(_measured(library, drawing, one, with_second=len(shown) < SECONDS))
+            shown.append(_measured(library, drawing, one, with_second=len(shown) < WITH_SECOND))
     return shown
 
 
@@ -196,15 +200,15 @@ def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight]) -> Readout | 
     return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
 
 
-def _scatter_of_pairs(scene: Scene, library: Library, drawings: Sequence[Drawing]) -> float:
+def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing]) -> float:
     """`Library.pair_scatter`: by flights with two effects, each hypothesis started from either."""
     excess, evidence, of_classes = [], [], []
-    for i in range(PAIRS):
+    for i in range(FLIGHTS_OF_TWO):
         rng = np.random.default_rng([SEED, Stream.CALIBRATION_PAIR, i])
         a, b = two_of(drawings, rng)
-        active = [d.active(log_uniform(d.kind.highest / RANGE_OF_PAIR, d.kind.highest, rng), rng)
+        active = [d.active(log_uniform(d.kind.highest / RANGE_OF_TWO, d.kind.highest, rng), rng)
                   for d in (drawings[a], drawings[b])]
-        flight = _flown(scene, library, FIRST_OF_PAIR + i, active)
+        flight = _flown(scene, library, FIRST_OF_TWO + i, active)
         if flight is None:
             continue
         one, two = (library.model.classes[j] for j in (a, b))
@@ -226,7 +230,7 @@ def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, 
             return a, b
 
 
-def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightFeatures | None:
+def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightHypotheses | None:
     """The features of a flight with effects; None where it does not end well."""
     features = fly(scene, number, active)
-    return None if features is None else FlightFeatures(library.coordinates(features[None])[0], library.model)
+    return None if features is None else FlightHypotheses(library.coordinates(features[None])[0], library.model)

@@ -1,6 +1,6 @@
-"""How likely features are under a class of flights: normal densities with few directions of more scatter.
+"""How likely a flight is under a class: normal densities with few directions of more scatter.
 
-A flight's features are Q values, of which nominal flights have the covariance 1. Log densities are in nats and leave
+A flight's coordinates are Q values, of which nominal flights have the covariance 1. Log densities are in nats and leave
 out the constant -Q/2 log(2 pi). The numbers of the search were chosen.
 """
 
@@ -21,7 +21,7 @@ SMALLEST = 1e-300  #: length that a division may have at least
 
 
 @dataclass(frozen=True)
-class Coordinates:
+class Rescaling:
     """A change of coordinates that makes a covariance 1 + F F' to 1.
 
     Along axes (Q, r) values are multiplied by 1 + stretch (r,). level: logarithm of the density that this costs, that
@@ -33,20 +33,20 @@ class Coordinates:
     level: float
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        """Values (..., Q) in these coordinates."""
+        """Values (..., Q) rescaled."""
         return values + ((values @ self.axes) * self.stretch) @ self.axes.T
 
 
-def coordinates_of(factors: np.ndarray) -> Coordinates:
-    """Coordinates for the covariance 1 + F F' of factors F (Q, r)."""
+def rescaling_of(factors: np.ndarray) -> Rescaling:
+    """The rescaling for the covariance 1 + F F' of factors F (Q, r)."""
     axes, size, _ = np.linalg.svd(factors, full_matrices=False)
     deviation = np.sqrt(1.0 + size ** 2)
-    return Coordinates(axes, 1.0 / deviation - 1.0, -float(np.log(deviation).sum()))
+    return Rescaling(axes, 1.0 / deviation - 1.0, -float(np.log(deviation).sum()))
 
 
-def unchanged(dimensions: int) -> Coordinates:
-    """Coordinates that change nothing."""
-    return Coordinates(np.zeros((dimensions, 0)), np.zeros(0), 0.0)
+def unchanged(dimensions: int) -> Rescaling:
+    """A rescaling that changes nothing."""
+    return Rescaling(np.zeros((dimensions, 0)), np.zeros(0), 0.0)
 
 
 def log_density(values: np.ndarray) -> float:
@@ -69,7 +69,7 @@ class Fit:
 
     @property
     def shift(self) -> np.ndarray:
-        """Expected shift (Q,) in plain coordinates."""
+        """Expected shift (Q,), not rescaled."""
         return self.of.mean(self.strength[None])[0]
 
     def factors(self) -> np.ndarray:
@@ -78,23 +78,24 @@ class Fit:
 
 
 class _Likelihood:
-    """The log density of a flight's values (Q,) under a class, in some coordinates, as a function of its strength."""
+    """The log density of a flight's values (Q,) under a class, rescaled, as a function of its strength."""
 
-    def __init__(self, of: EffectClass, values: np.ndarray, coordinates: Coordinates) -> None:
-        self.of, self.values, self.coordinates = of, values, coordinates
-        if coordinates.stretch.size and of.variances.size:
-            self.axes, size, _ = np.linalg.svd(coordinates((of.axes * np.sqrt(of.variances)).T).T, full_matrices=False)
+    def __init__(self, of: EffectClass, values: np.ndarray, rescaling: Rescaling) -> None:
+        """values: rescaled."""
+        self.of, self.values, self.rescaling = of, values, rescaling
+        if rescaling.stretch.size and of.variances.size:
+            self.axes, size, _ = np.linalg.svd(rescaling((of.axes * np.sqrt(of.variances)).T).T, full_matrices=False)
             self.variances = size ** 2
         else:
             self.axes, self.variances = of.axes, of.variances
 
     def level(self, shift: np.ndarray) -> np.ndarray:
-        """Log density (n,) at expected shifts (n, Q) in plain coordinates."""
+        """Log density (n,) at expected shifts (n, Q), not rescaled."""
         size = (shift ** 2).sum(axis=1)
-        residual = self.values - self.coordinates(shift)
+        residual = self.values - self.rescaling(shift)
         along, variance = residual @ self.axes, 1.0 + size[:, None] * self.variances
         squared_distance = (residual ** 2).sum(axis=1) - (along ** 2 * (1.0 - 1.0 / variance)).sum(axis=1)
-        return self.coordinates.level - 0.5 * (squared_distance + np.log(variance).sum(axis=1))
+        return self.rescaling.level - 0.5 * (squared_distance + np.log(variance).sum(axis=1))
 
     def at(self, strength: np.ndarray) -> np.ndarray:
         """Log density (n,) at strengths (n, parameters)."""
@@ -111,15 +112,15 @@ class _Likelihood:
         return strength / max(size, SMALLEST) * np.clip(size, self.of.least, self.of.most)
 
     def slopes(self, strength: np.ndarray) -> np.ndarray:
-        """Change (parameters, Q) of the expected shift per parameter, in these coordinates."""
+        """Change (parameters, Q) of the expected shift per parameter, rescaled."""
         step = SLOPE * float(np.linalg.norm(strength)) * np.eye(len(strength))
         ahead, back = (self.of.mean(strength + s) for s in (step, -step))
-        return self.coordinates((ahead - back) / (2.0 * step[0, 0]))
+        return self.rescaling((ahead - back) / (2.0 * step[0, 0]))
 
 
-def fit(of: EffectClass, values: np.ndarray, coordinates: Coordinates) -> Fit:
-    """The likeliest strength of a class for features (Q,) in some coordinates."""
-    likelihood = _Likelihood(of, values, coordinates)
+def fit(of: EffectClass, values: np.ndarray, rescaling: Rescaling) -> Fit:
+    """The likeliest strength of a class for a flight's coordinates (Q,), values: rescaled."""
+    likelihood = _Likelihood(of, values, rescaling)
     strength, level = _on_a_grid(likelihood) if of.parameters == 1 else _by_gauss_newton(likelihood)
     return Fit(of, strength, level, level + min(_occam_factor(likelihood, strength), 0.0))
 
@@ -174,12 +175,12 @@ def _step(likelihood: _Likelihood, strength: np.ndarray) -> np.ndarray:
     """The step (parameters,) of Gauss-Newton at a strength: least squares weighed by the covariance there."""
     shift, slopes = likelihood.of.mean(strength[None])[0], likelihood.slopes(strength)
     weighed = likelihood.over_covariance(shift, slopes)
-    residual = likelihood.values - likelihood.coordinates(shift)
+    residual = likelihood.values - likelihood.rescaling(shift)
     return np.linalg.lstsq(weighed @ slopes.T, weighed @ residual, rcond=1e-9)[0]
 
 
 def _occam_factor(likelihood: _Likelihood, strength: np.ndarray) -> float:
-    """Logarithm of the share of what a strength may be that the features leave (Laplace's method).
+    """Logarithm of the share of what a strength may be that the flight leaves (Laplace's method).
 
     MacKay, Information Theory, Inference, and Learning Algorithms, 2003, section 28.1. A strength may be anything
     between the least and the most that was flown, on a logarithmic scale, in any direction.

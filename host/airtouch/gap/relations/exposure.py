@@ -62,6 +62,10 @@ OF_VEHICLES = frozenset({"rotor_x", "rotor_y", "rotor_inertia", "yaw_torque_over
 LEFT_OUT = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_voltage", "voltage_exponent", "firmware",
                       "battery_cells", "power_per_thrust15", "motor_noise_time", "motor_hiss_time", "range_bias_fade",
                       "thrust_curve", "thrust_scale", "rate_scale", "thrust_per_speed2", "loss_burst"})
+#: what signals are about in an ordinary flight, by which they are divided; chosen. Thrusts are shares of the weight
+USUAL_MPS, USUAL_RADPS, USUAL_S, USUAL_TILT = 0.3, 0.2, 10.0, 0.05
+USUAL_THRUST, USUAL_DIFFERENCE = 0.05, 0.02
+FOR_EVER = 1e9  #: s, beyond any flight; and beyond any parameter
 ANY_VEHICLE = "crazyflie-2.1-flow"  #: one on which it is tried which properties effects change
 
 #: parameters of the wrench; kind: three times a `Follows`, and the axis (0 to 2); time: its SCALE, or number of a rotor
@@ -81,21 +85,21 @@ def _disturbance(p, s, memory, stream, out):
     if kind == Follows.CONSTANT:
         x = 1.0
     elif kind == Follows.VELOCITY:
-        x = s[at.VELOCITY + axis] / 0.3
+        x = s[at.VELOCITY + axis] / USUAL_MPS
     elif kind == Follows.SPEED:
-        x = math.sqrt(vx * vx + vy * vy + vz * vz) / 0.3
+        x = math.sqrt(vx * vx + vy * vy + vz * vz) / USUAL_MPS
     elif kind == Follows.THRUST:
-        x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / 0.05
+        x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / USUAL_THRUST
     elif kind == Follows.ROLL_THRUST:
-        x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / 0.02
+        x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / USUAL_DIFFERENCE
     elif kind == Follows.PITCH_THRUST:
-        x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / 0.02
+        x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / USUAL_DIFFERENCE
     elif kind == Follows.BODY_RATE:
-        x = s[at.RATES + axis] / 0.2
+        x = s[at.RATES + axis] / USUAL_RADPS
     elif kind == Follows.NEAR_GROUND:
         x = math.exp(-s[at.HEIGHT] / p[TIME])
     elif kind == Follows.TIME:
-        x = s[at.TIME] / 10.0
+        x = s[at.TIME] / USUAL_S
     elif kind == Follows.WAVE:
         x = math.sin(2.0 * math.pi * s[at.TIME] / p[TIME])
     elif kind == Follows.NOISE:
@@ -103,11 +107,11 @@ def _disturbance(p, s, memory, stream, out):
         memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
         x = memory[0]
     elif kind == Follows.TILT:
-        x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / 0.05
+        x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / USUAL_TILT
     elif kind == Follows.POSITION:
         x = s[at.POSITION]
     elif kind == Follows.SQUARED_VELOCITY:
-        x = vx * abs(vx) / 0.09
+        x = vx * abs(vx) / USUAL_MPS ** 2
     else:
         x = 4.0 * s[t + min(int(p[TIME]), 3)] / weight - 1.0
     for i in range(6):
@@ -115,7 +119,8 @@ def _disturbance(p, s, memory, stream, out):
 
 
 def _number(name: str) -> Parameter:
-    return Parameter(name, "1", 0.0, -1e9, 1e9, 0.0, name)
+    """A parameter of any value."""
+    return Parameter(name, "1", 0.0, -FOR_EVER, FOR_EVER, 0.0, name)
 
 
 DISTURBANCE = Effect("disturbance", "a force and torque without a name", tuple(_number(n) for n in NAMES),
@@ -123,6 +128,7 @@ DISTURBANCE = Effect("disturbance", "a force and torque without a name", tuple(_
 
 
 def _change(row, values) -> None:
+    """Scale a property of the plant's row, or add to it."""
     name, which, amount = properties()[int(values["property"])], int(values["which"]), values["amount"]
     own = np.array(row[name], float)
     here = np.ones(own.shape, bool) if not own.shape or which < 0 else np.arange(len(own)) == which % len(own)
@@ -176,7 +182,7 @@ def _drawn_wrench(rng: np.random.Generator) -> Active:
     direction[3:] *= LEVER_M
     time = log_uniform(*SCALE[follows], rng) if follows in SCALE else float(rng.integers(4))
     begin = float(rng.uniform(*BEGIN_S))
-    seconds = (0.0, 1e9) if rng.random() < WHOLE_FLIGHT_SHARE else (begin, begin + float(rng.uniform(*DURATION_S)))
+    seconds = (0.0, FOR_EVER) if rng.random() < WHOLE_FLIGHT_SHARE else (begin, begin + float(rng.uniform(*DURATION_S)))
     values = (3 * follows + axis, *direction, time, *seconds)
     return Active(DISTURBANCE, dict(zip(NAMES, map(float, values), strict=True)))
 

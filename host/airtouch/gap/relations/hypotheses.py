@@ -1,6 +1,6 @@
-"""Hypotheses on the features of a flight and their evidence: effects together, or a disturbance without a name.
+"""Hypotheses on a flight and their evidence: effects together, or a disturbance without a name.
 
-A flight's features are Q values, of which nominal flights have the covariance 1; evidence is in nats.
+A flight's coordinates are Q values, of which nominal flights have the covariance 1; evidence is in nats.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from airtouch.gap.relations.density import Coordinates, Fit, coordinates_of, fit, log_density, unchanged
+from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 ROUNDS = 3  #: rounds, at most, in which the effects of a hypothesis are fitted in turn; chosen
@@ -58,8 +58,8 @@ class Hypothesis:
         return np.sum([f.shift for f in self.fits], axis=0)
 
 
-class FlightFeatures:
-    """The features of a flight relative to nominal ones (Q,), and hypotheses on them."""
+class FlightHypotheses:
+    """The coordinates of a flight, values (Q,), and hypotheses on them."""
 
     def __init__(self, values: np.ndarray, model: LearnedModel) -> None:
         self.values, self.model = values, model
@@ -77,7 +77,7 @@ class FlightFeatures:
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
                       ) -> list[Hypothesis]:
         """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
-        known = self.coordinates(hypothesis.fits)
+        known = self.rescaling(hypothesis.fits)
         residual = known(self.values - hypothesis.shift)
         cost = hypothesis.evidence - hypothesis.level
         out = [self.at_fits((*hypothesis.fits, fit(c, residual, known)), cost)
@@ -87,7 +87,7 @@ class FlightFeatures:
     def with_two(self, one: EffectClass, two: EffectClass) -> Hypothesis:
         """The hypothesis of two classes: the second fitted beside the first, then both in turn."""
         first = fit(one, self.values, unchanged(len(self.values)))
-        known = coordinates_of(first.factors())
+        known = rescaling_of(first.factors())
         return self.refitted(self.at_fits((first, fit(two, known(self.values - first.shift), known))))
 
     def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -96,7 +96,7 @@ class FlightFeatures:
         for _ in range(ROUNDS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
-                known = self.coordinates(others)
+                known = self.rescaling(others)
                 fits[i] = fit(f.of, known(self.values - np.sum([o.shift for o in others], axis=0)), known)
             tried = self.at_fits(tuple(fits))
             if tried.level <= best.level:
@@ -107,12 +107,12 @@ class FlightFeatures:
     def squared_distance(self, hypothesis: Hypothesis) -> float:
         """Squared distance of the flight from a hypothesis, relative to the scatter about it."""
         fits = hypothesis.fits
-        residual = self.coordinates(fits)(self.values - hypothesis.shift) if fits else self.values
+        residual = self.rescaling(fits)(self.values - hypothesis.shift) if fits else self.values
         return float(residual @ residual)
 
     def nameless_evidence(self, hypothesis: Hypothesis) -> float:
         """Evidence over none of a hypothesis with a disturbance without a name beside it, nats."""
-        known = self.coordinates(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
+        known = self.rescaling(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
         residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
         axes, size, _ = np.linalg.svd(known(self.model.nameless.T).T, full_matrices=False)
         along = (residual @ axes) ** 2
@@ -126,15 +126,15 @@ class FlightFeatures:
 
         cost: nats that averaging over the strengths of all but the last changes, if known.
         """
-        known = self.coordinates(fits)
+        known = self.rescaling(fits)
         residual = known(self.values - np.sum([f.shift for f in fits], axis=0))
         level = known.level + log_density(residual) - log_density(self.values)
         own = [f.evidence - f.level for f in fits]
         return Hypothesis(tuple(fits), level, level + (sum(own) if cost is None else cost + own[-1]))
 
-    def coordinates(self, fits: Sequence[Fit]) -> Coordinates:
-        """Coordinates in which the scatter of a flight under effects has the covariance 1."""
+    def rescaling(self, fits: Sequence[Fit]) -> Rescaling:
+        """The rescaling by which the scatter of a flight under effects has the covariance 1."""
         sizes = [float(np.linalg.norm(f.shift)) for f in fits]
         smaller = float(np.sqrt(sum(min(a, b) ** 2 for a, b in combinations(sizes, 2))))
         interaction = [smaller * self.model.interaction] if smaller else []
-        return coordinates_of(np.concatenate([*(f.factors() for f in fits), *interaction], axis=1))
+        return rescaling_of(np.concatenate([*(f.factors() for f in fits), *interaction], axis=1))

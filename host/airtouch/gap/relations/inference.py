@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis, LearnedModel
+from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Reading, read_out
 from airtouch.gap.signatures.alike import interchangeable
@@ -83,16 +83,17 @@ class Inference:
 def infer(library: Library, coordinates: np.ndarray) -> Inference:
     """Infer the effects that flights with coordinates (n, Q) have in common."""
     many = len(coordinates)
-    flight = FlightFeatures(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
+    flight = FlightHypotheses(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
     singles = flight.single_effects()
     best = _likeliest(flight, singles, _by_class(library, library.second_share))
     against = max(_nameless(flight, best, _by_class(library, library.nameless_share)),
                   _distance(flight, best, _by_class(library, library.distance_scatter), library),
                   key=lambda a: a.nats / a.limit)
-    return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flight.nameless_evidence(flight.none),
-                     against.nats, against.limit, _readings(best),
-                     tuple(f.of.effect for f in best.fits
-                           if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
+    return Inference(
+        classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles),
+        nameless_alone=flight.nameless_evidence(flight.none), unexplained=against.nats, limit=against.limit,
+        readings=_readings(best), without_sign=tuple(
+            f.of.effect for f in best.fits if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
 
 
 def _by_class(library: Library, numbers: np.ndarray) -> Shares:
@@ -110,13 +111,13 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
             for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
 
 
-def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> Against:
+def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: Shares) -> Against:
     """What a disturbance without a name gains beside effects."""
     share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
     return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence)
 
 
-def _distance(flight: FlightFeatures, best: Hypothesis, scatters: Shares, library: Library) -> Against:
+def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: Shares, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
     share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
     return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence))
@@ -138,7 +139,7 @@ def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightFeatures, singles: list[Hypothesis], second: Shares) -> Hypothesis:
+def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], second: Shares) -> Hypothesis:
     """The likeliest hypothesis, with no more effects than its evidence supports."""
     best, beam = (singles[0] if singles else flight.none), singles[:BEAM]
     if best.evidence < LEAST_EVIDENCE:
@@ -155,7 +156,7 @@ def _likeliest(flight: FlightFeatures, singles: list[Hypothesis], second: Shares
     return best
 
 
-def _with_one_more(flight: FlightFeatures, beam: list[Hypothesis]) -> list[Hypothesis]:
+def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
     by_classes = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
                   for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}

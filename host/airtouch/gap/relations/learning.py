@@ -7,13 +7,12 @@ from enum import IntEnum
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import exposure
-from airtouch.gap.relations.features import features
 from airtouch.gap.relations.readout import amount_of
-from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.random_draws import SHAPED, Kind, kinds_of, log_uniform
-from airtouch.gap.signatures.signature import free_of
+from airtouch.gap.signatures.random_draws import Kind, kinds_of, log_uniform
+from airtouch.gap.signatures.signature import free_of, signature_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
@@ -65,7 +64,8 @@ class Drawing:
     def active(self, strength: float, rng: np.random.Generator) -> Active:
         """The effect at a strength, its direction drawn."""
         drawn = self.kind.active(strength, rng)
-        return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, SHAPED[self.name]: self.shape})
+        parameter = signature_of(drawn.effect).class_by
+        return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, parameter: self.shape})
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -81,13 +81,8 @@ def all_drawings() -> list[Drawing]:
 
 def drawings(effect: str) -> list[Drawing]:
     """The classes of flights of an effect: one for each kind of it, and for each value of what shapes that kind."""
-    out = []
-    for name, kind in kinds_of(get(effect)).items():
-        parameter = SHAPED.get(name)
-        own = [t for variant in all_candidates()[effect] for t in variant if t.name == effect and not t.companion]
-        shapes = sorted({t.values[parameter] for t in own}) if parameter else [None]
-        out += [Drawing(name, kind, shape) for shape in shapes]
-    return out
+    shapes = signature_of(get(effect)).class_values or (None,)
+    return [Drawing(name, kind, shape) for name, kind in kinds_of(get(effect)).items() for shape in shapes]
 
 
 def halved(highest: float, most: int, hides: Callable[[float], bool]) -> float:

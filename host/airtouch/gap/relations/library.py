@@ -11,8 +11,8 @@ from typing import Any, SupportsIndex
 
 import numpy as np
 
+from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.feature_space import Standard
 from airtouch.gap.relations.hypotheses import LearnedModel
 from airtouch.gap.relations.readout import Readout
 from airtouch.logs.files import write_bytes

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.relations.build import HALVINGS, WEAKEST_SHIFT
-from airtouch.gap.relations.calibration import ClassCalibration, calibrate_class, with_calibrations
+from airtouch.gap.relations.calibration import HIGHEST_START, ClassCalibration, calibrate_class, with_calibrations
 from airtouch.gap.relations.effect_class import learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, halved, scaled
 from airtouch.gap.relations.library import SHARES, Library
@@ -51,7 +51,7 @@ def _with_class(library: Library, scene: Scene, name: str) -> Library:
     """The library with a class of one more effect, learned and calibrated; as it is if too few flights end well."""
     drawing = Drawing(name, kinds_of(get(name))[name])
     high = drawing.kind.highest
-    low = min(_weakest(library, scene, drawing), 0.5 * high)
+    low = min(_weakest(library, scene, drawing), HIGHEST_START * high)
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()])) for i in range(PAIRS)]
     flown = shared(partial(_pair, library, scene, drawing), enumerate(strengths))
     pairs = [p for p in flown if p is not None]

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.signatures.term import neutral_of, parameter_of, unit
 from airtouch.simulation.effects import Effect
 
-LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors
 #: by name of a parameter: its value and standard deviation, in its unit
 Reading = Mapping[str, tuple[float, float]]
 WIDTH = float(np.log(2.0))  #: standard deviation, in the log strength, of the weights of calibration flights; chosen
@@ -92,7 +92,7 @@ def _deviation(residual: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 def amount_of(effect: Effect, name: str, value: float) -> float:
     """A parameter's value in natural steps from neutral; of a factor its logarithm."""
-    if effect.name in LOGARITHMIC:
+    if signature_of(effect).factors:
         return float(np.log(value))
     p = parameter_of(effect, name)
     return (value - neutral_of(p)) / unit(p)
@@ -106,7 +106,7 @@ def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
 
 def _quantity(effect: Effect, name: str, amount: float, deviation: float) -> tuple[float, float]:
     """Value and standard deviation of a parameter in its unit, from those of its amount; undoes `amount_of`."""
-    if effect.name in LOGARITHMIC:
+    if signature_of(effect).factors:
         value = float(np.exp(amount))
         return value, value * deviation
     p = parameter_of(effect, name)

@@ -1,12 +1,9 @@
 """Sealed sets: flights whose effect is withheld, so that nobody, this package included, can look.
 
-A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose
-effect is drawn, and `sealed.json` with the SHA-256 of the key. The key lies apart, in
-`FOLDER.key.json` beside the folder.
+A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose effect is drawn, and
+`sealed.json` with the SHA-256 of the key (`blind_key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
-import hashlib
-import json
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
@@ -18,9 +15,11 @@ import numpy as np
 
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.sealed.blind_key import OPENED, SEALED, key_of, seal
 from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.logs.files import write, write_bytes
@@ -34,6 +33,8 @@ CAL = 6  #: flights free of effects; chosen
 SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects; chosen
 PAIR_SEVERITIES = (1, 2)  #: places among the severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
+ANEW = 10_000  #: added to the number of a flight for each time that it is drawn anew
+MOST_FLOWN = 10  #: flights flown for each that is to end well; chosen
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
 Say = Callable[[str], None]
@@ -68,26 +69,17 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
     table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
              "severities": {k: list(v) for k, v in severities.items()}, "answers": answers}
-    _seal(out, key, table)
+    seal(out, key, table, CAL)
     return key
-
-
-def _seal(out: Path, key: Path, table: Mapping[str, Any]) -> None:
-    """Write the key, and its SHA-256 into the folder of its set."""
-    content = (json.dumps(table, indent=1) + "\n").encode()
-    write_bytes(content, key, True)
-    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": len(table["answers"]),
-              "calibration_flights": CAL}
-    write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
     """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised."""
-    for path in (out / "sealed.json", key):
+    for path in (out / SEALED, key):
         if path.exists() and not force:
             raise AirTouchError(f"{path}: exists already; use --force to replace it")
     out.mkdir(parents=True, exist_ok=True)
-    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob("opened.json")] if force else []:
+    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob(OPENED)] if force else []:
         old.unlink()
 
 
@@ -99,48 +91,6 @@ def _nats_when_told(study: Study, log: FlightLog, effects: Sequence[Mapping[str,
     return {"nats": log_ratio(Data(study, list(measure.usable([log], study.vehicle, []))), told)}
 
 
-def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
-    """Open the key of a set and score the diagnoses in `answers`: see `blind_score.figures`."""
-    from airtouch.gap.sealed import blind_score
-
-    cases = blind_score.read_answers(answers)
-    table = open_key(folder, hashlib.sha256(json.dumps(
-        [c for c in cases if not c.get("without")], sort_keys=True).encode()).hexdigest(), key)
-    return blind_score.figures(table, cases)
-
-
-def key_of(folder: Path) -> Path:
-    """Where the key of a set lies when nothing else is said: beside the folder."""
-    return folder.resolve().with_name(folder.resolve().name + ".key.json")
-
-
-def open_key(folder: Path, answers_sha256: str, key: Path | None = None) -> dict[str, Any]:
-    """The key, if it is the one that was sealed; the first opening is recorded with the answers' hash.
-
-    Raises AirTouchError for a key that was changed, and when other answers are already scored:
-    who has seen the key cannot answer blindly.
-    """
-    folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
-    try:
-        sealed = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))["key_sha256"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
-                            "`airtouch gap blind make`") from None
-    try:
-        content = key.read_bytes()
-    except OSError as error:
-        raise AirTouchError(f"{key}: the key cannot be read: {error.strerror}; name it with --key") from None
-    if hashlib.sha256(content).hexdigest() != sealed:
-        raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
-    opened = folder / "opened.json"
-    if opened.exists():
-        if json.loads(opened.read_text(encoding="utf-8")).get("answers_sha256") != answers_sha256:
-            raise AirTouchError(f"{opened}: the key was opened for other answers; make a new set to answer again")
-    else:
-        write_bytes((json.dumps({"answers_sha256": answers_sha256}) + "\n").encode(), opened, False)
-    return json.loads(content)
-
-
 def stripped(log: FlightLog) -> FlightLog:
     """A log that says nothing of how it came about."""
     kept: dict[str, Any] = {k: log.meta[k] for k in ("sample_period_s", "acc_frame") if k in log.meta}
@@ -149,7 +99,7 @@ def stripped(log: FlightLog) -> FlightLog:
 
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
     """Flights free of effects that end well, from a number on."""
-    every = flown(SCENARIO, range(first, first + 10 * count), vehicle=vehicle, seed=seed, workers=1)
+    every = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
     return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
 
 
@@ -196,7 +146,7 @@ def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Seve
     """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
     for attempt in range(TRIES):
         active: list[Active] = [KINDS[k].active(severities[k][place] * WEAKER ** attempt, rng) for k, place in drawn]
-        log = next(iter(flown(SCENARIO, [number + 10_000 * attempt], vehicle=vehicle, effects=active, seed=seed,
+        log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=vehicle, effects=active, seed=seed,
                               workers=1)))
         if isinstance(log, FlightLog) and list(measure.usable([stripped(log)], vehicle, [])):
             return stripped(log), [{"name": a.effect.name, "kind": k, "level": place, "values": dict(a.values)}

@@ -3,7 +3,6 @@
 One JSON for each case under OUT/answers: what is there is not done again.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -15,28 +14,30 @@ from typing import Any
 import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import brief
-from airtouch.gap.evidence.data import Study
-from airtouch.gap.sealed import blind
+from airtouch.gap.sealed import blind, blind_score
+from airtouch.gap.sealed.blind import Say
+from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
-Say = Callable[[str], None]
 Mapper = Callable[[Callable, Iterable], Iterable]
 Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
 CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
 Answer = tuple[str, tuple[str, ...], str]  #: name of a flight, effects left out, the diagnosis as JSON
 AHEAD = 4  #: flights sent to each process and not yet back; chosen
+#: fields of a diagnosis that an answer has
+ANSWERED = ("flights", "without", "verdict", "effects", "ranking", "indistinguishable", "gap", "shrink", "control")
 DEATHS = 3  #: of local processes, after which the work goes on; chosen
 #: of a local process, which `_begin` sets once: a task then carries the name of a file, and not the study
 _study: Study | None = None
 
 
 def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
-        kinds: Iterable[str] | None = None, spread: Mapper | None = None, progress: Say = lambda _: None,
-        ) -> dict[str, Any]:
+        spread: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
 
     unknown: how many single flights are diagnosed once more without their effect, all by default. spread: what
@@ -44,20 +45,19 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     one core for each flight, once more for each single one.
     """
     out = Path(out)
-    if not (out / "sealed.json").exists():
-        blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
+    if not (out / SEALED).exists():
+        blind.make(out, flights, seed, progress=progress)
     answers = out / "answers"
-    names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
+    names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
     first = sorted(answers.glob("flight_????.json"))
     # the key is opened for the answers above; effects can be withheld only when they are known
-    sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
-    key = blind.open_key(out, sealed)["answers"]
+    key = open_key(out, answers_sha256([json.loads(p.read_text()) for p in first]))["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, spread)
-    return blind.score(out, answers)
+    return blind_score.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
@@ -126,6 +126,5 @@ def _diagnosed(study: Study, case: Case) -> Answer:
     name, without, log = case
     diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
     diagnosis |= {"flights": [name], "without": list(without)}
-    content = {k: diagnosis[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
-                                     "gap", "shrink", "control")}
+    content = {k: diagnosis[k] for k in ANSWERED}
     return name, without, json.dumps(content) + "\n"

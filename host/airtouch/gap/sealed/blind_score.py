@@ -11,6 +11,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
+from airtouch.gap.sealed.blind_key import answers_sha256, open_key
 from airtouch.gap.sealed.blind_severity import SEEN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.signatures.alike import interchangeable
@@ -39,6 +40,12 @@ class Sheet:
     pairs: Mapping[str, Sequence[str]]
     first: Mapping[str, bool]
     three: Mapping[str, bool]
+
+
+def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
+    """Open the key of a set and score the diagnoses in `answers`: `figures`."""
+    cases = read_answers(answers)
+    return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
 
 
 def read_answers(path: Path) -> list[Case]:

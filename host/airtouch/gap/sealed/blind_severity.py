@@ -3,9 +3,9 @@
 Neyman and Pearson: among tests with a given rate of false alarms, the likelihood ratio of
 "this effect, this strength" against "none" misses least. It knows what the diagnosis has to
 find out. Its ratio is taken here on flights with and without the effect, each a normal
-variable with the mean and deviation seen; the strength is found by halving. A diagnosis
+variable with the mean and deviation seen; the strength is found by bisection. A diagnosis
 that may raise 2 % false alarms asks about every effect at once, so that each test gets its
-share of them only. Deviations of so few flights come out too small by chance, and halving
+share of them only. Deviations of so few flights come out too small by chance, and a search
 finds where they do; so the means alone must be as far apart as such normal variables are.
 """
 
@@ -17,9 +17,10 @@ from scipy.stats import norm
 
 import airtouch.gap.measure as measure
 from airtouch.gap.evidence.clock import clock_gain
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.gap.signatures.signature import CLOCK
@@ -36,57 +37,66 @@ SEEN = 0.5 * FALSE_ALARM ** 2  #: log ratio that chance exceeds in so many fligh
 TRIES = 8  #: flights with and without the effect; chosen
 FEWEST = 3  #: of them that must fly to the end, else the effect is so strong that it is seen anyhow; chosen
 RANGE = 300.0  #: highest plausible strength over the weakest that is tried; chosen
-HALVINGS = 6  #: of the logarithm of that range, so that the strength is known to a tenth; chosen
+BISECTIONS = 6  #: of the logarithm of that range, so that the strength is known to a tenth; chosen
 FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most the highest plausible
 FIRST = 900_000  #: number of the first flight, beyond those of any set
 
 
 def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], seed: int,
-            seen: Callable[[FlightLog], FlightLog]) -> float | None:
+            part_seen: Callable[[FlightLog], FlightLog]) -> float | None:
     """Strength that is just detected on such flights; None where the highest plausible one is not.
 
     without: flights free of effects, other than those that the study was calibrated on.
-    seen: what the diagnosis gets to see of a log.
+    part_seen: what the diagnosis gets to see of a log.
     """
-    rng_seed = [seed, sum(map(ord, kind.effect)), int(1e6 * kind.highest)]
-    if not _seen(kind, kind.highest, study, scenario, without, rng_seed, seen):
+    seeds = [seed, sum(map(ord, kind.effect)), int(1e6 * kind.highest)]
+
+    def detected(strength: float) -> bool:
+        """Whether the test tells flights with the effect at a strength from those without."""
+        return told_apart(*_log_ratios(
+            [kind.active(strength, np.random.default_rng([*seeds, i])) for i in range(TRIES)],
+            study, scenario, without, part_seen))
+
+    if not detected(kind.highest):
         return None
     low, high = np.log(kind.highest / RANGE), np.log(kind.highest)
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        if _seen(kind, float(np.exp(middle)), study, scenario, without, rng_seed, seen):
-            high = middle
-        else:
-            low = middle
+        low, high = (low, middle) if detected(float(np.exp(middle))) else (middle, high)
     return float(np.exp(high))
 
 
-def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Sequence[Data],
-          seed: list[int], seen: Callable[[FlightLog], FlightLog]) -> bool:
-    """Whether the likelihood ratio tells flights with the effect from those without; the arguments are `weakest`'s."""
-    with_effect, without_effect = [], []
-    for i in range(TRIES):
-        active = kind.active(strength, np.random.default_rng([*seed, i]))
+def _log_ratios(actives: Sequence[Active], study: Study, scenario: str, without: Sequence[Data],
+                part_seen: Callable[[FlightLog], FlightLog]) -> tuple[np.ndarray, np.ndarray]:
+    """Log ratios, nats, of a flight with each of these effects and of one without, for those that fly to the end."""
+    yes, no = [], []
+    for i, active in enumerate(actives):
         log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
         if not isinstance(log, FlightLog):
             continue
-        flights = list(measure.usable([seen(log)], study.vehicle, []))
-        if not flights:
-            continue
-        with_effect.append(log_ratio(Data(study, flights), active))
-        without_effect.append(log_ratio(without[i % len(without)], active))
-    if len(with_effect) < FEWEST:
-        return True  # so strong that it cannot fly
-    yes, no = np.array(with_effect), np.array(without_effect)
+        flights = list(measure.usable([part_seen(log)], study.vehicle, []))
+        if flights:
+            yes.append(log_ratio(Data(study, flights), active))
+            no.append(log_ratio(without[i % len(without)], active))
+    return np.array(yes), np.array(no)
+
+
+def told_apart(yes: np.ndarray, no: np.ndarray) -> bool:
+    """Whether log ratios (n,) of flights with an effect, nats, stand over those of as many without.
+
+    True for fewer than FEWEST: an effect so strong that it cannot fly.
+    """
+    if len(yes) < FEWEST:
+        return True
     alarm = no.mean() + FALSE_ALARM * no.std(ddof=1)
-    told_apart = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
-    return bool(told_apart and 0.5 * (yes.mean() - no.mean()) > APART)
+    apart = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
+    return bool(apart and 0.5 * (yes.mean() - no.mean()) > APART)
 
 
 def log_ratio(data: Data, active: Active) -> float:
     """Log likelihood of the flights under an effect with these values over that under none."""
     term = term_of(active)
-    if term.kind == CLOCK:
+    if term.shows_in == CLOCK:
         return clock_gain(data, term)[1]
     whole = whole_of(data)
     return judge(data, whole, (term,)) - judge(data, whole, ())

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
@@ -31,6 +32,8 @@ class Channel:
     high_hz: float = 50.0
 
 
+#: Of the rates only what is slower than any turn that is flown says something of the gyro; commands are judged above
+#: the high-pass of `loop.command_spectra`; both limits and the upper one of commands are chosen.
 CHANNELS = (
     *(Channel(f"force_{a}", "m/s^2") for a in "xyz"),
     *(Channel(f"torque_{a}", "rad/s^2") for a in "xyz"),
@@ -62,27 +65,23 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             controller: ClosedLoop | None = None, seed: int = 0, kept: dict | None = None) -> np.ndarray:
+             controller: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
 
     `active`: effects that the model has. On the ground with motors off the model is a
     vehicle at rest. Without a gyro the angular acceleration is taken as zero, which holds
-    at low frequency (the floor says how low). kept: what a gate puts together, for the next gate of the same
-    effects in this flight.
+    at low frequency (the floor says how low). workspace: has what gates put together, for the next gate
+    of the same effects in this flight.
     """
     gated = [a for a in active if a.gate]
     if not gated:
         return _steady(flight, vehicle, active, controller, seed)
-    always, cache = [a for a in active if not a.gate], {} if kept is None else kept
+    always, cache = [a for a in active if not a.gate], workspace or Workspace()
 
     def of(some: Sequence[Active]) -> np.ndarray:
         """Residual of effects that always act; cached."""
-        key = tuple((a.effect.name, *a.values.values()) for a in some)
-        if key not in cache:
-            if len(cache) >= KEPT:
-                cache.clear()
-            cache[key] = _steady(flight, vehicle, some, controller, seed)
-        return cache[key]
+        return cache.once("residual", tuple((a.effect.name, *a.values.values()) for a in some),
+                          lambda: _steady(flight, vehicle, some, controller, seed), KEPT)
 
     out = of(always).copy()
     for a in gated:

@@ -1,8 +1,15 @@
 """Likelihood of the commands' spectra under a hypothesis: the command view's part of a fit.
 
-A hypothesis multiplies the floor by a ratio. What the floor may be wrong by (few nominal
-flights, other air on other days) is a few smooth shapes of its logarithm, each with a
-prior, fitted anew for every flight and axis.
+The power e of a bin of a block is held against floor x ratio x correction. The ratio is the hypothesis's
+(`ClosedLoop.ratio`). The floor may be wrong (few nominal flights, other air on other days): its logarithm is off by a
+few smooth shapes, each with a normal prior, whose amounts are fitted anew for every flight and axis. Per bin the log
+likelihood is that of Student-like tails of nu = FREEDOM degrees of freedom,
+
+    -log power - (nu + 1) log(1 + e / (nu power)),
+
+each block counted half, as half overlapping blocks hold every sample twice. The correction is integrated out by
+Laplace's method (MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter 27); its cost is what
+that takes from the likelihood at its best amounts.
 """
 
 from collections.abc import Sequence
@@ -11,19 +18,23 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit
 
+from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop import edge_response
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, SHAPES, SPREAD, frequencies, shapes
+from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.channels import COMMAND
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge
 from airtouch.simulation.effects import Active
 
 EDGE_FREEDOM = 6.0  #: degrees of freedom of the Student-like tails of responses at edges; chosen
+SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
+#: nepers of power, standard deviation of the amounts of these shapes: of the level, of the others; chosen
+SPREAD = (0.10, 0.04)
 ROUNDS = 4  #: Newton steps to the floor's correction; chosen
 #: factor on `SPREAD` where random effects shake the loop in ways that no log holds; chosen
 WIDE = 6.0
@@ -50,6 +61,19 @@ class Elements(NamedTuple):
     freedom: np.ndarray
 
 
+class Correction(NamedTuple):
+    """What the floor is off by in one flight, under a hypothesis.
+
+    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together;
+    covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
+    """
+
+    log_power: np.ndarray
+    cost: float
+    weight: float
+    covariance: np.ndarray
+
+
 class CommandView:
     """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes.
 
@@ -70,7 +94,7 @@ class CommandView:
         by_flight = [(i, self._chosen_spectra(flights[i], middle, chosen)) for i, middle, chosen in in_air]
         #: number of each flight that has blocks, and their spectra (blocks, bins, AXES)
         self.flights, self.spectra = [i for i, s in by_flight if len(s)], [s for _, s in by_flight if len(s)]
-        self.sizes = [np.abs(s) ** 2 for s in self.spectra]
+        self.powers = [np.abs(s) ** 2 for s in self.spectra]
         self.edges = [(flights[i], i, e) for i, middle, chosen in in_air for e in self._chosen_edges(
             flights[i], middle, chosen)]
         self.values, self.floor, self.channel, self.frequency, self.flight, self.freedom = _joined([
@@ -127,12 +151,12 @@ class CommandView:
 
     def moved(self, active: Sequence[Active]) -> np.ndarray:
         """Values (elements,) less what effects add to the responses at edges."""
-        if not self.edges or not any(a.effect.name in edge_response.SHOWN for a in active):
+        if not self.edges or not any(signature_of(a.effect).at_edges for a in active):
             return self.values
         out = self.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT
         for flight, _, e in self.edges:
-            out[at:at + edge_response.COUNT] -= edge_response.expected(self._edge_floor, flight, e, active)
+            out[at:at + edge_response.COUNT] -= edge_effects.expected(self._edge_floor, flight, e, active)
             at += edge_response.COUNT
         return out
 
@@ -149,10 +173,10 @@ class CommandView:
     def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
         """`power` where that of the commands is a multiple (bins, AXES) of nominal flights'."""
         powers, cost = [], 0.0
-        for s in self.sizes:
-            correction, own_cost, _, _ = self._shift(s, ratio, wide)
-            cost += own_cost
-            powers.append(np.broadcast_to(self.loop.floor * ratio * np.exp(correction), s.shape).ravel())
+        for s in self.powers:
+            correction = self._correction(s, ratio, wide)
+            cost += correction.cost
+            powers.append(np.broadcast_to(self.loop.floor * ratio * np.exp(correction.log_power), s.shape).ravel())
         powers.append(np.ones(len(self.edges) * edge_response.COUNT))
         return np.concatenate(powers), cost
 
@@ -175,42 +199,49 @@ class CommandView:
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
             up, down = (self._level(ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
-        for s in self.sizes:
-            _, _, count, covariance = self._shift(s, ratio, wide)
-            for a in range(len(AXES)):
+        for s in self.powers:
+            correction = self._correction(s, ratio, wide)
+            for a in range(len(AXES)):  # what the shapes can take up tells nothing
                 j = rise[:, :, a]
-                cross = count * j @ self.shapes.T
-                information += count * j @ j.T - cross @ covariance @ cross.T
+                cross = correction.weight * j @ self.shapes.T
+                information += correction.weight * j @ j.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
     def _level(self, ratio: np.ndarray, wide: bool) -> float:
         """Log likelihood of the spectra where power is expected to be a multiple of the floor, less what that costs."""
         total = 0.0
-        for s in self.sizes:
-            correction, cost, _, _ = self._shift(s, ratio, wide)
-            power = self.loop.floor * ratio * np.exp(correction)
+        for s in self.powers:
+            correction = self._correction(s, ratio, wide)
+            power = self.loop.floor * ratio * np.exp(correction.log_power)
             tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
-            total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + cost
+            total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + correction.cost
         return total
 
-    def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, and covariance of the shapes.
+    def _correction(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> Correction:
+        """The floor's likeliest correction for the power s (blocks, bins, AXES) of a flight, by Newton's method.
 
-        s: power (blocks, bins, axes) of a flight.
+        Its information is that of exponential laws: 1 for each bin of a block, times the block's weight.
         """
-        e0 = s / (self.loop.floor * ratio)
+        over_floor = s / (self.loop.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
-        count = OVERLAP_WEIGHT * len(s)
-        normal = count * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
+        weight = OVERLAP_WEIGHT * len(s)
+        normal = weight * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
         covariance = np.linalg.inv(normal)
         amount = np.zeros((SHAPES, len(AXES)))
         for _ in range(ROUNDS):
-            push = OVERLAP_WEIGHT * _push(e0, np.exp(-self.shapes.T @ amount))
+            push = OVERLAP_WEIGHT * _push(over_floor, np.exp(-self.shapes.T @ amount))
             amount += covariance @ (self.shapes @ push - amount / spread[:, None] ** 2)
         cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
         cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
-        return self.shapes.T @ amount, cost, count, covariance
+        return Correction(self.shapes.T @ amount, cost, weight, covariance)
+
+
+def shapes() -> np.ndarray:
+    """Smooth shapes (SHAPES, bins) over the logarithm of frequency: level, slope, slow waves."""
+    x = np.log(frequencies())
+    x = (x - x[0]) / (x[-1] - x[0])
+    return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])
 
 
 @njit(float64[:, ::1](float64[:, :, ::1], float64[:, ::1]), cache=True, error_model="numpy")

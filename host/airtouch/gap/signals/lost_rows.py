@@ -12,10 +12,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, blocks, squared
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -30,37 +31,42 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     commands.
     Zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight.
     """
-    total = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT))
+    total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))
     if not flight.lost.any() or not len(first):
         return total
-    n, count = len(flight), np.zeros(len(first))
-    bad = (flight.phase == GROUND) | ~(flight.usable | flight.bridged)
-    before = np.cumsum(np.concatenate([[0], bad]))
     known, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
     for k in range(1, SHIFTS + 1):
-        offset = k * n // (SHIFTS + 1)
+        offset = k * len(flight) // (SHIFTS + 1)
         poorer = _without(flight, np.roll(flight.lost, offset))
         change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - known)
-        turned = angular_acceleration(poorer) - turning
-        begin = (first + offset) % n
-        room = begin + LENGTH[AIR] <= n
-        room[room] = before[begin[room] + LENGTH[AIR]] == before[begin[room]]
+        begin = (first + offset) % len(flight)
+        room = _in_flight(flight, begin)
         spectrum = blocks(change, begin[room], AIR)
         if response is not None and quiet is not None and flight.rates is not None and room.any():
-            torque = TorqueSpectra(blocks(turned, begin[room], AIR), spectrum[:, :, TORQUE])
-            spectrum = response.with_residual(spectrum, quiet[room], torque)
+            turned = blocks(angular_acceleration(poorer) - turning, begin[room], AIR)
+            spectrum = response.with_residual(spectrum, quiet[room], TorqueSpectra(turned, spectrum[:, :, TORQUE]))
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], SMOOTH, axis=1, mode="nearest")
 
 
-def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], kept: dict | None = None,
-                     ) -> np.ndarray:
+def _in_flight(flight: Flight, begin: np.ndarray) -> np.ndarray:
+    """Whether blocks that begin at samples (blocks,) end before the flight does and hold usable samples only, bool."""
+    bad = (flight.phase == GROUND) | ~(flight.usable | flight.bridged)
+    before = np.cumsum(np.concatenate([[0], bad]))
+    room = begin + LENGTH[AIR] <= len(flight)
+    room[room] = before[begin[room] + LENGTH[AIR]] == before[begin[room]]
+    return room
+
+
+def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
+                     workspace: Workspace | None = None) -> np.ndarray:
     """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor.
 
-    kept: see `residual`.
+    workspace: see `residual`.
     """
-    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active, kept=kept)))
+    known = residual(flight, vehicle, active, workspace=workspace)
+    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, known))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

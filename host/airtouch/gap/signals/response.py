@@ -1,14 +1,16 @@
-"""How the measured angular acceleration follows the logged commands in nominal flights.
+"""How the measured angular acceleration y follows w, what the model makes of the logged commands, in nominal flights.
 
-A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the
-vehicle, and the kicks of the outer loop's steps, which did, are mostly not in it. Of the torque
-that a model makes of logged commands only a share, by frequency and axis, is then to be
-expected in the gyro: E[y | w] = q w (Wiener; errors in variables). Taken as q = 1, every
-hypothesis that weakens the response (more inertia, slower motors) would fit.
-Flights declared nominal give q = S_yw / S_ww; a hypothesis that changes the response or
-the loop scales it as the loop model says, an outside torque acts past the loop that fights it.
-Blocks in which a set-point stepped follow another law (the kick is coherent, the aliases
-are not) and leave another floor.
+A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the vehicle,
+and the kicks of the outer loop's steps, which did, are mostly not in it. So of w only a part is to be expected in y, by
+frequency and axis (linear regression with errors in w: Fuller, Measurement Error Models, 1987, chapter 1):
+
+    E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal (`Law`)
+    residual = y - q c w + what effects add                      c: change of q by effects, `Law.ratio`
+
+Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
+comes through the commands, of which a part q is seen too, or as a torque from outside, which acts past the loop that
+fights it (`loop.disturbed`). Blocks in which a set-point stepped follow another law (the kick is coherent, the aliases
+are not) and leave another floor, to which their residual is weighted.
 """
 
 from collections.abc import Sequence
@@ -65,12 +67,12 @@ class TorqueSpectra:
 
 @dataclass(frozen=True)
 class Law:
-    """How the measured torque follows the modelled one in blocks of one kind, (bins, 3) each.
+    """How the measured torque follows the modelled one in blocks of one kind, quiet or stepped; (bins, 3) each.
 
-    transfer: measured over modelled, complex; coherent: the same as far as it is no noise of the gyro; bounded: that
-    for what a hypothesis changes of the model, never above 1 in size; disturbance: what remains of a torque that no
-    command makes; random: power that remains of a random one; weight: floor of quiet blocks over that of these, rms;
-    power: of the modelled torque.
+    transfer: q, complex; coherent: q as far as it is no noise of the gyro in both: 0 up to a coherence of NOISE, q from
+    twice that on; bounded: that for what a hypothesis changes of the model, never above 1 in size; disturbance: what
+    remains of a torque from outside, complex; random: power that remains of a random one; weight: floor of quiet blocks
+    over that of these, rms; power: S_ww.
     """
 
     transfer: np.ndarray
@@ -84,22 +86,23 @@ class Law:
     def ratio(self, change: Change, kind: int) -> np.ndarray:
         """Ratio (bins, 3) of `coherent` with effects that change the loop to that without. kind: 0 quiet, 1 stepped.
 
-        Of the commands a share follows the loop model, the rest turn the vehicle as they say; the share is the one that
-        makes `transfer` of both, or all where the two hardly differ. In yaw, mostly noise of the gyro, motors count
-        where it is none.
+        Of the commands a share a follows the loop model, the rest turn the vehicle as they say: q = a before + 1 - a,
+        with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, or 1 where model
+        and commands hardly differ. In yaw, mostly noise of the gyro, motors count where it is none.
         """
         before, after = change.before[kind], change.motors * change.share[kind] * change.before[kind]
         away = before - 1.0
-        follows = ((self.transfer * change.logged - 1.0) * away.conj()).real
-        modelled = np.clip((follows + SHARE_DOUBT ** 2) / (np.abs(away) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
-        out = (modelled * after + (1.0 - modelled) * change.motors) / (modelled * before + 1.0 - modelled)
+        along = ((self.transfer * change.logged - 1.0) * away.conj()).real
+        a = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(away) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
+        out = (a * after + (1.0 - a) * change.motors) / (a * before + 1.0 - a)
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.coherent[:, 2]), 1.0) ** 2
         return out
 
     def residual(self, torque: TorqueSpectra, change: Change | None, kind: int) -> np.ndarray:
         """Weighted residual (blocks, bins, 3) of blocks of this law's kind. change, kind: see `ratio`."""
-        ratio = 1.0 if change is None else self.ratio(change, kind)
-        residual = torque.measured - self.coherent * ratio * (torque.measured - torque.residual)
+        c = 1.0 if change is None else self.ratio(change, kind)
+        modelled = torque.measured - torque.residual
+        residual = torque.measured - self.coherent * c * modelled
         for share, added in ((self.bounded, torque.by_command), (self.disturbance, torque.disturbance)):
             if added is not None:
                 residual = residual + share * added
@@ -177,17 +180,26 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
     w = y - np.concatenate(residuals)
     if len(y) < FEWEST:
         return None
-    modelled, power = [m - r for m, r in zip(measured, residuals, strict=True)], np.abs(w) ** 2
-    quiet = np.ones((len(w), 3), bool)
-    for _ in range(ROUNDS):  # the nominal power is that of blocks without a step
-        nominal = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0) / np.log(2.0)
-        calm = np.median([np.quantile(_sizes(m, nominal), CALM, axis=0) for m in modelled if len(m)], axis=0)
-        quiet = np.concatenate([_quiet(m, nominal, calm) for m in modelled])
+    nominal, calm, quiet = _quiet_blocks([m - r for m, r in zip(measured, residuals, strict=True)], np.abs(w) ** 2)
     steady, floor = _law(y, w, quiet, loop, None)
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
         stepped, _ = _law(y, w, ~quiet, loop, floor)
     return Response(nominal=_smooth(nominal), calm=calm, steady=steady, stepped=stepped)
+
+
+def _quiet_blocks(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`Response.nominal` (not smoothed), `Response.calm`, and the blocks without a step, bool (blocks, 3).
+
+    modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the nominal power
+    is that of blocks without a step, and a step is what is stronger.
+    """
+    quiet = np.ones((len(power), 3), bool)
+    for _ in range(ROUNDS):
+        nominal = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0) / np.log(2.0)  # mean of an exponential
+        calm = np.median([np.quantile(_sizes(m, nominal), CALM, axis=0) for m in modelled if len(m)], axis=0)
+        quiet = np.concatenate([_quiet(m, nominal, calm) for m in modelled])
+    return nominal, calm, quiet
 
 
 def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
@@ -197,20 +209,24 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floo
     y, w: measured and modelled torque of all blocks. floor: to which the law weights them; None for their own.
     """
     mask, count = chosen[:, None], np.maximum(chosen.sum(axis=0), 1)
-    power = (np.abs(w) ** 2 * mask).sum(axis=0) / count
-    share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, TINY)
-    coherence = _smooth(np.abs(share) ** 2 * power / np.maximum((np.abs(y) ** 2 * mask).sum(axis=0) / count, TINY))
-    transfer = _smooth(share.real) + 1j * _smooth(share.imag)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        """Mean (bins, 3) over the chosen blocks."""
+        return (values * mask).sum(axis=0) / count
+
+    power = mean(np.abs(w) ** 2)
+    q = mean(y * w.conj()) / np.maximum(power, TINY)
+    coherence = _smooth(np.abs(q) ** 2 * power / np.maximum(mean(np.abs(y) ** 2), TINY))
+    transfer = _smooth(q.real) + 1j * _smooth(q.imag)
     coherent = transfer * np.clip((coherence - NOISE) / NOISE, 0.0, 1.0)
-    own = np.exp(_smooth(np.log(np.maximum((np.abs(y - coherent * w) ** 2 * mask).sum(axis=0) / count, TINY))))
+    own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), TINY))))
     enough = chosen.sum(axis=0) >= FEWEST
-    weight = np.ones(own.shape) if floor is None else np.where(enough, np.sqrt(floor / own), np.nan)
-    answer = coherent * loop.commanded
+    weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
+    answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
     disturbance = loop.measured - answer
-    random = np.abs(disturbance) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2
-    bounded = coherent / np.maximum(np.abs(coherent), 1.0)
-    return Law(transfer=transfer, coherent=coherent, bounded=bounded, disturbance=disturbance, random=random,
-               weight=weight, power=_smooth(power)), own
+    return Law(transfer=transfer, coherent=coherent, bounded=coherent / np.maximum(np.abs(coherent), 1.0),
+               disturbance=disturbance, random=np.abs(disturbance) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2,
+               weight=weight, power=_smooth(power)), own_floor
 
 
 def _quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.ndarray:

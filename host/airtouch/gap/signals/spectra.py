@@ -1,8 +1,8 @@
 """Short-time spectra of the gap, and the floor that they are held against.
 
-Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping. A bin's
-value over the floor's standard deviation is one standard normal number (real and
-imaginary part each) when nothing is wrong.
+Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping (Welch 1967). A bin's value over the
+floor's standard deviation is one standard normal number (real and imaginary part each) when nothing is wrong. The file
+reads: blocks of a flight, their spectra, which bins count, the floor of nominal flights.
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,7 @@ LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean 
 #: band of `hardness.BANDS_HZ`; chosen.
 TRIM_HZ = 0.6
 FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
+LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
 LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floor over frequency; chosen
@@ -87,9 +88,11 @@ def judged(regime: str) -> np.ndarray:
 class Floor:
     """Power of the residuals of nominal flights, against which a gap is held.
 
-    power[regime] (bins, COUNT): unit^2/Hz, from `blocks` blocks; offset (COUNT,): standard deviation between flights
-    of a channel's mean in the air;
-    clock_s: rms of the logged times around regular ones; lost: share of lost samples.
+    power: by regime (bins, COUNT), unit^2/Hz, from `blocks` blocks of it; offset (COUNT,): standard deviation between
+    flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,): that of it which the power in the
+    lowest bin does not give; clock_s: rms of the logged times around regular ones, s; lost: share of lost samples;
+    slopes: of the power in the air with how hard the vehicle is flown, None for too few flights; least (bins, COUNT):
+    power in the air of the sensors alone.
     """
 
     power: dict[str, np.ndarray]
@@ -97,9 +100,8 @@ class Floor:
     offset: np.ndarray
     clock_s: float
     lost: float
-    slopes: Slopes | None = None  #: with how hard it is flown, of the power in the air
-    least: np.ndarray | float = 0.0  #: (bins, COUNT) in the air, of the sensors alone
-    #: (COUNT,) of `offset`, what the power in the lowest bin does not give
+    slopes: Slopes | None = None
+    least: np.ndarray | float = 0.0
     offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
 
     def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
@@ -114,21 +116,20 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
              spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray, bridging: Sequence[np.ndarray]) -> Floor:
     """The floor of flights declared nominal, from what the calibrated model leaves of them.
 
-    residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first samples and the spectra;
-    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
-    its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT) that lost rows add in the
-    air; it is taken off, as each flight has its own, but for what is left by chance.
+    flights: one or more. residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first
+    samples and the spectra; least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz
+    (angular acceleration: of its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT)
+    that lost rows add in the air; it is taken off, as each flight has its own, but for what is left by chance.
     """
-    powers = {r: np.abs(np.concatenate([s[r] for s in spectra])) ** 2 if spectra else np.zeros((0, 1, COUNT))
-              for r in (AIR, REST)}
+    powers = {r: np.abs(np.concatenate([s[r] for s in spectra])) ** 2 for r in (AIR, REST)}
     in_air, slopes = _power_in_air(flights, first, powers[AIR], bridging)
     power = {AIR: _floor_power(in_air, sensor_power(least, AIR)),
              REST: _floor_power(powers[REST], sensor_power(least, REST))}
-    offset, own = _between(flights, residuals, power[AIR][0])
-    clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
-    lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
-    return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, clock_s=float(clock),
-                 lost=lost, slopes=slopes, least=LEAST_FLOOR * sensor_power(least, AIR), offset_beyond=own)
+    offset, beyond = _between(flights, residuals, power[AIR][0])
+    return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
+                 clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
+                 lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
+                 slopes=slopes, least=LEAST_FLOOR * sensor_power(least, AIR))
 
 
 def _power_in_air(flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]], power: np.ndarray,
@@ -173,9 +174,14 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
     """PSD (bins, COUNT) of the sensors' white noise; differences of the gyro rise with frequency."""
     f = frequencies(regime)
     white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
-    shape = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2
-    white[:, TORQUE] = shape[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
+    differences = difference_power(np.maximum(f, LEAKED * f[1]))
+    white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
     return white
+
+
+def difference_power(f: np.ndarray) -> np.ndarray:
+    """PSD (bins,) at frequencies f (Hz) of the differences of two samples of what is white, over its own PSD."""
+    return 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:

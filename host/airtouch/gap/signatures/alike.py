@@ -1,23 +1,64 @@
-"""Names of effects that stand for one thing in the logs at hand."""
+"""Names of effects that logs do not tell apart, and what would: for one thing in any log at hand, or often confused."""
 
-#: names for one thing in the logs at hand, with what would tell them apart
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class Confusion(NamedTuple):
+    """Effects that logs confuse, what would tell them apart, and the mission that shows it; "" where none does."""
+
+    effects: frozenset[str]
+    remedy: str
+    mission: str = ""
+
+
+#: names for one thing in the logs at hand
 ALIKE = (
-    (frozenset({"mass", "thrust_coefficient"}),
-     "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
-     "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
+    Confusion(frozenset({"mass", "thrust_coefficient"}),
+              "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
+              "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
     # one push against the speed; below 0.5 m/s flapping's moment (lever 15 mm) drowns in the floor
-    (frozenset({"rotor_drag", "blade_flapping"}),
-     "fly at 1.5 m/s or more, with climbs and drops at speed: flapping's push grows with thrust, rotor drag "
-     "with rotor speed, and only flapping pitches the vehicle, if the drag acts at the centre of mass"),
+    Confusion(frozenset({"rotor_drag", "blade_flapping"}),
+              "fly at 1.5 m/s or more, with climbs and drops at speed: flapping's push grows with thrust, rotor drag "
+              "with rotor speed, and only flapping pitches the vehicle, if the drag acts at the centre of mass"),
 )
+#: effects that logs like these confuse at times
+CONFUSED = (
+    Confusion(frozenset({"motor_lag", "actuator_delay"}),
+              "command steps in hover at two step sizes, or log rpm: a lag rounds the response, a delay shifts it"),
+    Confusion(frozenset({"motor_lag", "inertia"}),
+              "log rpm, or add quick yaw turns: inertia scales every response alike"),
+    Confusion(frozenset({"wind", "imu_bias"}),
+              "stand still with motors off for five seconds, and turn the vehicle by 90 degrees in hover: wind turns "
+              "in body axes and is gone on the ground, a bias is neither"),
+    Confusion(frozenset({"weak_motor", "com_offset"}),
+              "add yaw turns: a weak rotor leaves yaw torque, an offset does not"),
+    Confusion(frozenset({"rotor_drag", "blade_flapping"}),
+              "fly faster than 1 m/s: flapping tilts the vehicle as well"),
+    Confusion(frozenset({"sensor_latency", "controller_gain"}),
+              "log the attitude set-points, or fly steps of attitude: a sweep has them where it starts and stops",
+              "there-and-back"),
+    Confusion(frozenset({"battery_sag", "thrust_coefficient"}), "log the battery voltage over a whole flight", "hover"),
+)
+#: what helps where nothing better is known
+REMEDY, MISSION = "repeat the flight with other speeds and heights", "there-and-back"
 
 
-def names_alike(name: str) -> tuple[frozenset[str], str] | None:
-    """The set of effects that these logs do not separate from this one, and what would; None without one."""
-    return next(((group, advice) for group, advice in ALIKE if name in group), None)
+def names_alike(name: str) -> Confusion | None:
+    """The effects that these logs do not separate from this one, and what would; None without any."""
+    return next((confusion for confusion in ALIKE if name in confusion.effects), None)
 
 
 def interchangeable(one: str, other: str) -> bool:
     """Whether two names stand for one thing in these logs."""
-    group = names_alike(one)
-    return one == other or (group is not None and other in group[0])
+    alike = names_alike(one)
+    return one == other or (alike is not None and other in alike.effects)
+
+
+def confusion_among(names: Sequence[str]) -> Confusion:
+    """What tells effects from one another, or first those of them that are names of one thing, as the first is."""
+    first = names_alike(names[0])
+    if first is not None and first.effects <= frozenset(names):
+        return first
+    known = next((c for c in CONFUSED if c.effects <= frozenset(names)), None)
+    return Confusion(frozenset(names), *(known[1:] if known else (REMEDY, MISSION)))

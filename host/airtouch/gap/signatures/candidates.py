@@ -5,27 +5,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.result import Found
-from airtouch.gap.signatures.signature import COMPANIONS, GATED, SHAKES, SIGNATURES, SPECTRUM, signature_of
-from airtouch.gap.signatures.term import Term
+from airtouch.gap.result import NamedEffect
+from airtouch.gap.signatures.signature import ALWAYS_RANDOM, COMPANIONS, GATED, SIGNATURES, SPECTRUM, signature_of
+from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
 
-Variant = tuple[Term, ...]  #: the terms of one hypothesis: the effect, its random part, its companion
 
-
-def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
+def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of every effect of the registry but those of `without`, by name and in its order.
 
     Moving air acts through the rotors' drag, and drag that acts on the air's velocity acts
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
     """
     without = set(without)
-    out: dict[str, list[Variant]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    out: dict[str, list[Terms]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
     for name, signature in SIGNATURES.items():
         if name in out and signature.steady is not None:
-            random: list[Variant] = [(*v, random_part_of(name)) for v in out[name]]
-            out[name] = random if name in SHAKES else out[name] + random
+            random: list[Terms] = [(*v, random_part_of(name)) for v in out[name]]
+            out[name] = random if name in ALWAYS_RANDOM else out[name] + random
     for name, companion in COMPANIONS.items():
         if name in out and companion not in without:
             beside = [replace(t, companion=True) for t in terms(companion)]
@@ -33,7 +31,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
     return out
 
 
-def gated(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
+def gated_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
     without, out = set(without), {}
     for name in GATED:
@@ -46,13 +44,13 @@ def gated(without: Iterable[str] = ()) -> dict[str, list[Variant]]:
 def terms(name: str) -> list[Term]:
     """The hypotheses of one effect, one for each variant, with all free parameters at neutral."""
     effect = get(name)
-    signature, kind = signature_of(effect), kind_of(effect)
+    signature, where = signature_of(effect), shows_in(effect)
     neutral = effect.scaled(effect.values(), 0.0) | dict(signature.steady or {})
-    together = [Term(effect, kind, signature.free, neutral | dict(v)) for v in signature.variants]
-    return together + ([Term(effect, kind, (p,), neutral) for p in signature.free] if signature.alone_too else [])
+    together = [Term(effect, where, signature.free, neutral | dict(v)) for v in signature.variants]
+    return together + ([Term(effect, where, (p,), neutral) for p in signature.free] if signature.alone_too else [])
 
 
-def kind_of(effect: Effect) -> str:
+def shows_in(effect: Effect) -> str:
     """How an effect shows: as its record says; without one, in the spectrum where its force is random."""
     if effect.name not in SIGNATURES and _random(effect):
         return SPECTRUM
@@ -67,21 +65,21 @@ def random_part_of(name: str) -> Term:
 
 
 def strength_term(terms: Sequence[Term]) -> Term:
-    """The term whose strength is that of the effect: the random part of an effect that SHAKES, else the first."""
-    return terms[-1] if terms[0].name in SHAKES else terms[0]
+    """The term whose strength is that of the effect: the random part of one that is ALWAYS_RANDOM, else the first."""
+    return terms[-1] if terms[0].name in ALWAYS_RANDOM else terms[0]
 
 
 def random_of(terms: Sequence[Term]) -> list[Term]:
     """The terms that add power, whose phase is not known."""
-    return [t for t in terms if t.kind == SPECTRUM]
+    return [t for t in terms if t.shows_in == SPECTRUM]
 
 
 def is_random(name: str) -> bool:
     """Whether an effect's strength is that of a random force, which no strength below 0 has."""
-    return name in SHAKES or name in EFFECTS and kind_of(get(name)) == SPECTRUM
+    return name in ALWAYS_RANDOM or name in EFFECTS and shows_in(get(name)) == SPECTRUM
 
 
-def term_of(effect: Found) -> Term:
+def term_of(effect: NamedEffect) -> Term:
     """The term of an effect that a diagnosis named, with its values: its own variant, or the nearest."""
     values = {k: q.value for k, q in effect.parameters.items()}
 

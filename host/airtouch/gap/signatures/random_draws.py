@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.signatures.signature import free_of
+from airtouch.gap.signatures.signature import SIGNATURES, free_of
 from airtouch.gap.signatures.term import neutral_of, unit
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active, Effect
@@ -51,6 +51,12 @@ def _times(parameter: str, signed: bool = True) -> Callable[[float, np.random.Ge
     return lambda s, rng: {parameter: (1.0 + s) ** (rng.choice([-1.0, 1.0]) if signed else 1.0)}
 
 
+def _in_classes(effect: str, parameter: str) -> Callable[[float, np.random.Generator], Values]:
+    """A parameter equal to the strength, in one of the effect's classes (`Signature.class_by`) by chance."""
+    signature = SIGNATURES[effect]
+    return lambda s, rng: {parameter: s, signature.class_by: float(rng.choice(signature.class_values))}
+
+
 def _around(s: float, rng: np.random.Generator) -> Values:
     """A horizontal vector of length s and random direction."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
@@ -70,17 +76,17 @@ KINDS: dict[str, Kind] = {
     "ground_effect": Kind("ground_effect", 2.0, lambda s, rng: {"strength": s, "turbulence": 0.3}),
     "rotor_drag": Kind("rotor_drag", 0.06, _one("horizontal")),
     "wind": Kind("wind", 0.8, _around),
-    "gust": Kind("gust", 1.0, lambda s, rng: {"rms": s, "length": float(rng.choice([0.2, 0.5, 1.5]))}),
+    "gust": Kind("gust", 1.0, _in_classes("gust", "rms")),
     "blade_flapping": Kind("blade_flapping", 0.1, _one("tilt")),
     "motor_lag": Kind("motor_lag", 1.0, _times("factor")),
-    "motor_noise": Kind("motor_noise", 0.1, lambda s, rng: {"rms": s, "time": float(rng.choice([0.005, 0.02, 0.1]))}),
+    "motor_noise": Kind("motor_noise", 0.1, _in_classes("motor_noise", "rms")),
     "thrust_coefficient": Kind("thrust_coefficient", 0.2, _one("loss", signed=True)),
-    "weak_motor": Kind("weak_motor", 0.3, lambda s, rng: {"rotor": float(rng.integers(1, 5)), "thrust_loss": s}),
+    "weak_motor": Kind("weak_motor", 0.3, _in_classes("weak_motor", "thrust_loss")),
     "battery_sag": Kind("battery_sag", 1.5, lambda s, rng: {"strength": s, "charge": float(rng.uniform(0.6, 0.95))}),
     "mass": Kind("mass", 0.25, _one("fraction")),
     "com_offset": Kind("com_offset", 0.006, _around),
     "inertia": Kind("inertia", 1.0, _one("fraction")),
-    "slung_load": Kind("slung_load", 0.008, lambda s, rng: {"load": s, "length": float(rng.choice([0.1, 0.2, 0.4]))}),
+    "slung_load": Kind("slung_load", 0.008, _in_classes("slung_load", "load")),
     "imu_bias": Kind("imu_bias", 3.0, _bias),
     "imu_noise": Kind("imu_noise", 4.0, _times("factor", signed=False)),
     "vibration": Kind("vibration", 3.0, _one("amplitude")),
@@ -95,8 +101,6 @@ KINDS: dict[str, Kind] = {
        for loop in ("rate", "attitude", "position", "height")},
 }
 STEPS = 3.0  #: natural steps of a parameter up to which an effect that KINDS lacks is drawn; chosen
-#: parameters of a kind that shape it, not scale it: each of the values that the diagnosis tries is a class of its own
-SHAPED = {"weak_motor": "rotor", "gust": "length", "motor_noise": "time", "slung_load": "length"}
 
 
 def kinds_of(effect: Effect) -> dict[str, Kind]:

@@ -8,8 +8,8 @@ from scipy.special import poch
 
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.nominal_scatter import LEAST_SPREAD, Apparent, Scatter, table
 from airtouch.gap.signatures.posterior import LEAST, moments, standard_deviation, updated
+from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, table
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
 RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen
@@ -22,12 +22,12 @@ OWN_TRIM = "simulated, trim of its own"  #: of those whose rotors and battery ar
 Pair = tuple[float, float]  #: mean and standard deviation
 
 
-def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "",
+def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, vehicle: str = "",
                one_trim: bool | None = None) -> Scatter:
     """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
 
-    baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
-    by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
+    baseline: flights compared with a vehicle that was calibrated on all of them. Their scatter is widened
+    by (n + 1) / (n - 1): each was among those that it is compared with, another flight will not be.
     recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
     that was measured on the vehicle of this name leaves no room for other vehicles'. one_trim: whether the baseline's
     trims are alike, which tells the classes of simulated flights apart; None: nobody knows. One flight or none says
@@ -51,10 +51,10 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=middle, exact=simulated)
 
 
-def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = None) -> Scatter:
-    """The scatter of flights each of which was held against others than itself.
+def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[ApparentStrengths] | None = None) -> Scatter:
+    """The scatter of flights each of which was compared with others than itself.
 
-    alike: those of them that give the rates and the degrees of freedom, which were held against flights of their own
+    alike: those of them that give the rates and the degrees of freedom, which were compared with flights of their own
     day and condition; all by default.
     """
     alike = flights if alike is None else alike
@@ -86,7 +86,7 @@ def _possible_classes(recorded: bool, vehicle: str, one_trim: bool | None) -> di
     return of_vehicle if vehicle and of_vehicle else classes
 
 
-def _updated_middle(own: Scatter, known: Sequence[Apparent], worth: float) -> dict[str, np.ndarray]:
+def _updated_middle(own: Scatter, known: Sequence[ApparentStrengths], worth: float) -> dict[str, np.ndarray]:
     """Mean strength (k,) of each random effect: of the class, which counts as `worth` flights, and of the baseline."""
     middle = {}
     for name in own.rms:
@@ -97,7 +97,7 @@ def _updated_middle(own: Scatter, known: Sequence[Apparent], worth: float) -> di
     return middle
 
 
-def _updated_rms(own: Scatter, known: Sequence[Apparent], middle: Mapping[str, np.ndarray], widening: float,
+def _updated_rms(own: Scatter, known: Sequence[ApparentStrengths], middle: Mapping[str, np.ndarray], widening: float,
                  worth: float, least: float) -> dict[str, np.ndarray]:
     """Scatter (k,) of each effect's strength about its middle, by the baseline's flights, at least `least`.
 
@@ -120,19 +120,19 @@ def _updated_rms(own: Scatter, known: Sequence[Apparent], middle: Mapping[str, n
 def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Scatter by effect, in which names of one thing in the logs, as mass and thrust, have the wider of theirs."""
     out = dict(rms)
-    for group, _ in ALIKE:
-        same = [out[n] for n in group if n in out]
+    for confusion in ALIKE:
+        same = [out[n] for n in confusion.effects if n in out]
         if len({len(x) for x in same}) == 1:
-            out |= {n: np.max(same, axis=0) for n in group if n in out}
+            out |= {n: np.max(same, axis=0) for n in confusion.effects if n in out}
     return out
 
 
-def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
+def _column(flights: Sequence[ApparentStrengths], name: str, what: str, k: int) -> np.ndarray:
     """Parameter k of an effect, "strengths" or "errors", in every flight that has it (n,)."""
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
 
 
-def _log_likelihood(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
+def _log_likelihood(own: Scatter, baseline: Sequence[ApparentStrengths], wide: float) -> float:
     """Log likelihood of the baseline's strengths, rates and sizes in a class; wide: factor of their variance."""
     total, nu = 0.0, own.freedom
     for flight in baseline:

@@ -12,7 +12,13 @@ from airtouch.simulation.effects import Effect
 
 #: how an effect shows: in the mean of the gap, in its spectrum, in the logged times alone
 MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
+#: closed forms of a random effect's spectrum (`evidence.random_effects`): white noise of the IMU, noise of each rotor's
+#: thrust, lines of the rotors
+IMU_NOISE, THRUST_NOISE, ROTOR_LINES = "white noise of the IMU", "noise of the thrust", "lines of the rotors"
 OVERHEAD = "downwash"  #: the effect of another vehicle overhead
+#: effects of which the first that is not the answer is fitted alike, as a deliberately wrong one; chosen, common ones
+#: of force, torque and sensors
+WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
 class Shape(NamedTuple):
@@ -34,21 +40,33 @@ class Bursts(NamedTuple):
 
 @dataclass(frozen=True)
 class Signature:
-    """How one effect is fitted, and how it shows; values in the units of the effect's parameters.
+    """How one effect is fitted, and where it shows; values in the units of the effect's parameters.
 
+    How it is fitted:
     free: parameters that a fit frees; the others have the same effect in most logs.
-    shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
     variants: values of parameters that are tried one by one.
     free_later: parameters that are freed once a fit of the others is close.
     shape: a shape that all the data choose in the end; None for an effect without.
     alone_too: whether each free parameter is also tried alone.
-    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; none
+    factors: whether its parameters are factors, neutral at 1, of which the logarithm is known.
+    own_scatter: relative standard deviation of its strength from flight to flight that no likelihood shows.
+
+    Where it shows:
+    shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
+    commands_only: whether it changes what the controller commands and nothing of what the logged commands lead to.
+    at_edges: whether it shows in what a flight does at edges.
+    scales_torque: whether it only multiplies torque, and would shrink any trim.
+    spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
+    bursts: for what is counted in bursts, the parameters that say so.
+    comes_and_goes: whether it may act in a part of a flight only.
+
+    What is beside it:
+    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; None
     for an effect without a random part.
     always_random: whether the effect is only tried with its random part, because the mean alone has other names.
-    comes_and_goes: whether it may act in a part of a flight only.
     companion: the effect that a variant has beside it; "" without one.
-    own_scatter: relative standard deviation of its strength from flight to flight that no likelihood shows.
-    bursts: for what is counted in bursts, the parameters that say so.
+    several_by: parameter of which each value is an effect of its own, several of which may act together; "" for none.
+    class_by: parameter of which each value of the variants is a class of its own in the relations of signals.
     """
 
     free: tuple[str, ...]
@@ -57,12 +75,44 @@ class Signature:
     free_later: tuple[str, ...] = ()
     shape: Shape | None = None
     alone_too: bool = False
+    factors: bool = False
+    own_scatter: float = 0.0
+    commands_only: bool = False
+    at_edges: bool = False
+    scales_torque: bool = False
+    spectrum: str = ""
+    bursts: Bursts | None = None
+    comes_and_goes: bool = False
     steady: Mapping[str, float] | None = None
     always_random: bool = False
-    comes_and_goes: bool = False
     companion: str = ""
-    own_scatter: float = 0.0
-    bursts: Bursts | None = None
+    several_by: str = ""
+    class_by: str = ""
+
+    @property
+    def loop_only(self) -> bool:
+        """Whether the spectra of the closed loop alone show it."""
+        return self.commands_only and not self.at_edges
+
+    @property
+    def edges_only(self) -> bool:
+        """Whether what a flight does at edges alone shows it."""
+        return self.commands_only and self.at_edges
+
+    @property
+    def loses_rows(self) -> bool:
+        """Whether it takes rows from the log; what else shows in the logged times moves them."""
+        return self.bursts is not None
+
+    @property
+    def sensed(self) -> bool:
+        """Whether a random effect acts on the IMU, so that no loop fights it."""
+        return self.spectrum in (IMU_NOISE, ROTOR_LINES)
+
+    @property
+    def class_values(self) -> tuple[float, ...]:
+        """The values of `class_by` in the variants, in their order."""
+        return tuple(v[self.class_by] for v in self.variants) if self.class_by else ()
 
 
 def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
@@ -75,7 +125,7 @@ def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
 SIGNATURES: dict[str, Signature] = {
     "ground_effect": Signature(
         ("strength",), variants=_each("fade", 0.0, 0.06, 0.0875, 0.129),
-        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), steady={"turbulence": 0.0},
+        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), steady={"turbulence": 0.0}, at_edges=True,
         # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of
         # opened sealed sets
         own_scatter=0.07),
@@ -85,37 +135,42 @@ SIGNATURES: dict[str, Signature] = {
         variants=({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
         companion="rotor_drag"),  # air moves the vehicle through its rotors' drag
     "gust": Signature(
-        ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), comes_and_goes=True, companion="rotor_drag"),
+        ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), class_by="length", comes_and_goes=True,
+        companion="rotor_drag"),
     "blade_flapping": Signature(("tilt",)),
-    "motor_lag": Signature(("factor",)),
-    "motor_noise": Signature(("rms",), SPECTRUM, _each("time", 0.005, 0.02, 0.1)),
+    "motor_lag": Signature(("factor",), factors=True),
+    "motor_noise": Signature(
+        ("rms",), SPECTRUM, _each("time", 0.005, 0.02, 0.1), class_by="time", spectrum=THRUST_NOISE),
     "thrust_coefficient": Signature(("loss",)),
-    "weak_motor": Signature(("thrust_loss",), variants=_each("rotor", 1, 2, 3, 4)),
+    "weak_motor": Signature(
+        ("thrust_loss",), variants=_each("rotor", 1, 2, 3, 4), several_by="rotor", class_by="rotor"),
     "battery_sag": Signature(
         ("strength",), free_later=("charge", "capacity"),
         variants=tuple({"charge": x, "capacity": c} for x in (0.95, 0.8, 0.6, 0.4) for c in (0.2, 1.0))),
     "mass": Signature(("fraction",)),
     "com_offset": Signature(("x", "y")),
-    "inertia": Signature(("fraction",)),
-    "slung_load": Signature(("load",), variants=_each("length", 0.1, 0.2, 0.4), free_later=("length",)),
+    "inertia": Signature(("fraction",), scales_torque=True),
+    "slung_load": Signature(
+        ("load",), variants=_each("length", 0.1, 0.2, 0.4), free_later=("length",), class_by="length"),
     "imu_bias": Signature(("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z")),
-    "imu_noise": Signature(("factor",), SPECTRUM),
+    "imu_noise": Signature(("factor",), SPECTRUM, factors=True, spectrum=IMU_NOISE),
     # lines of four rotors at nearly one speed add up as their phases happen to stand: Rayleigh, sqrt(4 / pi - 1)
-    "vibration": Signature(("amplitude",), SPECTRUM, own_scatter=0.52),
-    "sensor_latency": Signature(("delay",)),
+    "vibration": Signature(("amplitude",), SPECTRUM, own_scatter=0.52, spectrum=ROTOR_LINES),
+    "sensor_latency": Signature(("delay",), commands_only=True),
     "actuator_delay": Signature(("delay",)),
     "time_jitter": Signature(("rms",), CLOCK),
     "packet_loss": Signature(("share",), CLOCK, bursts=Bursts("share", "burst")),
-    "range_step": Signature(("residual", "kick")),
-    "flow_scale": Signature(("share", "transient")),
+    "range_step": Signature(("residual", "kick"), commands_only=True, at_edges=True),
+    "flow_scale": Signature(("share", "transient"), commands_only=True, at_edges=True),
     "downwash": Signature(
         ("strength",), steady={"turbulence": 0.0, "width": 0.0}, always_random=True, comes_and_goes=True),
-    "controller_gain": Signature(("rate", "attitude", "position", "height"), alone_too=True),
+    "controller_gain": Signature(
+        ("rate", "attitude", "position", "height"), alone_too=True, commands_only=True, factors=True),
 }
 #: effects that may come and go within a flight
 GATED = tuple(name for name, s in SIGNATURES.items() if s.comes_and_goes)
 #: effects that are only tried with their random part
-SHAKES = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
+ALWAYS_RANDOM = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
 #: effects with a variant that has another effect beside it, and that other
 COMPANIONS = {name: s.companion for name, s in SIGNATURES.items() if s.companion}
 

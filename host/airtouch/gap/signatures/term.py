@@ -1,13 +1,15 @@
 """A term of a hypothesis: one effect with its parameters, scaled so that 0 is neutral and 1 a natural step."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from airtouch.gap.result import Quantity
-from airtouch.gap.signatures.signature import MEAN, free_of, signature_of
+from airtouch.gap.signatures.signature import MEAN, Signature, free_of, signature_of
 from airtouch.simulation.effects import Active, Effect, Parameter
+from airtouch.simulation.effects.effect import Gate
 
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
 RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter whose default is neutral; chosen
@@ -17,21 +19,31 @@ RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter w
 class Term:
     """An effect as a hypothesis: values of every parameter, those that are free (k of them), and how it shows.
 
-    kind: MEAN, SPECTRUM or CLOCK (`signature`); values: of every parameter, in its unit; companion: in the model
-    because another effect implies it, not reported itself; gate: (flight, from_s, to_s) when it acts, none: always.
+    shows_in: MEAN, SPECTRUM or CLOCK (`signature`); values: of every parameter, in its unit; companion: in the model
+    because another effect implies it, not reported itself; gate: when it acts, none: always.
     """
 
     effect: Effect
-    kind: str
+    shows_in: str
     free: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
     companion: bool = False
-    gate: tuple[tuple[str, float, float], ...] = ()
+    gate: Gate = ()
 
     @property
     def name(self) -> str:
         """Name of the effect in the registry."""
         return self.effect.name
+
+    @property
+    def signature(self) -> Signature:
+        """What the diagnosis knows of the effect."""
+        return signature_of(self.effect)
+
+    @property
+    def identity(self) -> tuple[str, float | None]:
+        """Name of the effect, and of one of which several may act together which of them this is."""
+        return self.name, self.values.get(self.signature.several_by)
 
     def active(self, x: np.ndarray | None = None) -> Active:
         """The effect at scaled parameters x (k,), clipped to its bounds; None: at the values of the term."""
@@ -51,13 +63,13 @@ class Term:
 
     def refined(self) -> "Term":
         """The term with those parameters free too that are fitted last."""
-        later = tuple(p for p in signature_of(self.effect).free_later if p not in self.free)
+        later = tuple(p for p in self.signature.free_later if p not in self.free)
         return replace(self, free=self.free + later) if later else self
 
     def shaped(self) -> "list[Term]":
         """The term in each shape that all the data may choose among; none where its effect has no shapes."""
-        shape = signature_of(self.effect).shape
-        if shape is None or self.kind != MEAN:
+        shape = self.signature.shape
+        if shape is None or self.shows_in != MEAN:
             return []
         return [replace(self, values={**self.values, shape.parameter: v}) for v in shape.values]
 
@@ -117,6 +129,15 @@ class Term:
     def _parameter(self, name: str) -> Parameter:
         return parameter_of(self.effect, name)
 
+
+Terms = tuple[Term, ...]  #: a hypothesis: effects that act together, each with its random part and its companion
+
+
+def mean_places(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
+    """The mean effects among terms, each with the place of its free parameters among those of all of them."""
+    mean = [t for t in terms if t.shows_in == MEAN]
+    ends = itertools.accumulate(len(t.free) for t in mean)
+    return [(t, slice(end - len(t.free), end)) for t, end in zip(mean, ends, strict=True)]
 
 def parameter_of(effect: Effect, name: str) -> Parameter:
     """The parameter of an effect with a name."""

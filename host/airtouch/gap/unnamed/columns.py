@@ -10,9 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import BANDS_HZ, GROUPS
-from airtouch.gap.evidence.data import Data, commanded
-from airtouch.gap.evidence.problem import Part, Problem
+from airtouch.gap.evidence.cells import BANDS_HZ, CELLS
+from airtouch.gap.evidence.data import Data, command_torque
+from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
@@ -25,8 +25,8 @@ CHANNELS = 9  #: that are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
 TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
 LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
-LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
-WIDEST = len(BASIS) + LOOP
+LOOP_COLUMNS = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
+WIDEST = len(BASIS) + LOOP_COLUMNS
 NOTHING = 1e-9  #: variance that a coefficient or a power without scatter is given; chosen
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
@@ -34,7 +34,7 @@ OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate((
 
 @dataclass(frozen=True)
 class UnnamedFloor:
-    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
+    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, CELLS)."""
 
     columns: np.ndarray
     power: np.ndarray
@@ -42,15 +42,15 @@ class UnnamedFloor:
 
 def no_floor() -> UnnamedFloor:
     """The floor where no nominal flight is known: coefficients and powers without scatter."""
-    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))
+    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, CELLS)))
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One channel of one flight, for a regression.
+class Regressors:
+    """What the values of one channel of one flight are regressed on.
 
-    own (elements,): its places among the problem's values; columns (elements, free + offsets): what they are regressed
-    on; offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
+    own (elements,): places of the values among the problem's; columns (elements, free + offsets): of the regression;
+    offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
     """
 
     channel: int
@@ -69,15 +69,15 @@ class Cell:
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
 
-def cells_of(data: Data, part: Part, problem: Problem) -> list[Cell]:
-    """The cells of a half; made once."""
-    return problem.workspace.once("cells", (), lambda: _cells(data, part, problem))
+def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
+    """The regressors of each channel of each flight of a part that has known values; made once."""
+    return problem.workspace.once("regressors", (), lambda: _regressors(data, part, problem))
 
 
-def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
-    """A cell for each channel of each flight that has known values."""
+def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
+    """See `regressors_of`."""
     out = []
-    channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
+    channel, flight, known = (x[:problem.replay_count] for x in (problem.channel, problem.flight, problem.known))
     for c in range(CHANNELS):
         table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
@@ -85,8 +85,8 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
             own = elements[here]
             offsets = [(x[own], p) for x, p in problem.unit_offsets if np.any(x[own])]
             if len(own):
-                out.append(Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
-                                 np.array([p for _, p in offsets])))
+                out.append(Regressors(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
+                                      np.array([p for _, p in offsets])))
     return out
 
 
@@ -103,7 +103,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
 
 
 def _loop_columns(data: Data) -> list[np.ndarray]:
-    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight.
+    """Spectra (blocks, bins, 2, LOOP_COLUMNS) in the air of the torque that the model makes of the commands, by flight.
 
     Each band's alone, weighted as what is left of the torque is; made once.
     """
@@ -111,9 +111,9 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
         f, response = frequencies(AIR), data.study.response
         bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
         bands[:FIRST_BIN] = False
-        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP)
+        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP_COLUMNS)
         out = []
-        for i, torque in enumerate(commanded(data)):
+        for i, torque in enumerate(command_torque(data)):
             weighted = torque if response is None else response.weighted(data.quiet[i], torque)
             out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
         return out
@@ -121,14 +121,14 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
     return data.workspace.once("loop", (), make)
 
 
-def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
+def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.ndarray:
     """The columns (elements, columns) at the elements of one channel, in their order."""
     spectra, rows = _columns(data), []
     axis = channel % 3
     for i, r, chosen in part.pieces:
         columns = spectra[i][axis][r][chosen]
         if channel in ROLL_PITCH:
-            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
+            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP_COLUMNS))
             columns = np.concatenate([columns, loop], axis=2)
         rows.append(columns[:, problem.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
@@ -146,6 +146,6 @@ def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
         out[len(BASIS):] = False
-    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.kind == MEAN]):
+    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.shows_in == MEAN]):
         out[OF_COMMAND[yaw]] = False
     return out

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS
 from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, UnnamedFloor, answerable, no_floor
@@ -22,7 +22,7 @@ from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, column_
 LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
 
 
-def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
+def generic_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
     """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
 
     terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
@@ -30,7 +30,7 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     """
     floor = data.study.unnamed_floor or no_floor()
     linear = power = 0.0
-    for train, test in ((0, 1), (1, 0)):
+    for train, test in ROUND_TRIP:
         trained, held_out = (HalfResiduals(data, parts[half], terms[train]) for half in (train, test))
         fitted = np.array([coefficients(trained, channel, floor, answerable(data, terms[train], channel))
                            for channel in range(CHANNELS)])
@@ -41,13 +41,13 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     return linear, power
 
 
-def height_gain(data: Data, parts: Sequence[Part]) -> float:
+def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
     """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
     floor = data.study.unnamed_floor or no_floor()
     halves = [HalfResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
     return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
-               for train, test in ((0, 1), (1, 0)))
+               for train, test in ROUND_TRIP)
 
 
 def unnamed_floor(data: Data) -> UnnamedFloor:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import GROUPS, above_means, band_cells, channel_cells, sensor_cells
+from airtouch.gap.evidence.cells import CELLS, above_means, band_cells, channel_cells, sensor_cells
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor
 
@@ -16,9 +16,9 @@ LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
 CHANCE = 4.0  #: nats that a band must gain on the half that it is fitted to; chosen, chance gives about one
 UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen
 LONGEST = 1.5  #: nepers, the longest of these steps; chosen
-SENSOR = sensor_cells()[channel_cells()]  #: (GROUPS,) number of each cell's view and sensor, all bands together
+SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) number of each cell's view and sensor, all bands together
 ABOVE_MEANS = above_means()
-NO_PRIOR = (np.zeros(GROUPS), np.full(GROUPS, 1e3))  #: mean and scatter (nepers) of a prior that says nothing
+NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and scatter (nepers) of a prior that says nothing
 
 
 class Powers(NamedTuple):
@@ -50,22 +50,22 @@ def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
 
 
 def power_factors(powers: Powers, middle: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log posterior (GROUPS,) there.
+    """Logarithm (CELLS,) of the power's factor of highest posterior, and the log posterior (CELLS,) there.
 
-    middle, spread (GROUPS,): of the normal prior of the logarithm. In a cell without values the factor is the prior's.
+    middle, spread (CELLS,): of the normal prior of the logarithm. In a cell without values the factor is the prior's.
     """
     e, nu, tail, cell = powers
     out = middle.copy()
-    count = np.bincount(cell, minlength=GROUPS)
+    count = np.bincount(cell, minlength=CELLS)
     precision = 1.0 / np.maximum(spread ** 2, NOTHING)
-    held = np.bincount(cell, information(nu), GROUPS)
+    known = np.bincount(cell, information(nu), CELLS)
     for _ in range(UPDATES):
         scaled = e * np.exp(-out[cell])
-        push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
-        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * held + precision), -LONGEST, LONGEST)
+        push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), CELLS)
+        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * known + precision), -LONGEST, LONGEST)
     out[count == 0] = middle[count == 0]
     scaled = e * np.exp(-out[cell])
-    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
+    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail)), CELLS)
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
@@ -80,27 +80,27 @@ def power_gain(trained: Powers, held_out: Powers, floor: UnnamedFloor, simulated
     before = tuple(power_factors(half, middle, spread)[1] for half in (trained, held_out))
 
     def gain(factors: np.ndarray, trained_spread: np.ndarray, pool: np.ndarray) -> float:
-        """What these factors gain on the half held out; pool (GROUPS,): cells that are judged together."""
+        """What these factors gain on the half held out; pool (CELLS,): cells that are judged together."""
         after = (power_factors(trained, factors, trained_spread)[1], power_factors(held_out, factors, spread)[1])
-        gains = [np.bincount(pool, x - y, GROUPS) for x, y in zip(after, before, strict=True)]
+        gains = [np.bincount(pool, x - y, CELLS) for x, y in zip(after, before, strict=True)]
         return float(gain_at_even_odds(gains[1][_above_chance(gains[0], factors > middle, pool, simulated)]).sum())
 
-    of_cells = gain(power_factors(trained, middle, NO_PRIOR[1])[0], NO_PRIOR[1], np.arange(GROUPS))
+    of_cells = gain(power_factors(trained, middle, NO_PRIOR[1])[0], NO_PRIOR[1], np.arange(CELLS))
     return max(of_cells, gain(_of_sensors(trained, middle), spread, SENSOR)) if simulated else of_cells
 
 
 def _above_chance(gained: np.ndarray, stronger: np.ndarray, pool: np.ndarray, simulated: bool) -> np.ndarray:
-    """Mask (GROUPS,) of the pools that gain more than CHANCE on the half that they are fitted to.
+    """Mask (CELLS,) of the pools that gain more than CHANCE on the half that they are fitted to.
 
-    gained (GROUPS,): nats, by pool; stronger (GROUPS,): cells with more power than nominal flights have. In simulated
+    gained (CELLS,): nats, by pool; stronger (CELLS,): cells with more power than nominal flights have. In simulated
     flights less power counts as well, above the band of the means.
     """
     counts = stronger | ABOVE_MEANS if simulated else stronger
-    return (gained > CHANCE) & (np.bincount(pool, counts, GROUPS) > 0)
+    return (gained > CHANCE) & (np.bincount(pool, counts, CELLS) > 0)
 
 
 def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
-    """Logarithm (GROUPS,) of the powers' factors where all bands of a sensor but that of the means share one."""
+    """Logarithm (CELLS,) of the powers' factors where all bands of a sensor but that of the means share one."""
     e, nu, tail, cell = powers
     use = ABOVE_MEANS[cell]
     relative = Powers((e * np.exp(-middle[cell]))[use], nu[use], tail[use], SENSOR[cell][use])
@@ -109,12 +109,12 @@ def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
 
 
 def power_floor(flights: Sequence[Powers]) -> np.ndarray:
-    """Log power's mean and rms (2, GROUPS) in nominal flights, two or more, beyond what chance alone gives."""
-    log_power, chance = np.zeros((len(flights), GROUPS)), np.full((len(flights), GROUPS), np.nan)
+    """Log power's mean and rms (2, CELLS) in nominal flights, two or more, beyond what chance alone gives."""
+    log_power, chance = np.zeros((len(flights), CELLS)), np.full((len(flights), CELLS), np.nan)
     for i, powers in enumerate(flights):
         log_power[i] = power_factors(powers, *NO_PRIOR)[0]
-        held = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), GROUPS)
-        chance[i, held > 0.0] = 1.0 / held[held > 0.0]
+        own = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), CELLS)
+        chance[i, own > 0.0] = 1.0 / own[own > 0.0]
     known = np.isfinite(chance)
     count = np.maximum(known.sum(axis=0), 1)
     middle = np.where(known, log_power, 0.0).sum(axis=0) / count
@@ -125,6 +125,6 @@ def power_floor(flights: Sequence[Powers]) -> np.ndarray:
 
 
 def _of_band(values: np.ndarray) -> np.ndarray:
-    """For each cell the sum of values (GROUPS,) over the channels of its view and band."""
+    """For each cell the sum of values (CELLS,) over the channels of its view and band."""
     band = band_cells()
-    return np.bincount(band, values, GROUPS)[band]
+    return np.bincount(band, values, CELLS)[band]

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import Part, problem_of
+from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Cell, UnnamedFloor, cells_of, no_floor
+from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Regressors, UnnamedFloor, no_floor, regressors_of
 from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
 ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
-CELL_ROUNDS = 2  #: the same of one cell under fitted coefficients; chosen
+OWN_ROUNDS = 2  #: the same of one channel of a flight under fitted coefficients; chosen
 RIDGE, LEAST_RIDGE = 1e-9, 1e-12  #: added to a normal matrix, over its diagonal and at least, to invert it; chosen
 MOST_COLUMNS = 4  #: columns of one channel that may be used; chosen
 SURE = 3.0  #: standard deviations by which coefficients must scatter more than by chance; chosen
@@ -22,53 +22,55 @@ CHANCE = 4.0  #: nats that a column must gain on the half that it is fitted to; 
 class HalfResiduals:
     """Residual of a half under a hypothesis: values, their expected power, and the basis there.
 
-    cells: every channel of every flight; what nominal flights may have of a column, each flight has for itself.
+    regressors: of every channel of every flight; what nominal flights may have of a column, each flight has for itself.
     """
 
-    def __init__(self, data: Data, part: Part, terms: Sequence[Term]) -> None:
+    def __init__(self, data: Data, part: BlockSet, terms: Sequence[Term]) -> None:
         self.problem = problem = problem_of(data, part)
         self.values, added, _ = problem.modelled(terms)
         self.power = problem.power + added
-        self.groups = problem.groups
-        self.cells = cells_of(data, part, problem)
+        self.cells = problem.cells
+        self.regressors = regressors_of(data, part, problem)
 
-    def system(self, cell: Cell, values: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Normal matrix (columns, columns) and right-hand side (columns,) for values (elements,) of a cell.
+    def system(self, one: Regressors, values: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Normal matrix (columns, columns) and right-hand side (columns,) for values (elements,) of one channel
+        of one flight.
 
         residual (elements,): by which each is weighted, as its tails are Student's.
         """
-        nu, tail, power = self.problem.freedom[cell.own], self.problem.tail[cell.own], self.power[cell.own]
+        nu, tail, power = self.problem.freedom[one.own], self.problem.tail[one.own], self.power[one.own]
         weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
-        weighted = cell.columns.conj().T * weights
-        return 2.0 * (weighted @ cell.columns).real, 2.0 * (weighted @ values).real
+        weighted = one.columns.conj().T * weights
+        return 2.0 * (weighted @ one.columns).real, 2.0 * (weighted @ values).real
 
-    def without(self, cell: Cell, fitted: np.ndarray, floor: UnnamedFloor) -> tuple[np.ndarray, float]:
-        """Residual (elements,) of a cell under fitted coefficients, and its log likelihood.
+    def without(self, one: Regressors, fitted: np.ndarray, floor: UnnamedFloor) -> tuple[np.ndarray, float]:
+        """Residual (elements,) of one channel of one flight under fitted coefficients, and its log likelihood.
 
         What nominal flights may have of the columns is taken off as well. fitted (columns,): the coefficients that all
         flights share.
         """
-        values = self.values[cell.own] - cell.columns[:, :cell.free] @ fitted[:cell.free]
-        residual, precision = values, cell.precision(floor)
-        for _ in range(CELL_ROUNDS):
-            normal, right = self.system(cell, values, residual)
+        values = self.values[one.own] - one.columns[:, :one.free] @ fitted[:one.free]
+        residual, precision = values, one.precision(floor)
+        for _ in range(OWN_ROUNDS):
+            normal, right = self.system(one, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
-            residual = values - cell.columns @ x
-        nu, tail = self.problem.freedom[cell.own], self.problem.tail[cell.own]
-        tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[cell.own] / tail)
+            residual = values - one.columns @ x
+        nu, tail = self.problem.freedom[one.own], self.problem.tail[one.own]
+        tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[one.own] / tail)
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:
         """Powers of the residuals (elements,) whose values are known."""
         known = self.problem.known
         over = squared(residuals[known]) / self.power[known]
-        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.groups[known])
+        return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.cells[known])
 
     def without_columns(self, fitted: np.ndarray, floor: UnnamedFloor) -> np.ndarray:
-        """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each cell."""
+        """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each channel
+        of each flight."""
         residuals = self.values.copy()
-        for cell in self.cells:
-            residuals[cell.own], _ = self.without(cell, fitted[cell.channel], floor)
+        for one in self.regressors:
+            residuals[one.own], _ = self.without(one, fitted[one.channel], floor)
         return residuals
 
     def floor_powers(self, floor: UnnamedFloor) -> Powers:
@@ -81,32 +83,32 @@ def coefficients(half: HalfResiduals, channel: int, floor: UnnamedFloor, among: 
 
     among (WIDEST,): the columns that may be asked for; all by default.
     """
-    cells = [c for c in half.cells if c.channel == channel]
+    sets = [c for c in half.regressors if c.channel == channel]
     fitted = np.zeros(WIDEST)
-    if not cells:
+    if not sets:
         return fitted
-    allowed = [k for k in range(cells[0].free) if among is None or among[k]]
-    residuals = [half.values[c.own] for c in cells]
+    allowed = [k for k in range(sets[0].free) if among is None or among[k]]
+    residuals = [half.values[c.own] for c in sets]
     for _ in range(ROUNDS):  # of weights
-        normal, right = _shared_system(half, cells, residuals, floor)
+        normal, right = _shared_system(half, sets, residuals, floor)
         free = _worth_asking(normal, right, allowed)
         fitted = np.zeros(WIDEST)
         fitted[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
-        residuals = [half.without(c, fitted, floor)[0] for c in cells]
+        residuals = [half.without(c, fitted, floor)[0] for c in sets]
     return fitted
 
 
-def _shared_system(half: HalfResiduals, cells: Sequence[Cell], residuals: Sequence[np.ndarray], floor: UnnamedFloor,
-                   ) -> tuple[np.ndarray, np.ndarray]:
+def _shared_system(half: HalfResiduals, sets: Sequence[Regressors], residuals: Sequence[np.ndarray],
+                   floor: UnnamedFloor) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and right-hand side of the coefficients that all flights share, each flight's own solved for.
 
-    residuals: of each cell under earlier coefficients.
+    residuals: of each of the sets of regressors under earlier coefficients.
     """
-    n = cells[0].free
+    n = sets[0].free
     total, right = np.zeros((n, n)), np.zeros(n)
-    for cell, residual in zip(cells, residuals, strict=True):
-        normal, slope = half.system(cell, half.values[cell.own], residual)
-        ridge = normal + np.diag(cell.precision(floor))
+    for one, residual in zip(sets, residuals, strict=True):
+        normal, slope = half.system(one, half.values[one.own], residual)
+        ridge = normal + np.diag(one.precision(floor))
         own = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
         total += normal[:n, :n] - normal[:n] @ own[:, :n]
         right += slope[:n] - normal[:n] @ own[:, n]
@@ -137,7 +139,7 @@ def linear_gain(half: HalfResiduals, channel: int, fitted: np.ndarray, floor: Un
         return 0.0
     nothing = np.zeros(WIDEST)
     return float(gain_at_even_odds(sum(half.without(c, fitted, floor)[1] - half.without(c, nothing, floor)[1]
-                                       for c in half.cells if c.channel == channel)))
+                                       for c in half.regressors if c.channel == channel)))
 
 
 def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
@@ -145,24 +147,24 @@ def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
     n = len(halves)
     beyond_chance, over_chance = np.zeros((2, CHANNELS, WIDEST))
     for half in halves:
-        for cell in half.cells:
-            estimate, variance = _one_by_one(half, cell)
-            beyond_chance[cell.channel, :cell.free] += (estimate ** 2 - variance) / (n - 1)
-            over_chance[cell.channel, :cell.free] += estimate ** 2 / variance / n
+        for one in half.regressors:
+            estimate, variance = _one_by_one(half, one)
+            beyond_chance[one.channel, :one.free] += (estimate ** 2 - variance) / (n - 1)
+            over_chance[one.channel, :one.free] += estimate ** 2 / variance / n
     beyond_chance[over_chance < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
     of_another = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
     return np.sqrt(np.maximum(of_another * beyond_chance, 0.0))
 
 
-def _one_by_one(half: HalfResiduals, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
-    n = cell.free
-    residual = half.without(cell, np.zeros(n), no_floor())[0]
-    normal, right = half.system(cell, half.values[cell.own], residual)
+def _one_by_one(half: HalfResiduals, one: Regressors) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficient and variance (columns,) of every column of one channel of a flight, each beside the offsets."""
+    n = one.free
+    residual = half.without(one, np.zeros(n), no_floor())[0]
+    normal, right = half.system(one, half.values[one.own], residual)
     estimate, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         index = [k, *range(n, len(right))]
-        precision = np.concatenate([[LEAST_RIDGE], 1.0 / cell.offsets ** 2])
+        precision = np.concatenate([[LEAST_RIDGE], 1.0 / one.offsets ** 2])
         inverse = np.linalg.inv(normal[np.ix_(index, index)] + np.diag(precision + RIDGE * np.diag(normal)[index]))
         estimate[k], variance[k] = (inverse @ right[index])[0], inverse[0, 0]
     return estimate, variance

@@ -7,7 +7,9 @@ from scipy.special import gammaincinv
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.signatures.term import WITHIN_90
-from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
+from airtouch.gap.where.band_sums import Sums
+from airtouch.gap.where.filter_bank import BANDS_HZ
+from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
 DRAWS = 400  #: bootstrap samples of each phase: 20 lie beyond each end of a 90 % interval; chosen
@@ -17,6 +19,7 @@ INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
 #: degrees of freedom of a block at most, as blocks differ by more than chance; chosen. With it the intervals hold the
 #: true rms in 85 of 100 cells or more (test_map.py)
 FREEDOM = 4.0
+FLOOR_SEED = 100  #: of the floors' bootstrap, no phase's number, which is that of a phase's own
 AIR = "air"  #: key of the floor of phases in which no nominal flight was
 
 #: phase, or AIR: floor and its upper end, (regimes, bands, COUNT) each
@@ -40,7 +43,11 @@ class Table:
 
 
 def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
-    """The cells of one phase from all sums, None where no flight has it; seed: of the bootstrap."""
+    """The cells of one phase from all sums, None where no flight has it; seed: of the bootstrap.
+
+    The interval is that of the bootstrap, and never narrower than that of a mean square of noise with the cell's
+    degrees of freedom.
+    """
     rows = all_sums.phase == phase
     if not rows.any():
         return None
@@ -54,14 +61,21 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     total = np.maximum(weight, 1.0)[:, None, None]
     mean_square = part.power.sum(axis=0) / total
     low, high = _bootstrap(part.weight, part.power, seed)
-    seconds = weight * PERIOD_S
+    freedom = _freedom(weight * PERIOD_S, blocks)
+    least, most = (mean_square * freedom / chi_square(p / 100.0, freedom) for p in INTERVAL[::-1])
+    least[:, 0], most[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
+    return Table(rms=np.sqrt(mean_square), low=np.sqrt(np.minimum(low, least)), high=np.sqrt(np.maximum(high, most)),
+                 seconds=weight * PERIOD_S, blocks=blocks, flights=flights)
+
+
+def _freedom(seconds: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """Degrees of freedom (regimes, bands, 1) of a mean square of noise: 2 x time x bandwidth, FREEDOM a block at most.
+
+    seconds, blocks (regimes,). Bendat and Piersol, Random Data, 4th ed., section 8.3.
+    """
     width = np.array([b - a for a, b in BANDS_HZ])
     limit = np.maximum(FREEDOM * blocks, 1.0)[:, None]
-    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, limit)[:, :, None]
-    narrow, wide = (mean_square * freedom / chi_square(p / 100.0, freedom) for p in INTERVAL[::-1])
-    narrow[:, 0], wide[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
-    low, high = np.minimum(low, narrow), np.maximum(high, wide)
-    return Table(np.sqrt(mean_square), np.sqrt(low), np.sqrt(high), seconds, blocks, flights)
+    return np.clip(2.0 * seconds[:, None] * width, 1.0, limit)[:, :, None]
 
 
 def chi_square(share: float, freedom: np.ndarray) -> np.ndarray:
@@ -111,7 +125,7 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
     sources: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
     for key, source, phase in sources:
         spread = _without_common(source, phase, count)
-        table = table_of(spread, phase, seed=100) if spread is not None else None
+        table = table_of(spread, phase, seed=FLOOR_SEED) if spread is not None else None
         if table is None:
             continue
         whole = table.rms[:1], table.high[:1]  # of the phase, for regimes in which no nominal flight was

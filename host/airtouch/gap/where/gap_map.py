@@ -13,24 +13,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
-from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
+from airtouch.gap.where.band_sums import Sums, join, sums
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
+from airtouch.gap.where.filter_bank import BANDS_HZ, gains, sensor_rms
+from airtouch.gap.where.regimes import REGIMES
 from airtouch.gap.where.summary import TINY, significant, sure_ratio
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
-
-PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
-               "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
-
 
 @dataclass(frozen=True)
 class Part:
@@ -128,34 +127,11 @@ def where(of_map: GapMap, count: int = 10) -> list[Cell]:
     return chosen + sorted(others, key=sure_ratio, reverse=True)
 
 
-def ratio(cell: Cell) -> float:
-    """The cell's gap over its floor."""
-    return cell.gap / max(cell.floor, TINY)
-
-
 def overall(cells: Iterable[Cell], key: str = "gap") -> float:
     """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
     ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != KINDS[GROUND]
              and getattr(c, key) is not None and c.floor > 0.0]
     return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
-
-
-def in_words(cell: Cell) -> str:
-    """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
-    regime = "" if cell.regime == "all" else f" ({cell.regime})"
-    return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
-            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, "
-            f"{short(ratio(cell))} times the floor")
-
-
-def interval(cell: Cell) -> str:
-    """The interval of the cell's gap, "" where there is none."""
-    return "" if cell.low is None or cell.high is None else f"{short(cell.low)} to {short(cell.high)}"
-
-
-def short(value: float) -> str:
-    """The value with two digits, or its whole part where that has more."""
-    return f"{value:.0f}" if 10.0 <= abs(value) < 1e5 else f"{value:.2g}"
 
 
 def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
@@ -164,23 +140,29 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    active = [t.active() for t in terms if t.kind == MEAN]
+    active = [t.active() for t in terms if t.shows_in == MEAN]
     gap = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
                study.vehicle)
     random = random_of(terms)
     if not random or not len(gap.phase):
         return gap
-    data = Data(study, [flight])
-    sensor = sensor_rms(study.vehicle) ** 2
-    power = gap.power.copy()
+    modelled = _random_power(study, flight, random)
+    sensor, power = sensor_rms(study.vehicle) ** 2, gap.power.copy()
     for rows, regime in ((gap.phase == GROUND, REST), (gap.phase != GROUND, AIR)):
-        density = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
-        modelled = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
-                    for p in (random_effects.power(data, t)[0][regime] for t in random))
         weight = gap.weight[rows][:, :, None, None]
         noise = np.minimum(sensor * weight, gap.power[rows])
-        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled)
+        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled[regime])
     return replace(gap, power=power)
+
+
+def _random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> dict[str, np.ndarray | float]:
+    """Mean power (bands, COUNT) that random effects add in a flight, by regime of blocks; 0 where it has no block."""
+    data, out = Data(study, [flight]), {}
+    for regime in (REST, AIR):
+        density = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
+        out[regime] = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
+                          for p in (random_effects.power(data, t)[0][regime] for t in terms))
+    return out
 
 
 def _rms(of_sums: Sums, phase: int) -> np.ndarray:

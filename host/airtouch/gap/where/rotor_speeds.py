@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
+from airtouch.gap.signals.study import Study
 from airtouch.logs.flight_log import RPM
 from airtouch.simulation import replay
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.result import Cell, Ranked
+from airtouch.gap.result import Cell, RankedCandidate
 from airtouch.logs.segments import KINDS
 
 GROUND = "ground"
@@ -150,7 +150,7 @@ def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
     return tuple(sorted(out, key=lambda p: -p.energy))
 
 
-def leading(ranking: Sequence[Ranked]) -> list[Ranked]:
+def leading(ranking: Sequence[RankedCandidate]) -> list[RankedCandidate]:
     """The candidates that are shown: the first MOST_RANKED, and `none` and `unknown` wherever they are."""
     return [r for i, r in enumerate(ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
 

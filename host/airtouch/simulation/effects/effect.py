@@ -114,13 +114,16 @@ class Effect:
         return out
 
 
+Gate = tuple[tuple[str, float, float], ...]  #: when an effect acts: stretches (flight, from_s, to_s)
+
+
 @dataclass(frozen=True)
 class Active:
     """An effect that is switched on, with the values of all its parameters.
 
-    gate: stretches (flight, from_s, to_s) outside which a replayed log does not feel it; none: it always acts.
+    gate: stretches outside which a replayed log does not feel it; none: it always acts.
     """
 
     effect: Effect
     values: Mapping[str, float]
-    gate: tuple[tuple[str, float, float], ...] = ()
+    gate: Gate = ()

@@ -5,18 +5,19 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from airtouch.gap.flights.flight import Flight
-from airtouch.gap.relations.flight_signals import (
-    ANGLE_LEFT,
+from airtouch.gap.features.feature import LEAST_COHERENCE, LEAST_LOG, Feature
+from airtouch.gap.features.flight_signals import (
+    ANGLE_RESIDUAL,
     COMMAND,
-    FORCE_LEFT,
+    FORCE_RESIDUAL,
     LIFT,
-    RANGE_LEFT,
-    SPEED_LEFT,
-    TORQUE_LEFT,
+    RANGE_RESIDUAL,
+    SPEED_RESIDUAL,
+    TORQUE_RESIDUAL,
     TURN,
     FlightSignals,
 )
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 
 #: edges of the bands; chosen; the last one lies beyond half the log's rate, 50 Hz, which it so includes
@@ -27,31 +28,31 @@ LEAST_ALONE = 1e-4  #: share of a signal's power that the others of its group do
 #: signals that move together, each by its name and its column of the table: roll with y, pitch with x, climb, yaw
 GROUPS: dict[str, dict[str, int]] = {
     **{axis: {"command": COMMAND.start + 1 + turned, "turn": TURN.start + turned,
-              "force": FORCE_LEFT.start + pushed, "torque": TORQUE_LEFT.start + turned,
-              "speed": SPEED_LEFT.start + pushed, "angle": ANGLE_LEFT.start + turned}
+              "force": FORCE_RESIDUAL.start + pushed, "torque": TORQUE_RESIDUAL.start + turned,
+              "speed": SPEED_RESIDUAL.start + pushed, "angle": ANGLE_RESIDUAL.start + turned}
        for axis, turned, pushed in (("roll", 0, 1), ("pitch", 1, 0))},
-    "climb": {"command": COMMAND.start, "lift": LIFT.start, "force": FORCE_LEFT.start + 2,
-              "speed": SPEED_LEFT.start + 2, "range": RANGE_LEFT.start},
-    "yaw": {"command": COMMAND.start + 3, "turn": TURN.start + 2, "torque": TORQUE_LEFT.start + 2,
-            "angle": ANGLE_LEFT.start + 2},
+    "climb": {"command": COMMAND.start, "lift": LIFT.start, "force": FORCE_RESIDUAL.start + 2,
+              "speed": SPEED_RESIDUAL.start + 2, "range": RANGE_RESIDUAL.start},
+    "yaw": {"command": COMMAND.start + 3, "turn": TURN.start + 2, "torque": TORQUE_RESIDUAL.start + 2,
+            "angle": ANGLE_RESIDUAL.start + 2},
 }
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Names of what `coherence` gives: group, what of it (power, real, imaginary, alone), signals, band."""
-    out = []
+def table() -> tuple[Feature, ...]:
+    """What `coherence` gives: group, what of it (power, real, imaginary, alone), signals, number of the band."""
+    out: list[Feature] = []
     for group, signals in GROUPS.items():
         bands = range(len(BANDS_HZ) - 1)
-        out += [f"{group} power {a} {k}" for a in signals for k in bands]
-        out += [f"{group} {part} {a}:{b} {k}" for a, b in combinations(signals, 2) for part in ("real", "imaginary")
-                for k in bands]
-        out += [f"{group} alone {a} {k}" for a in signals for k in bands]
+        out += [Feature(f"{group} power {a} {k}", LEAST_LOG) for a in signals for k in bands]
+        out += [Feature(f"{group} {part} {a}:{b} {k}", LEAST_COHERENCE) for a, b in combinations(signals, 2)
+                for part in ("real", "imaginary") for k in bands]
+        out += [Feature(f"{group} alone {a} {k}", LEAST_LOG) for a in signals for k in bands]
     return tuple(out)
 
 
 def coherence(signals: FlightSignals) -> np.ndarray:
-    """Powers and coherences (len(names()),) of a flight in the air.
+    """Powers and coherences (len(table()),) of a flight in the air.
 
     Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the
     logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.gap.flights.contact import within
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.motion import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.gap.signals.channels import FORCE, TORQUE, angular_acceleration, residual
 from airtouch.logs.flight_log import ATTITUDE, GYRO, VELOCITY, FlightLog
@@ -15,10 +15,13 @@ from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
 NEEDED = (*GYRO, *VELOCITY, *ATTITUDE, "zrange_m", "z_m")  #: columns beside commands and accelerations
-#: columns of `FlightSignals.table`
-COMMAND, TURN, LIFT, FORCE_LEFT, TORQUE_LEFT, SPEED_LEFT, ANGLE_LEFT, RANGE_LEFT = (
+#: columns of `FlightSignals.table`, by what they are of
+COMMAND, TURN, LIFT, FORCE_RESIDUAL, TORQUE_RESIDUAL, SPEED_RESIDUAL, ANGLE_RESIDUAL, RANGE_RESIDUAL = (
     slice(0, 4), slice(4, 7), slice(7, 8), slice(8, 11), slice(11, 14), slice(14, 17), slice(17, 20), slice(20, 21))
-COUNT = 21
+#: their names, one by one
+COLUMNS = ("thrust command", "roll command", "pitch command", "yaw command", *(f"turn {a}" for a in "xyz"), "lift",
+           *(f"{what} residual {a}" for what in ("force", "torque", "speed", "angle") for a in "xyz"), "range residual")
+COUNT = len(COLUMNS)
 #: down range over standing below which legs may touch in flight, and for how long around it
 CONTACT_M, CONTACT_S = 0.012, 0.15  # chosen
 JUMP_MPS = 4.0  #: change of the down range from which another surface came below; chosen

@@ -30,8 +30,8 @@ FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that
 
 
 @dataclass(frozen=True)
-class Apparent:
-    """One nominal flight held against others.
+class ApparentStrengths:
+    """One nominal flight compared with others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
     chance; rate: nats a second that a model without names gains; passing: size (`size_of`) of each effect that comes

@@ -4,44 +4,51 @@ from functools import cache
 
 import numpy as np
 
-from airtouch.gap.relations.flight_signals import (
+from airtouch.gap.features.feature import LEAST_CLOCK, LEAST_LOG, LEAST_LOST, Feature
+from airtouch.gap.features.flight_signals import (
+    COLUMNS,
     COMMAND,
-    COUNT,
-    FORCE_LEFT,
-    RANGE_LEFT,
-    SPEED_LEFT,
-    TORQUE_LEFT,
+    FORCE_RESIDUAL,
+    RANGE_RESIDUAL,
+    SPEED_RESIDUAL,
+    TORQUE_RESIDUAL,
     FlightSignals,
 )
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.unnamed.basis import BASIS, basis
 from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
 AXES = "xyz"
-REGRESSED = {"force": FORCE_LEFT, "torque": TORQUE_LEFT, "speed": SPEED_LEFT}
-OF_MEANS = slice(FORCE_LEFT.start, SPEED_LEFT.stop)  #: columns of the table whose means are looked at
+REGRESSED = {"force": FORCE_RESIDUAL, "torque": TORQUE_RESIDUAL, "speed": SPEED_RESIDUAL}
+OF_MEANS = slice(FORCE_RESIDUAL.start, SPEED_RESIDUAL.stop)  #: columns of the table whose means are looked at
 FEWEST = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
 FEWEST_AT_REST = 4  #: samples at rest of which a variance is taken; chosen
 FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow and what deviates from it fast; chosen
 LEAST_VARIANCE = 1e-14  #: variance that is added, in squared units of a signal, so that none is 0
 LEAST_SCORE = 1e-9  #: sum of squares of a column that is added to it, so that none is 0
-CLOCK_S = 2e-4  #: s that are added to the rms of the logged times: a jitter below it says nothing; chosen
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Names of what `moments` gives."""
-    means = [f"mean {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4 + 3 + 3 + 3 + 1)]
-    of_phase = [*means, *(f"variance {i}" for i in range(COUNT))]
-    return (*(f"follows {what} {axis} {b}" for what in REGRESSED for axis in AXES for b in BASIS),
-            *(f"{phase} {what}" for phase in KINDS[1:] for what in of_phase),
-            *(f"later {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4)),
-            *(f"rest {what} {i}" for what in ("mean", "fast variance", "variance") for i in range(6)),
-            "clock rms", "clock steps", "clock lost", "clock runs")
+def table() -> tuple[Feature, ...]:
+    """What `moments` gives, in its order: scores, each phase, the second half, at rest, the clock."""
+    means = [*COLUMNS[OF_MEANS], *COLUMNS[COMMAND]]
+    slow = [*(f"{what} {axis}" for what in ("angle", "velocity", "rate") for axis in AXES), *COLUMNS[RANGE_RESIDUAL]]
+    of_phase = [*(Feature(f"mean {what}") for what in (*means, *slow)),
+                *(Feature(f"variance {what}", LEAST_LOG) for what in COLUMNS)]
+    imu = [f"{what} {axis}" for what in ("acceleration", "rate") for axis in AXES]
+    return (
+        *(Feature(f"{what} {axis} follows {b}") for what in REGRESSED for axis in AXES for b in BASIS),
+        *(Feature(f"{phase} {f.name}", f.least) for phase in KINDS[1:] for f in of_phase),
+        *(Feature(f"later mean {what}") for what in means),
+        *(Feature(f"rest mean {what}") for what in imu),
+        *(Feature(f"rest {part} {what}", LEAST_LOG) for part in ("fast variance", "variance") for what in imu),
+        Feature("clock rms", LEAST_CLOCK), Feature("clock steps", LEAST_CLOCK),
+        Feature("clock lost", LEAST_LOST), Feature("clock runs", LEAST_LOST))
 
 
 def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
-    """Scores, means and variances (len(names()),) of a flight; NaN where there is nothing to tell by.
+    """Scores, means and variances (len(table()),) of a flight; NaN where there is nothing to tell by.
 
     What force, torque and estimated speed have of the flight's own signals (`unnamed.basis`); means and logarithms of
     variances in each phase; what the second half has over the first; means and noise at rest; and what the log did to
@@ -73,7 +80,7 @@ def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
     some = in_phase if in_phase.sum() > FEWEST else signals.air
     assert signals.flight.rates is not None
     slow = [x[some].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
-                                           signals.table[:, RANGE_LEFT])]
+                                           signals.table[:, RANGE_RESIDUAL])]
     fast = (signals.table - _smoothed(signals.table))[some].var(axis=0)
     return np.concatenate([_means(signals, some), *slow, np.log(fast + LEAST_VARIANCE)])
 
@@ -108,4 +115,4 @@ def _clock(signals: FlightSignals) -> np.ndarray:
     clock, lost = signals.flight.clock_s, signals.flight.lost
     gaps = (np.diff(lost.astype(int), prepend=0) == 1).sum()
     rms = [np.sqrt(np.mean(x ** 2)) if len(x) else 0.0 for x in (clock, np.diff(clock))]
-    return np.concatenate([np.log(np.array(rms) + CLOCK_S), np.log1p([lost.sum(), gaps])])
+    return np.concatenate([np.log(np.array(rms) + LEAST_JITTER_S), np.log1p([lost.sum(), gaps])])

@@ -5,15 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.relations import coherence, edge_steps, moments
+from airtouch.gap.features import flight_features
 
 SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm only; chosen, as all numbers here
 MIDDLE_TWO_THIRDS = (0.16, 0.84)  #: quantiles; in a normal density they are two standard deviations apart
 LONG_SHIFT = 8.0  #: length of a whitened shift above which longer ones count no more in `directions`
 SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
-#: no feature is taken to say more than this: coherence, logarithms of powers and of variances, of the clock
-LEAST_COHERENCE, LEAST_LOG, LEAST_CLOCK = 0.01, 0.03, 0.1
-LEAST_LOST = 0.5  #: the same of lost rows, in the logarithm of one more than their number: one by chance is no news
 DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
 SMALLEST = 1e-9  #: deviation of a feature that varies at all
 
@@ -38,16 +35,8 @@ def standard_of(nominal: np.ndarray) -> Standard:
     """The standard of nominal flights' features (n, features): the middle two thirds of them give the deviation."""
     middle = np.nanmedian(nominal, axis=0)
     low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), MIDDLE_TWO_THIRDS, axis=0)
-    deviation = np.hypot(0.5 * (high - low), _least())
+    deviation = np.hypot(0.5 * (high - low), [f.least for f in flight_features.table()])
     return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
-
-
-def _least() -> np.ndarray:
-    """The least deviation (features,) of each feature."""
-    of_coherence = [LEAST_COHERENCE if " real " in n or " imaginary " in n else LEAST_LOG for n in coherence.names()]
-    clock = {"clock rms": LEAST_CLOCK, "clock steps": LEAST_CLOCK, "clock lost": LEAST_LOST, "clock runs": LEAST_LOST}
-    of_moments = [LEAST_LOG if "variance" in n else clock.get(n, 0.0) for n in moments.names()]
-    return np.array([*of_coherence, *of_moments, *(0.0 for _ in edge_steps.names())])
 
 
 def cholesky_factor(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:

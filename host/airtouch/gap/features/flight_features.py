@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 
+from airtouch.gap.features import coherence, edge_steps, moments
+from airtouch.gap.features.feature import Feature
+from airtouch.gap.features.flight_signals import readable, signals_of
 from airtouch.gap.flights.flight import Flight, without_columns
-from airtouch.gap.relations import coherence, edge_steps, moments
-from airtouch.gap.relations.flight_signals import readable, signals_of
 from airtouch.logs.flight_log import RPM
 from airtouch.vehicle import Vehicle
 
@@ -17,13 +18,13 @@ UNSEEN = ("vbat_V", *RPM)  #: columns that are left out: few small vehicles log 
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """The names of all features, in their order."""
-    return (*coherence.names(), *moments.names(), *edge_steps.names())
+def table() -> tuple[Feature, ...]:
+    """All features, in their order."""
+    return (*coherence.table(), *moments.table(), *edge_steps.table())
 
 
 def features(flight: Flight, vehicle: Vehicle) -> np.ndarray | None:
-    """Features (len(names()),) of a flight of a vehicle as declared, NaN where there is nothing to tell by.
+    """Features (len(table()),) of a flight of a vehicle as declared, NaN where there is nothing to tell by.
 
     None for a log that lacks a column. Takes about 20 ms.
     """

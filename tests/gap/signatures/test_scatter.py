@@ -7,19 +7,19 @@ from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.alike import ALIKE
-from airtouch.gap.signatures.nominal_scatter import FALSE_SHARE, Apparent, Scatter, size_of, table
 from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, standard_deviation
-from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, measured, scatter_of, student_log_density
+from airtouch.gap.signatures.scatter import FALSE_SHARE, ApparentStrengths, Scatter, size_of, table
+from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, class_scatter, scatter_of, student_log_density
 from airtouch.simulation.effects import EFFECTS
 
 
-def draw_strengths(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
-    return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()},
-                     {k: 1e-6 + 0.0 * v for k, v in rms.items()},
-                     float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
+def draw_strengths(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[ApparentStrengths]:
+    return [ApparentStrengths({k: rng.normal(size=len(v)) * v for k, v in rms.items()},
+                              {k: 1e-6 + 0.0 * v for k, v in rms.items()},
+                              float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 
-SHARED = {n for group, _ in ALIKE for n in group}  #: names of one thing, which have one scatter
+SHARED = {n for confusion in ALIKE for n in confusion.effects}  #: names of one thing, which have one scatter
 REAL = [n for n in table() if not n.startswith("simulated")]
 
 
@@ -48,14 +48,14 @@ def test_flights_of_a_class_are_taken_for_it():
 
 def test_recorded_flights_are_never_taken_for_simulated_ones():
     still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
-    flights = [Apparent(still, still, 0.0) for _ in range(4)]
+    flights = [ApparentStrengths(still, still, 0.0) for _ in range(4)]
     assert scatter_of(flights).rms["wind"][0] < 0.05
     assert scatter_of(flights, recorded=True).rms["wind"][0] > scatter_of(flights).rms["wind"][0]
 
 
 def test_simulated_flights_with_trims_of_their_own_scatter_as_such():
     still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
-    flights = [Apparent(still, still, 0.0) for _ in range(4)]  # strengths tell nothing of the class
+    flights = [ApparentStrengths(still, still, 0.0) for _ in range(4)]  # strengths tell nothing of the class
     one, own = (scatter_of(flights, vehicle="crazyflie-2.1-flow", one_trim=alike) for alike in (True, False))
     assert one.exact and not own.exact
     assert own.rms["mass"][0] > 10.0 * one.rms["mass"][0]
@@ -84,7 +84,7 @@ def test_names_of_one_thing_scatter_alike():
 
 
 def test_a_baseline_without_a_loss_says_little_of_other_days():
-    none = Apparent({"packet_loss": np.zeros(1)}, {"packet_loss": np.zeros(1)}, 0.0)
+    none = ApparentStrengths({"packet_loss": np.zeros(1)}, {"packet_loss": np.zeros(1)}, 0.0)
     of_class = next(c for c in table().values() if c.vehicle == "ns-34g").rms["packet_loss"]
     packet_loss = scatter_of([none] * 3, True, "ns-34g").rms["packet_loss"]
     assert packet_loss == pytest.approx(np.maximum(of_class, LEAST_RECORDED))
@@ -100,10 +100,10 @@ def test_many_baseline_flights_outweigh_the_table():
 
 def test_what_chance_alone_scatters_is_not_counted_as_scatter():
     rng = np.random.default_rng(5)
-    flights = [Apparent({"mass": rng.normal(size=1)}, {"mass": np.ones(1)}, 0.0) for _ in range(200)]
-    wide = [Apparent({"mass": 2.0 * rng.normal(size=1)}, {"mass": np.ones(1)}, 0.0) for _ in range(200)]
-    assert measured(flights).rms["mass"][0] < 0.4
-    assert measured(wide).rms["mass"][0] == pytest.approx(np.sqrt(3.0), rel=0.2)
+    flights = [ApparentStrengths({"mass": rng.normal(size=1)}, {"mass": np.ones(1)}, 0.0) for _ in range(200)]
+    wide = [ApparentStrengths({"mass": 2.0 * rng.normal(size=1)}, {"mass": np.ones(1)}, 0.0) for _ in range(200)]
+    assert class_scatter(flights).rms["mass"][0] < 0.4
+    assert class_scatter(wide).rms["mass"][0] == pytest.approx(np.sqrt(3.0), rel=0.2)
 
 
 def test_without_baseline_flights_the_widest_class_holds():
@@ -131,17 +131,18 @@ def test_an_effect_of_one_sign_scatters_as_the_flights_that_show_it():
     """Half of the flights would have it below none: how far below, nobody knows, and they are no sign of calm."""
     rng = np.random.default_rng(8)
     strengths = 0.3 * rng.normal(size=200)
-    flights = [Apparent({"ground_effect": np.array([max(x, 0.0)])},
-                        {"ground_effect": np.array([0.02 if x > 0.0 else NOBODY_KNOWS])}, 0.0) for x in strengths]
-    assert measured(flights).rms["ground_effect"][0] == pytest.approx(0.3, rel=0.15)
+    errors = [np.array([0.02 if x > 0.0 else NOBODY_KNOWS]) for x in strengths]
+    flights = [ApparentStrengths({"ground_effect": np.array([max(x, 0.0)])}, {"ground_effect": error}, 0.0)
+               for x, error in zip(strengths, errors, strict=True)]
+    assert class_scatter(flights).rms["ground_effect"][0] == pytest.approx(0.3, rel=0.15)
 
 
 def test_flights_that_say_nothing_of_an_effect_leave_it_to_its_gain():
     """Nominal flights high above the floor say nothing of ground effect; a flight close to it may still be news."""
     rng = np.random.default_rng(9)
-    flights = [Apparent({"ground_effect": np.array([rng.uniform(0.0, 3.0)])},
-                        {"ground_effect": np.array([rng.uniform(1.0, 9.0)])}, 0.0) for _ in range(30)]
-    assert measured(flights).rms["ground_effect"][0] == LEAST
+    flights = [ApparentStrengths({"ground_effect": np.array([rng.uniform(0.0, 3.0)])},
+                                 {"ground_effect": np.array([rng.uniform(1.0, 9.0)])}, 0.0) for _ in range(30)]
+    assert class_scatter(flights).rms["ground_effect"][0] == LEAST
 
 
 def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
@@ -153,7 +154,7 @@ def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
 
     beyond = []
     for _ in range(50):
-        scatter = measured([Apparent({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
+        scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
         beyond += [scatter.unusual("gust", size()) > 0.0 for _ in range(40)]
     assert np.mean(beyond) < 0.06
 
@@ -161,12 +162,12 @@ def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
 def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
     rng = np.random.default_rng(11)
     sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)
-    scatter = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
+    scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
     assert np.mean([scatter.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(FALSE_SHARE, rel=0.3)
 
 
 def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():
-    scatter = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
+    scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
     assert scatter.unusual("downwash", size_of(30.0, np.array([0.01]))) < 0.0
     assert scatter.unusual("downwash", size_of(0.1, np.array([0.2]))) < 0.0
     assert scatter.unusual("downwash", size_of(30.0, np.array([0.2]))) > 0.0
@@ -175,8 +176,8 @@ def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():
 def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():
     none = {"mass": np.zeros(1), "inertia": np.zeros(1)}
     values = ((1.0, 2.0), (-1.0, 0.0))
-    flights = [Apparent({"mass": np.array([m]), "inertia": np.array([i])}, none, 1.0) for m, i in values]
-    scatter = measured(flights)
+    flights = [ApparentStrengths({"mass": np.array([m]), "inertia": np.array([i])}, none, 1.0) for m, i in values]
+    scatter = class_scatter(flights)
     n = 2  # n s^2 / sigma^2 is chi-square of n degrees where every order of magnitude of sigma is as likely
     expected = np.sqrt(n * np.array([1.0, 2.0]) / chi2.ppf(0.5, n))
     np.testing.assert_allclose([*scatter.rms["mass"], *scatter.rms["inertia"]], expected, rtol=0.06)  # the grid's step
@@ -185,8 +186,8 @@ def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():
 def test_a_parameter_of_which_no_flight_tells_scatters_as_the_effect_s_others():
     rng = np.random.default_rng(7)
     error = {"wind": np.array([0.01, 1e6])}
-    flights = [Apparent({"wind": np.array([rng.normal(), 0.0])}, error, 1.0) for _ in range(60)]
-    first_rms, second_rms = measured(flights).rms["wind"]
+    flights = [ApparentStrengths({"wind": np.array([rng.normal(), 0.0])}, error, 1.0) for _ in range(60)]
+    first_rms, second_rms = class_scatter(flights).rms["wind"]
     assert first_rms == pytest.approx(1.0, rel=0.25)
     assert 0.3 < second_rms < 3.0
 
@@ -198,9 +199,9 @@ def test_the_table_knows_every_effect_of_the_registry():
 
 def test_a_random_effect_is_judged_by_how_far_it_is_above_its_usual_strength():
     rng = np.random.default_rng(9)
-    flights = [Apparent({"vibration": 0.5 + 0.05 * rng.normal(size=1)}, {"vibration": np.zeros(1)}, 0.0)
+    flights = [ApparentStrengths({"vibration": 0.5 + 0.05 * rng.normal(size=1)}, {"vibration": np.zeros(1)}, 0.0)
                for _ in range(300)]
-    scatter = measured(flights)
+    scatter = class_scatter(flights)
     assert scatter.middle["vibration"] == pytest.approx(0.5, abs=0.01)
     assert scatter.rms["vibration"] == pytest.approx(0.05, rel=0.15)
     strength, (middle,), (rms,) = np.array([0.8]), scatter.middle["vibration"], scatter.rms["vibration"]
@@ -250,24 +251,25 @@ def test_the_best_of_several_trials_does_not_widen_the_scatter():
     rng = np.random.default_rng(10)
     strengths = [rng.normal(size=4) for _ in range(200)]
     best = [np.where(np.arange(4) == np.argmax(np.abs(x)), x, 0.0) for x in strengths]
-    each = [Apparent({"controller_gain": x}, {"controller_gain": np.ones(4)}, 0.0) for x in strengths]
-    largest = [Apparent({"controller_gain": x}, {"controller_gain": np.where(x == 0.0, 1e6, 1.0)}, 0.0) for x in best]
-    assert measured(each).rms["controller_gain"].max() < 0.5 < measured(largest).rms["controller_gain"].min()
+    each = [ApparentStrengths({"controller_gain": x}, {"controller_gain": np.ones(4)}, 0.0) for x in strengths]
+    largest = [ApparentStrengths({"controller_gain": x}, {"controller_gain": np.where(x == 0.0, 1e6, 1.0)}, 0.0)
+               for x in best]
+    assert class_scatter(each).rms["controller_gain"].max() < 0.5 < class_scatter(largest).rms["controller_gain"].min()
 
 
 def test_flights_of_the_simulator_are_all_drawn_alike():
     still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
-    scatter = scatter_of([Apparent(still, still, 0.0) for _ in range(4)])
+    scatter = scatter_of([ApparentStrengths(still, still, 0.0) for _ in range(4)])
     assert scatter.exact and scatter.freedom == table()["simulated"].freedom + 4
-    recorded = scatter_of([Apparent(still, still, 0.0) for _ in range(4)], recorded=True)
+    recorded = scatter_of([ApparentStrengths(still, still, 0.0) for _ in range(4)], recorded=True)
     assert not recorded.exact and recorded.freedom == 8.0
 
 
 def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed():
     """Four flights of another mission, with 0.1 of a ground effect each, where the class knows 0.005."""
     rng, class_rms = np.random.default_rng(8), table()["simulated"].rms
-    flights = [Apparent(nominal.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
-                        nominal.errors | {"ground_effect": np.array([0.02])}, nominal.rate)
+    flights = [ApparentStrengths(nominal.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
+                                 nominal.errors | {"ground_effect": np.array([0.02])}, nominal.rate)
                for nominal in draw_strengths(rng, {k: v for k, v in class_rms.items() if k not in SHARED}, 4)]
     scatter = scatter_of(flights)
     assert scatter.exact and 0.05 < scatter.rms["ground_effect"][0] < 0.2
@@ -298,7 +300,7 @@ def test_few_baseline_flights_scatter_more_than_they_seem_to():
     """Each of three was among those that it is held against: twice the variance; the class counts as four flights."""
     of_class = next(c for c in table().values() if c.vehicle == "ns-34g")
     strengths = np.array([4.0, -6.0, 5.0])
-    flights = [Apparent({"inertia": np.array([x])}, {"inertia": np.array([0.1])}, 1.0) for x in strengths]
+    flights = [ApparentStrengths({"inertia": np.array([x])}, {"inertia": np.array([0.1])}, 1.0) for x in strengths]
     expected = standard_deviation(np.sqrt(2.0) * strengths, np.full(3, np.sqrt(2.0) * 0.1), of_class.rms["inertia"][0],
                                   (4.0, 4.0))
     assert scatter_of(flights, True, "ns-34g").rms["inertia"] == pytest.approx(expected)
@@ -307,5 +309,5 @@ def test_few_baseline_flights_scatter_more_than_they_seem_to():
 
 def test_one_flight_of_a_high_rate_hardly_raises_what_its_class_allows():
     rates = [1.0] * 20 + [400.0]
-    middle, deviation = measured([Apparent({}, {}, r) for r in rates]).rate
+    middle, deviation = class_scatter([ApparentStrengths({}, {}, r) for r in rates]).rate
     assert middle == pytest.approx(1.0) and deviation == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,75 @@
+"""The probability of each candidate, of `none` and of `unknown`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.gap.naming.selection import TEMPERATURE, Selection
+
+LEAD = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
+#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAD
+MOST_UNKNOWN = 0.9
+
+
+def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
+    """Of every single candidate, `none` and `unknown`; they sum to 1.
+
+    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
+
+    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
+    effect or `none` is the answer it stays below that.
+    """
+    names = list(selection.singles)
+    weight = _weights(selection, names)
+    share = weight / weight.sum()
+    odds = selection.unlike ** 2
+    unknown = odds / (1.0 + odds)
+    if selection.chosen is not None and selection.explained:
+        unknown = _limited(unknown, share[names.index(selection.named[0].name)])
+    if at_floor:
+        unknown = _limited(unknown, share[-1])
+    known = (1.0 - unknown) * weight / weight.sum()
+    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
+
+
+def _limited(unknown: float, share: float) -> float:
+    """Probability of `unknown`, MOST_UNKNOWN that of an answer at most, which has this share of all others."""
+    return min(unknown, MOST_UNKNOWN * share / (1.0 + MOST_UNKNOWN * share))
+
+
+def _weights(selection: Selection, names: Sequence[str]) -> np.ndarray:
+    """Weight (k + 1,) of each of k candidates, and of `none`, beside one another."""
+    if selection.inference is not None:
+        alone = selection.inference.probabilities()
+        return np.array([alone[n] for n in (*names, "none")])
+    score = np.array([*_scores(selection, names), 0.0])
+    return np.exp((score - score.max()) / TEMPERATURE)
+
+
+def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
+    """Score of every single candidate beside 0 for `none`, nats; those that could be named keep the order of gains.
+
+    The first effect named leads them by LEAD at least.
+    """
+    singles = selection.singles
+    out = [_against_none(singles[n].evidence, selection.least[n], len(names)) for n in names]
+    if not selection.named or selection.named[0].name not in names:
+        return out
+    first = names.index(selection.named[0].name)
+
+    def beside_first(i: int) -> float:
+        """Score of a candidate that could be named, or of the first effect itself."""
+        behind = max(singles[names[first]].gain - singles[names[i]].gain, LEAD) if i != first else 0.0
+        return max(out[first] - behind, -TEMPERATURE)
+
+    return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
+
+
+def _against_none(gain: float, least: float, many: int = 1) -> float:
+    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
+
+    gain: the evidence, nats, over `none` and over what nominal flights show; least: what is needed.
+    """
+    if gain < least:
+        return TEMPERATURE * (gain - least - np.log(many))
+    return gain - least

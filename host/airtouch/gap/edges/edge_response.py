@@ -1,0 +1,140 @@
+"""What a flight does in the second after an edge passes under it: thrust, speed along its path, height.
+
+Nominal flights give the mean response and its scatter, by which a response is whitened.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_missing
+from airtouch.gap.workspace import Workspace
+from airtouch.logs.edges import Edge, true_edges
+from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
+from airtouch.logs.segments import KINDS as PHASES
+from airtouch.logs.segments import PLATFORM_STEP_M
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+BEFORE, AFTER = 30, 130  #: samples around an edge; chosen
+BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust, speed, height; chosen
+COUNT = sum(n for _, n in BINS)
+KINDS = ("entry", "exit")
+LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
+UNSURE = 3  #: samples before an edge that may belong to it already; chosen
+LEAST_MPS = 1e-6  #: speed that a direction is divided by at least
+LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
+WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
+#: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
+SHRINKAGE = 0.3
+
+
+@dataclass(frozen=True)
+class EdgeFloor:
+    """What nominal flights do at edges, and its scatter.
+
+    nominal: mean response (COUNT,) by kind, from `counts` edges each; whiten (COUNT, COUNT): turns a deviation from it
+    into independent standard normal numbers.
+    """
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    nominal: dict[str, np.ndarray]
+    counts: dict[str, int]
+    whiten: np.ndarray
+    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
+
+
+def edges_of(flight: Flight) -> list[Edge]:
+    """Edges with enough flight around them, none where there is no down range."""
+    if not flight.log.has("zrange_m"):
+        return []
+    air = flight.phase != GROUND
+    return flight.workspace.once("edges", (), lambda: [
+        e for e in true_edges(flight.log, PLATFORM_STEP_M)
+        if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()])
+
+
+def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
+    """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
+    window = slice(at - BEFORE, at + AFTER)
+    thrust, speed, height = _thrust(log, vehicle, window), _speed(log, window), _height(log, window)
+    out = []
+    for values, (width, n) in zip((thrust, speed, height), BINS, strict=True):
+        size = int(round(width / PERIOD_S))
+        values = values - values[:BEFORE - UNSURE].mean()
+        out.append(values[BEFORE:BEFORE + n * size].reshape(n, size).mean(axis=1))
+    return np.concatenate(out)
+
+
+def _thrust(log: FlightLog, vehicle: Vehicle, window: slice) -> np.ndarray:
+    """Commanded thrust, N per motor."""
+    return vehicle.thrust(interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
+
+
+def _speed(log: FlightLog, window: slice) -> np.ndarray:
+    """Speed along the path before the edge, m/s; 0 where the log has none."""
+    if not log.has(*VELOCITY[:2]):
+        return np.zeros(BEFORE + AFTER)
+    speed = interpolate_missing(log.stack(VELOCITY[:2])[window])
+    heading = speed[:BEFORE].mean(axis=0)
+    return speed @ (heading / max(float(np.hypot(*heading)), LEAST_MPS))
+
+
+def _height(log: FlightLog, window: slice) -> np.ndarray:
+    """Height, m: as logged, else the down range without its steps, else 0."""
+    if log.has(POSITION[2]):
+        return interpolate_missing(log[POSITION[2]][window])
+    if not log.has("zrange_m"):
+        return np.zeros(BEFORE + AFTER)
+    height = interpolate_missing(log["zrange_m"][window])
+    step = np.diff(height, prepend=height[0])
+    step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
+    return np.cumsum(step)
+
+
+def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
+    """Mean response and scatter of flights declared nominal; None where they cross no edge."""
+    responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+    without_edge: list[np.ndarray] = []
+    for f in flights:
+        edges = edges_of(f)
+        for e in edges:
+            responses[e.kind].append(response(f.log, vehicle, e.sample))
+        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges)]
+    if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
+        return None
+    covariance = _covariance(np.array(without_edge), responses)
+    return EdgeFloor(vehicle, tuple(calibration), {k: np.mean(v, axis=0) for k, v in responses.items()},
+                     {k: len(v) for k, v in responses.items()}, np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
+    """Samples of level flight that have no edge near them, WINDOW_STEP apart."""
+    level = np.isin(flight.phase, LEVEL)
+    return [at for at in range(BEFORE, len(flight) - AFTER, WINDOW_STEP) if level[at - BEFORE:at + AFTER].all()
+            and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges)]
+
+
+def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]]) -> np.ndarray:
+    """Covariance (COUNT, COUNT) of a response: of stretches without an edge, and what edges scatter beyond them.
+
+    without_edge: responses (stretches, COUNT); at_edges: those of each kind of edge.
+    """
+    spread = np.cov((without_edge - np.mean(without_edge, axis=0)).T)
+    out = ((1.0 - SHRINKAGE) * spread + SHRINKAGE * np.diag(np.diag(spread))
+           + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9))
+    of_kinds = [np.array(v) - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1]
+    if of_kinds:
+        deviations = np.concatenate(of_kinds)
+        own = deviations.T @ deviations / max(sum(len(v) - 1 for v in at_edges.values()), 1)
+        out += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
+    return out
+
+
+def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
+    """Response of one edge less the nominal one, whitened by its scatter, (COUNT,)."""
+    raw = response(flight.log, floor.vehicle, edge.sample) - floor.nominal[edge.kind]
+    return floor.whiten @ raw / np.sqrt(1.0 + 1.0 / floor.counts[edge.kind])

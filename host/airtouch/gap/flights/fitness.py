@@ -1,0 +1,74 @@
+"""Whether a log can be diagnosed: values that cannot be, columns that it lacks, what no diagnosis of it can tell."""
+
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.checks.quality import nothing_logged
+from airtouch.logs.edges import true_edges
+from airtouch.logs.flight_log import ACC, GYRO, PWM, RANGES, FlightLog
+from airtouch.logs.segments import PLATFORM_STEP_M
+
+LEAST_AIR_S = 3.0  #: seconds in the air that a flight needs to be diagnosed; chosen
+LARGEST = 1e5  #: magnitude above which a value is none, in any column's unit; chosen, beyond what any sensor says
+PWM_RANGE = (-1.0, 66000.0)  #: of a motor command, which has 16 bits: 0 to 65535; its margins are chosen
+LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the column is left out; chosen
+
+
+def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
+    """The log without impossible values and columns that hold few others, and notes on what it lacks.
+
+    Raises AirTouchError where nothing was logged, without motor commands or accelerations, and for a single sample.
+    """
+    name = log.source
+    if nothing_logged(log):
+        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
+    notes = [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
+    log, unfit = _without_impossible_values(log)
+    if unfit:
+        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
+    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
+        if not log.has(*columns):
+            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
+                                "compares what the motors were told with what the IMU felt")
+    if len(log) < 2:
+        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    return log, tuple(notes)
+
+
+def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
+    """The log without values that cannot be and without columns that have few others; their names."""
+    columns, unfit = {}, []
+    for key, values in log.columns.items():
+        low, high = PWM_RANGE if key in PWM else (-LARGEST, LARGEST)
+        good = (values >= low) & (values <= high)
+        if len(good) and good.mean() < LEAST_GOOD:
+            unfit += [key] if key not in RANGES else []
+        else:
+            columns[key] = np.where(good, values, np.nan)
+    return FlightLog(columns, log.meta), unfit
+
+
+def stamped_at_arrival(log: FlightLog) -> bool:
+    """Whether the host stamped the rows: the authors' logs."""
+    return str(log.meta.get("format", "")).startswith("authors")
+
+
+def cannot_tell(log: FlightLog) -> tuple[str, ...]:
+    """Sentences on what no diagnosis of this log can tell, for want of a channel or of an edge."""
+    cannot = []
+    if not log.has(*GYRO):
+        cannot.append("no gyro: torque only at low frequency, from the balance of the motors")
+    if stamped_at_arrival(log):
+        cannot.append("logged times are those of arrival at the host: the drone's own clock cannot be judged")
+    if not log.has("zrange_m"):
+        cannot.append("no down range: range steps and flow scale cannot be seen; the floor is taken as flat, and the "
+                      "height over it comes from z_m" if log.has("z_m") else
+                      "no down range: ground effect, range steps and flow scale cannot be seen (z_m would do for the "
+                      "first)")
+    elif not true_edges(log, PLATFORM_STEP_M):
+        cannot.append("no edge crossed: range steps and flow scale cannot be seen")
+    if not log.has("vx_mps", "vy_mps"):
+        cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
+    return tuple(cannot)

@@ -1,0 +1,51 @@
+"""The study of a vehicle: the model and the floor that flights are compared with."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.signals.response import Response
+from airtouch.gap.signals.spectra import Floor
+from airtouch.gap.signatures.scatter import Scatter
+from airtouch.simulation.effects import Active
+from airtouch.simulation.effects.effect import Gate
+from airtouch.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Study:
+    """What flights are compared with.
+
+    vehicle, calibration: the model without effects; controller: the nominal loops, None without them; floor: power of
+    the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; unnamed_floor:
+    scatter of nominal flights in a model without names (`unnamed.columns.UnnamedFloor`); nominal: how many nominal
+    flights there are; scatter: how strong effects seem to be in them, None without any; relations: what was learned of
+    such flights (`relations.library.Library`), if anything; overhead: when another vehicle is known to be overhead,
+    none where nobody knows.
+    """
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    controller: ClosedLoop | None
+    floor: Floor
+    response: Response | None = None
+    unnamed_floor: Any = None
+    nominal: int = 0
+    scatter: Scatter | None = None
+    relations: Any = None
+    overhead: Gate = ()
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its nominal flights are those of a simulator, which are all drawn alike."""
+        return self.scatter is not None and self.scatter.exact
+
+    @property
+    def same_models(self) -> bool:
+        """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
+        return self.simulated and self.controller is not None and self.controller.by_firmware
+
+    @property
+    def recorded(self) -> bool:
+        """Whether its nominal flights are recorded ones. Without nominal flights this is False, as `simulated` is."""
+        return self.scatter is not None and not self.scatter.exact

@@ -1,0 +1,32 @@
+"""A cell of the map in words: its phrase, its interval, its ratio."""
+
+from airtouch.gap.result import Cell
+from airtouch.gap.signals.channels import CHANNEL_WORDS
+from airtouch.gap.where.summary import TINY
+
+#: each phase as a phrase
+PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
+               "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
+
+
+def in_words(cell: Cell) -> str:
+    """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
+    regime = "" if cell.regime == "all" else f" ({cell.regime})"
+    return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
+            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, "
+            f"{short(ratio(cell))} times the floor")
+
+
+def interval(cell: Cell) -> str:
+    """The interval of the cell's gap, "" where there is none."""
+    return "" if cell.low is None or cell.high is None else f"{short(cell.low)} to {short(cell.high)}"
+
+
+def short(value: float) -> str:
+    """The value with two digits, or its whole part where that has more."""
+    return f"{value:.0f}" if 10.0 <= abs(value) < 1e5 else f"{value:.2g}"
+
+
+def ratio(cell: Cell) -> float:
+    """The cell's gap over its floor."""
+    return cell.gap / max(cell.floor, TINY)

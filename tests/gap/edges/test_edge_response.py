@@ -1,0 +1,48 @@
+"""The response at an edge against made logs whose steps are known."""
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle as vehicles
+from airtouch.gap.edges.edge_response import BINS, SHRINKAGE, _covariance, response
+from airtouch.logs.flight_log import PWM, FlightLog
+
+VEHICLE = vehicles.load()
+EDGE, N = 50, 200
+THRUST, SPEED, HEIGHT = np.split(np.arange(20), np.cumsum([n for _, n in BINS])[:-1])
+
+
+def log_of(**columns):
+    pwm = columns.pop("pwm", np.full(N, 40000.0))
+    return FlightLog({"t_s": 0.01 * np.arange(N), **dict.fromkeys(PWM, pwm), **columns}, {})
+
+
+def after(step):
+    """Zeros before the edge, a step from it on."""
+    return np.where(np.arange(N) < EDGE, 0.0, step)
+
+
+def test_thrust_speed_and_height_are_those_after_the_edge_less_those_before():
+    """A turn to the left at the edge: along the way flown before it, 0.4 m/s are left of 0.5."""
+    log = log_of(pwm=40000.0 + after(5000.0), vx_mps=0.3 - after(0.06), vy_mps=0.4 - after(0.08), z_m=0.5 + after(0.1))
+    values = response(log, VEHICLE, EDGE)
+    assert values[THRUST] == pytest.approx(float(np.diff(VEHICLE.thrust(np.array([40000.0, 45000.0])))[0]))
+    assert values[SPEED] == pytest.approx(-0.1) and values[HEIGHT] == pytest.approx(0.1)
+
+
+def test_without_a_position_the_height_is_the_down_range_without_the_edge_itself():
+    log = log_of(zrange_m=0.8 - after(0.3) + 0.01 * after(1.0) * np.arange(N) / N)
+    values = response(log, VEHICLE, EDGE)
+    assert values[SPEED] == pytest.approx(0.0)
+    assert values[HEIGHT] == pytest.approx(0.01 * (np.arange(6) * 20 + 9.5) / N, abs=1e-4)
+
+
+def test_edges_widen_the_scatter_of_stretches_without_one():
+    """Stretches of variance 1; edges, of two kinds with other means, of variance 9 in the first number alone."""
+    rng = np.random.default_rng(1)
+    stretches, edges = rng.normal(size=(4000, 20)), rng.normal(size=(4000, 20))
+    edges[:, 0] *= 3.0
+    covariance = _covariance(stretches, {"entry": list(edges[::2] + 5.0), "exit": list(edges[1::2] - 5.0)})
+    assert np.diag(covariance) == pytest.approx([9.0, *np.ones(19)], rel=0.15)
+    correlated = rng.normal(size=(4000, 1)) + rng.normal(size=(4000, 20))  # covariance 1 beside a variance of 2
+    assert _covariance(correlated, {})[0, 1] == pytest.approx(1.0 - SHRINKAGE, rel=0.1)
