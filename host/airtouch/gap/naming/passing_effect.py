@@ -9,7 +9,9 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.passing.gates import TOLD, Gated, gated
+from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.unnamed.generic import height_gain
 
 
@@ -54,7 +56,10 @@ def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     key: `Gated.key`; gain: nats; strength (k,): of its parameters, in natural steps.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / seconds(data), strength)))
+    sizes = {key: size_of(gain / seconds(data), strength)}
+    if key == OVERHEAD and DOWNWARD in data.study.scatter.passing:
+        sizes[DOWNWARD] = downward(data)
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(sizes))
 
 
 def seconds(data: Data) -> float:

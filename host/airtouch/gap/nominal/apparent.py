@@ -16,6 +16,7 @@ from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated
+from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.second_process import shared
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, size_of
@@ -47,8 +48,9 @@ def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
                     nameless(on, None) / seconds(data),
-                    {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
-                     for n in GATED})
+                    {DOWNWARD: downward(data)}
+                    | {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
+                       for n in GATED})
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
