@@ -6,6 +6,11 @@ Every nominal flight is held twice against up to five others of its vehicle, on 
 own group (drone, day and condition) and of other groups of the same drone. Strengths of both count, rates of the first
 alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
 With --keep, flights that the file holds already are not worked on again.
+
+    python tools/nominal_scatter.py [FLIGHTS] --downward    # 3 min
+
+measures nothing but whether pushes point down, in the same flights of the same groups, and puts that into the table
+that is shipped.
 """
 
 import argparse
@@ -13,12 +18,14 @@ import csv
 import json
 import multiprocessing
 import os
+import re
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from importlib import resources
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -30,9 +37,10 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent
+from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.sealed import blind
 from airtouch.gap.signatures import scatter_estimates
-from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter
+from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, table
 from airtouch.gap.signatures.scatter_estimates import class_scatter
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
@@ -95,8 +103,8 @@ def _read(path: Path) -> Log:
 
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
-             ) -> Iterator[tuple[str, ApparentStrengths]]:
-    """Each flight against others of its group, or against those given."""
+             look: Callable[[Data], ApparentStrengths] = apparent) -> Iterator[tuple[str, ApparentStrengths]]:
+    """Each flight against others of its group, or against those given, as `look` sees it."""
     ready = _ready(logs, vehicle)
     if others is not None:
         base = [f for _, f in _ready(_evenly_spaced(others), vehicle)]
@@ -105,7 +113,7 @@ def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
         if others is None:
             study, _ = calibrate.calibrated(vehicle, _evenly_spaced([f for k, (_, f) in enumerate(ready) if k != i]),
                                             scatter=False)
-        yield name, apparent(Data(study, [flight]))
+        yield name, look(Data(study, [flight]))
 
 
 def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
@@ -116,6 +124,30 @@ def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
     return i, others, [{"file": _name(name, others), "rate": one.rate, "passing": dict(one.passing),
                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
                         "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in comparisons]
+
+
+def pushes(data: Data) -> ApparentStrengths:
+    """Whether pushes point down in a flight, and nothing else."""
+    return ApparentStrengths({}, {}, 0.0, {DOWNWARD: downward(data)})
+
+
+def _pushes_of(i: int) -> list[ApparentStrengths]:
+    """The same of every flight of a group."""
+    *_, vehicle, files = _GROUPS[i]
+    return [one for _, one in held_out(files, vehicle, look=pushes)]
+
+
+def with_pushes(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
+    """The classes of the table that is shipped, with what their flights have of DOWNWARD."""
+    flights = defaultdict(list)
+    for (of, *_), found in zip(groups, pool.map(_pushes_of, range(len(groups))), strict=True):
+        flights[of] += found
+    return {of: replace(one, passing=one.passing | class_scatter(flights[of]).passing) for of, one in table().items()}
+
+
+def counts_of(text: str) -> dict[str, str]:
+    """How many flights each class of a table was measured on, by its comments."""
+    return dict(re.findall(r'^\["(.+)"\]  # (.+)$', text, re.MULTILINE))
 
 
 def _rest(groups: list[Group], i: int) -> list[Log]:
@@ -163,7 +195,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"))
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--downward", action="store_true")
     args = parser.parse_args()
+    if args.downward:
+        _GROUPS[:] = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
+        with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
+            shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
+            write(args.out, text_of(with_pushes(pool, _GROUPS), counts_of(shipped.read_text(encoding="utf-8"))))
+        return
     row_of = {}
     if args.keep and args.keep.exists():
         row_of = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
@@ -193,10 +232,15 @@ def main() -> None:
     classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
     counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups"
               for of, flights in cases.items()}
-    new = args.out.with_suffix(".new")
-    new.write_text(text_of(classes, counts))
-    new.rename(args.out)
-    print(text_of(classes, counts))
+    write(args.out, text_of(classes, counts))
+
+
+def write(path: Path, text: str) -> None:
+    """Write a table and print it."""
+    new = path.with_suffix(".new")
+    new.write_text(text)
+    new.rename(path)
+    print(text)
 
 
 if __name__ == "__main__":

@@ -161,7 +161,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
     selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
     for step in selection.steps:
-        beyond = study.scatter.unusual("downwash", size_of(step.gain / data.seconds, step.strength))
+        beyond = study.scatter.unusual({"downwash": size_of(step.gain / data.seconds, step.strength)})
         assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
 
 

@@ -58,7 +58,7 @@ def evidence(study, one):
     known = overhead.with_overhead(study, one, SECONDS)
     wake = gates.gated_effects(Data(known, [one]))[gates.KNOWN_OVERHEAD]
     size = size_of(wake.gain / (len(one) * PERIOD_S), wake.strength)
-    return known.scatter.unusual(wake.key, size), wake.gain
+    return known.scatter.unusual({wake.key: size}), wake.gain
 
 
 def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, nominal_flight):

@@ -155,7 +155,7 @@ def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
     beyond = []
     for _ in range(50):
         scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
-        beyond += [scatter.unusual("gust", size()) > 0.0 for _ in range(40)]
+        beyond += [scatter.unusual({"gust": size()}) > 0.0 for _ in range(40)]
     assert np.mean(beyond) < 0.06
 
 
@@ -163,14 +163,25 @@ def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
     rng = np.random.default_rng(11)
     sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)
     scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
-    assert np.mean([scatter.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(FALSE_SHARE, rel=0.3)
+    beyond = [scatter.unusual({"downwash": s}) > 0.0 for s in sizes[2000:]]
+    assert np.mean(beyond) == pytest.approx(FALSE_SHARE, rel=0.3)
+
+
+def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary_by_two_sizes_together():
+    """Two sizes that scatter as Student's, independent of one another; one of them far out may do alone."""
+    scatter = Scatter({}, 7.0, (0.0, 1.0), {"downwash": (0.2, 0.1), "downward": (-0.4, 0.4)})
+    sizes = np.random.default_rng(12).standard_t(7.0, (20_000, 2)) * [0.1, 0.4] + [0.2, -0.4]
+    beyond = [scatter.unusual({"downwash": a, "downward": b}) > 0.0 for a, b in sizes]
+    assert np.mean(beyond) == pytest.approx(FALSE_SHARE, rel=0.25)
+    assert scatter.unusual({"downwash": 0.9, "downward": -2.0}) > 0.0 > scatter.unusual({"downwash": 0.45})
+    assert scatter.unusual({"downwash": 0.45, "downward": 0.8}) > 0.0
 
 
 def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():
     scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
-    assert scatter.unusual("downwash", size_of(30.0, np.array([0.01]))) < 0.0
-    assert scatter.unusual("downwash", size_of(0.1, np.array([0.2]))) < 0.0
-    assert scatter.unusual("downwash", size_of(30.0, np.array([0.2]))) > 0.0
+    assert scatter.unusual({"downwash": size_of(30.0, np.array([0.01]))}) < 0.0
+    assert scatter.unusual({"downwash": size_of(0.1, np.array([0.2]))}) < 0.0
+    assert scatter.unusual({"downwash": size_of(30.0, np.array([0.2]))}) > 0.0
 
 
 def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():

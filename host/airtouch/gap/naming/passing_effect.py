@@ -8,7 +8,9 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
+from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.unnamed.generic import height_gain
 
 
@@ -53,4 +55,7 @@ def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / data.seconds, strength)))
+    sizes = {key: size_of(gain / data.seconds, strength)}
+    if key == OVERHEAD and DOWNWARD in data.study.scatter.passing:
+        sizes[DOWNWARD] = downward(data)
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(sizes))

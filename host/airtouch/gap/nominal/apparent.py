@@ -15,6 +15,7 @@ from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import gated_effects
+from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.second_process import shared
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
@@ -46,6 +47,7 @@ def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     passing = gated_effects(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
+    sizes[DOWNWARD] = downward(data)
     return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
                              nameless(on, None) / data.seconds, sizes)
 

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
 from scipy.special import stdtrit
@@ -24,6 +25,7 @@ from scipy.special import stdtrit
 from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS
 
 EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is added to that of every strength
+QUANTILES = 1000  #: of Student's distribution, of which sums of rarities are made; chosen
 STEPS = 12  #: iterations of the compromise between nominal scatter and chance; chosen
 LEAST_SPREAD = 0.05  #: natural steps: scatter of a size at least; chosen
 FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that come and go may be named; chosen
@@ -58,9 +60,10 @@ def size_of(rate: float, strength: np.ndarray) -> float:
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate: mean and standard deviation of its square root; passing by effect: of its size. vehicle: whose flights a class
-    of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
-    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
+    rate: mean and standard deviation of its square root; passing by effect: of its size, and of how far pushes point
+    down (`passing.one_sided`). vehicle: whose flights a class of the table was measured on. middle: mean (k,) of the
+    strengths of a random effect, which are never negative; the others' is 0. exact: whether the flights come from the
+    models that effects are fitted with.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -122,16 +125,34 @@ class Scatter:
         deviations = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
         return least + seconds * (middle + min(deviations, MOST_DEVIATIONS) * spread) ** 2
 
-    def unusual(self, name: str, size: float) -> float:
-        """Log likelihood (Student) by which the size of an effect that comes and goes exceeds that of nominal flights.
+    def unusual(self, sizes: Mapping[str, float]) -> float:
+        """Log likelihood (Student) by which sizes of what comes and goes, together, exceed those of nominal flights.
 
-        It is 0 at the size that a share FALSE_SHARE of nominal flights exceeds, and negative below.
+        sizes: by name, as in `passing`; their log likelihoods add up, as if nominal flights had them independently of
+        one another. It is 0 at the sum that a share FALSE_SHARE of nominal flights exceeds, and negative below.
         """
-        middle, spread = self.passing.get(name, (0.0, 0.0))
-        far = max(size - middle, 0.0) / max(spread, LEAST_SPREAD)
-        limit = float(stdtrit(self.freedom, 1.0 - FALSE_SHARE))
-        rarity, limit_rarity = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
-        return 0.5 * (self.freedom + 1.0) * (rarity - limit_rarity)
+        rarity = 0.0
+        for name, size in sizes.items():
+            middle, spread = self.passing.get(name, (0.0, 0.0))
+            rarity += _rarity(max(size - middle, 0.0) / max(spread, LEAST_SPREAD), self.freedom)
+        return rarity - _exceeded(len(sizes), self.freedom)
+
+
+def _rarity(far: np.ndarray | float, freedom: float) -> Any:
+    """Log of Student's density at 0 over that at `far`."""
+    return 0.5 * (freedom + 1.0) * np.log1p(np.square(far) / freedom)
+
+
+@cache
+def _exceeded(count: int, freedom: float) -> float:
+    """The sum of `count` rarities, of positive draws alone, that a share FALSE_SHARE of Student's draws exceeds."""
+    if count == 1:
+        return float(_rarity(stdtrit(freedom, 1.0 - FALSE_SHARE), freedom))
+    draws = stdtrit(freedom, (np.arange(QUANTILES) + 0.5) / QUANTILES)
+    one = sums = _rarity(np.maximum(draws, 0.0), freedom)
+    for _ in range(count - 1):
+        sums = np.add.outer(sums, one).ravel()
+    return float(np.quantile(sums, 1.0 - FALSE_SHARE))
 
 
 def _least_within(strength: np.ndarray, apart: np.ndarray, chance: np.ndarray) -> np.ndarray:
