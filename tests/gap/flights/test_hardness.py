@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.flights.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
+from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.flights.hardness import CALMER, HARDER, Slopes, hardness_of, slopes_of
 from airtouch.gap.nominal.consistency import flown_unlike
 
 FIRST = np.array([0, 128, 256])

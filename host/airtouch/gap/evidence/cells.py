@@ -5,9 +5,9 @@ A cell's number is VIEW times the number of its view, plus COUNT times that of i
 
 import numpy as np
 
+from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import CHANNELS, COUNT
 
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell: about octaves; no other source
 REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: numbers of the views: in the air, on the ground, of the commands
 VIEW = 1000  #: numbers that are kept for the cells of a view
 CELLS = 3 * VIEW  #: numbers of cells are below it

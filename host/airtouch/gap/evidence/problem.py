@@ -8,10 +8,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.cells import BANDS_HZ, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
+from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
+from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView

@@ -1,10 +1,14 @@
-"""Blocks of a flight, half overlapping, and the Hann window under which their spectra are taken."""
+"""Blocks of a flight, half overlapping, the Hann window under which their spectra are taken, and their bands."""
 
 import functools
 
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
+
+#: Edges of the bands in which a spectrum is judged: about octaves, no other source. The lowest band has the means, the
+#: last edge lies beyond half the log's rate, 50 Hz, which it so includes.
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 
 
 def half_overlapping(may_begin: np.ndarray, length: int) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 What a model leaves of a nominal flight grows with the manoeuvres: motors that are late or
 saturated, air that flows through the rotors. A block's hardness is the logarithm of how much
-its tilt varies. The power of the gap in a channel and band goes with a power of that,
+its tilt varies. The power of the gap in a channel and band (`blocks.BANDS_HZ`) goes with a power of that,
 E[power] = exp(a + slope * hardness), found by gamma regression over the blocks of nominal
 flights (McCullagh and Nelder, Generalized Linear Models, 2nd ed., chapter 8).
 """
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.flight import Flight
 
 STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer; chosen
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of bands, each with one slope; chosen
 #: mean and standard deviation of slopes before any flight; the mean is that of errors that are a share of what is
 #: flown, the deviation is chosen
 PRIOR = (1.0, 1.0)

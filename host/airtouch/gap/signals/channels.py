@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.workspace import Workspace
@@ -68,10 +68,10 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
              controller: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
 
-    `active`: effects that the model has. On the ground with motors off the model is a
-    vehicle at rest. Without a gyro the angular acceleration is taken as zero, which holds
-    at low frequency (the floor says how low). workspace: has what gates put together, for the next gate
-    of the same effects in this flight.
+    `active`: effects that the model has. In the phase GROUND the model is a vehicle at rest, whether the motors run or
+    not: samples there with running motors are never usable (`contact.near_ground`). Without a gyro the angular
+    acceleration is taken as zero, which holds at low frequency (the floor says how low). workspace: has what gates put
+    together, for the next gate of the same effects in this flight.
     """
     gated = [a for a in active if a.gate]
     if not gated:
@@ -104,7 +104,7 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
     model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
     force, turning = model.specific_force, model.angular_acceleration
     turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
-    rest = flight.phase == 0
+    rest = flight.phase == GROUND
     if rest.any():
         up = flight.turn[:, 2, :] * vehicle.gravity_mps2
         force = np.where(rest[:, None], up + row["acc_bias"], force)

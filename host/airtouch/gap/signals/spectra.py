@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
+from airtouch.gap.flights.blocks import BANDS_HZ, count_within, half_overlapping, hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
@@ -22,9 +22,9 @@ OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
 MOST_LOST = 0.1  #: share of lost rows that a block may have; chosen
 HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
 LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted; chosen
-#: Hz, below which torque and rate hold the trim of a flight, which does not go with how hard it is flown: the lowest
-#: band of `hardness.BANDS_HZ`; chosen.
-TRIM_HZ = 0.6
+#: Hz, below which, in the lowest band, torque and rate hold the trim of a flight, which does not go with how hard it is
+#: flown
+TRIM_HZ = BANDS_HZ[1]
 FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
 LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen

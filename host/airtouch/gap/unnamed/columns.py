@@ -10,9 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import BANDS_HZ, CELLS
+from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data, command_torque
 from airtouch.gap.evidence.problem import BlockSet, Problem
+from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
