@@ -18,8 +18,8 @@ class Rolling:
 
     def __init__(self, swing):
         roll = swing * np.sin(2.0 * np.pi * np.arange(512) / 128.0)
-        self.turn = np.zeros((512, 3, 3))
-        self.turn[:, 2] = np.stack([np.zeros(512), np.sin(roll), np.cos(roll)], axis=1)
+        self.body_to_world = np.zeros((512, 3, 3))
+        self.body_to_world[:, 2] = np.stack([np.zeros(512), np.sin(roll), np.cos(roll)], axis=1)
         self.phase = np.ones(512)
         self.on_ground = np.zeros(512, bool)
         self.usable = np.ones(512, bool)

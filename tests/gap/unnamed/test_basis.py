@@ -63,7 +63,7 @@ def test_time_height_and_axes_of_the_world():
     signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 2.0 * HEIGHT_M
     c, s = np.cos(TILT), np.sin(TILT)
     turn = np.tile([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], (len(hover), 1, 1))
-    column = columns(replace(hover, signals=signals, turn=turn))
+    column = columns(replace(hover, signals=signals, body_to_world=turn))
     t = np.arange(len(hover)) * 0.01
     np.testing.assert_allclose(column["time"][:, 0], t / TIME_S)
     np.testing.assert_allclose(column["time_thrust"][:, 0], t / TIME_S * column["thrust"][:, 0])

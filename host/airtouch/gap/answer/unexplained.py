@@ -113,7 +113,7 @@ def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
     """The signals (n,) of a flight that a gap may follow, by their names in the answer."""
     s, log = flight.signals, flight.log
     thrust = study.vehicle.thrust(flight.pwm).sum(axis=1)
-    out = {"thrust": thrust, "tilt": np.hypot(flight.turn[:, 2, 0], flight.turn[:, 2, 1]),
+    out = {"thrust": thrust, "tilt": np.hypot(flight.body_to_world[:, 2, 0], flight.body_to_world[:, 2, 1]),
            "time": np.arange(len(flight)) * PERIOD_S}
     if log.has("zrange_m") or log.has("z_m"):
         out["height"] = s[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1)

@@ -134,5 +134,5 @@ def _corrections(flight: Flight) -> np.ndarray:
     if not all(flight.log.has(name) for name in VELOCITY):
         return np.zeros((len(flight) - 1, 3))
     velocity = np.column_stack([flight.log[name] for name in VELOCITY])
-    world = np.einsum("nij,nj->ni", flight.turn, flight.acceleration)
+    world = np.einsum("nij,nj->ni", flight.body_to_world, flight.acceleration)
     return np.nan_to_num(np.diff(velocity, axis=0) - 0.5 * PERIOD_S * (world[1:] + world[:-1]))

@@ -8,13 +8,13 @@ import numpy as np
 from airtouch.gap.features.feature import LEAST_COHERENCE, LEAST_LOG, Feature
 from airtouch.gap.features.flight_signals import (
     ANGLE_RESIDUAL,
+    ANGULAR_ACCELERATION,
     COMMAND,
     FORCE_RESIDUAL,
     LIFT,
     RANGE_RESIDUAL,
     SPEED_RESIDUAL,
     TORQUE_RESIDUAL,
-    TURN,
     FlightSignals,
 )
 from airtouch.gap.flights.flight import Flight
@@ -27,13 +27,13 @@ LACKING_SHARE = 0.2  #: share of the blocks, up to which those that lack a row a
 LEAST_ALONE = 1e-4  #: share of a signal's power that the others of its group do not predict, at least
 #: signals that move together, each by its name and its column of the table: roll with y, pitch with x, climb, yaw
 GROUPS: dict[str, dict[str, int]] = {
-    **{axis: {"command": COMMAND.start + 1 + turned, "turn": TURN.start + turned,
+    **{axis: {"command": COMMAND.start + 1 + turned, "turn": ANGULAR_ACCELERATION.start + turned,
               "force": FORCE_RESIDUAL.start + pushed, "torque": TORQUE_RESIDUAL.start + turned,
               "speed": SPEED_RESIDUAL.start + pushed, "angle": ANGLE_RESIDUAL.start + turned}
        for axis, turned, pushed in (("roll", 0, 1), ("pitch", 1, 0))},
     "climb": {"command": COMMAND.start, "lift": LIFT.start, "force": FORCE_RESIDUAL.start + 2,
               "speed": SPEED_RESIDUAL.start + 2, "range": RANGE_RESIDUAL.start},
-    "yaw": {"command": COMMAND.start + 3, "turn": TURN.start + 2, "torque": TORQUE_RESIDUAL.start + 2,
+    "yaw": {"command": COMMAND.start + 3, "turn": ANGULAR_ACCELERATION.start + 2, "torque": TORQUE_RESIDUAL.start + 2,
             "angle": ANGLE_RESIDUAL.start + 2},
 }
 

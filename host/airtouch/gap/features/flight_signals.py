@@ -16,14 +16,15 @@ from airtouch.vehicle import Vehicle
 
 NEEDED = (*GYRO, *VELOCITY, *ATTITUDE, "zrange_m", "z_m")  #: columns beside commands and accelerations
 #: columns of `FlightSignals.table`, by what they are of
-COMMAND, TURN, LIFT, FORCE_RESIDUAL, TORQUE_RESIDUAL, SPEED_RESIDUAL, ANGLE_RESIDUAL, RANGE_RESIDUAL = (
-    slice(0, 4), slice(4, 7), slice(7, 8), slice(8, 11), slice(11, 14), slice(14, 17), slice(17, 20), slice(20, 21))
+COMMAND, ANGULAR_ACCELERATION, LIFT = slice(0, 4), slice(4, 7), slice(7, 8)
+FORCE_RESIDUAL, TORQUE_RESIDUAL, SPEED_RESIDUAL = slice(8, 11), slice(11, 14), slice(14, 17)
+ANGLE_RESIDUAL, RANGE_RESIDUAL = slice(17, 20), slice(20, 21)
 #: their names, one by one
 COLUMNS = ("thrust command", "roll command", "pitch command", "yaw command", *(f"turn {a}" for a in "xyz"), "lift",
            *(f"{what} residual {a}" for what in ("force", "torque", "speed", "angle") for a in "xyz"), "range residual")
 COUNT = len(COLUMNS)
 #: down range over standing below which legs may touch in flight, and for how long around it
-CONTACT_M, CONTACT_S = 0.012, 0.15  # chosen
+LEGS_M, LEGS_S = 0.012, 0.15  # chosen
 JUMP_MPS = 4.0  #: change of the down range from which another surface came below; chosen
 
 
@@ -57,7 +58,7 @@ def signals_of(flight: Flight, vehicle: Vehicle) -> FlightSignals:
     log = flight.log
     angles, velocity = interpolate_missing(log.stack(ATTITUDE)), flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
     force = np.nan_to_num(residual(flight, vehicle))
-    gravity = flight.turn[:, 2, :] * vehicle.gravity_mps2
+    gravity = flight.body_to_world[:, 2, :] * vehicle.gravity_mps2
     assert flight.rates is not None  # `NEEDED` has the gyro
     rates = 0.5 * (flight.rates + np.roll(flight.rates, -1, axis=0))
     down = _rate(interpolate_missing(log["zrange_m"])[:, None])
@@ -84,5 +85,5 @@ def _rate(values: np.ndarray) -> np.ndarray:
 def _touched(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Samples (n,) in flight around those at which the legs may touch what is below."""
     standing = float(prepare(vehicle, ())[0][0]["leg_below_range"])
-    low = (flight.phase != GROUND) & (interpolate_missing(flight.log["zrange_m"]) < standing + CONTACT_M)
-    return within(low, CONTACT_S)
+    low = (flight.phase != GROUND) & (interpolate_missing(flight.log["zrange_m"]) < standing + LEGS_M)
+    return within(low, LEGS_S)

@@ -32,8 +32,8 @@ class Flight:
     """One flight of n samples on a regular 10 ms clock.
 
     signals (n, simulation.signals.COUNT): what effects see; acceleration (n, 3): specific force in body axes, m/s^2;
-    rates (n, 3): of the gyro, rad/s, None without one; pwm (n, 4): motor commands, 16 bits; turn (n, 3, 3): body to
-    world; phase (n,): places in `segments.KINDS`; usable (n,): neither lost nor close to a touch of the ground;
+    rates (n, 3): of the gyro, rad/s, None without one; pwm (n, 4): motor commands, 16 bits; body_to_world (n, 3, 3):
+    rotation; phase (n,): places in `segments.KINDS`; usable (n,): neither lost nor close to a touch of the ground;
     clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure; lost (n,):
     rows that did not arrive; touching (n,): in flight, so low that the legs may touch; notes, cannot: sentences on what
     was left out of the log, and on what no diagnosis of it can tell.
@@ -45,7 +45,7 @@ class Flight:
     acceleration: np.ndarray
     rates: np.ndarray | None
     pwm: np.ndarray
-    turn: np.ndarray
+    body_to_world: np.ndarray
     phase: np.ndarray
     usable: np.ndarray
     clock_s: np.ndarray
@@ -60,7 +60,7 @@ class Flight:
 
     @property
     def bridged(self) -> np.ndarray:
-        """Samples whose gap is nobody's, bool (n,): the log lost them, or the floor held the legs."""
+        """Samples whose residual is not evidence, bool (n,): the row was lost, or the legs may touch the floor."""
         return self.lost | self.touching
 
     @property
@@ -86,15 +86,16 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         raise AirTouchError(f"{name}: no flight in it ({(~ground).sum() * PERIOD_S:.1f} s in the air); "
                             f"at least {LEAST_AIR_S:g} s are needed")
     angles = attitude(log)
-    turn = as_matrix(*angles.T)
-    force = _body_force(log, turn, vehicle.gravity_mps2)
-    signals, touching = _signals(log, angles, turn, phase, vehicle)
+    body_to_world = as_matrix(*angles.T)
+    force = _body_force(log, body_to_world, vehicle.gravity_mps2)
+    signals, touching = _signals(log, angles, body_to_world, phase, vehicle)
     rates = interpolate_missing(log.stack(GYRO)) if log.has(*GYRO) else None
     pwm = interpolate_missing(log.stack(PWM))
     running = pwm.max(axis=1) > 0.0
     usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
-    return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm, turn=turn, phase=phase,
-                  usable=usable, clock_s=clock, lost=lost, touching=touching, notes=notes, cannot=cannot)
+    return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
+                  body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
+                  notes=notes, cannot=cannot)
 
 
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
@@ -103,19 +104,19 @@ def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -
     if len(log.columns) == len(flight.log.columns):
         return flight
     angles = attitude(log)
-    return replace(flight, log=log, signals=_signals(log, angles, flight.turn, flight.phase, vehicle)[0])
+    return replace(flight, log=log, signals=_signals(log, angles, flight.body_to_world, flight.phase, vehicle)[0])
 
 
-def _body_force(log: FlightLog, turn: np.ndarray, gravity: float) -> np.ndarray:
-    """Specific force (n, 3) m/s^2 in body axes. turn: (n, 3, 3) body to world; gravity: m/s^2.
+def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np.ndarray:
+    """Specific force (n, 3) m/s^2 in body axes. body_to_world (n, 3, 3): rotation; gravity: m/s^2.
 
     Of logs in world axes, some have gravity already subtracted: it is added again.
     """
     force = interpolate_missing(log.stack(ACC))
     if log.meta.get("acc_frame") == "world":
-        force = np.einsum("nji,nj->ni", turn, force)
+        force = np.einsum("nji,nj->ni", body_to_world, force)
         if np.median(force[:, 2]) < WITHOUT_GRAVITY * gravity:
-            force += np.einsum("nji,j->ni", turn, [0.0, 0.0, gravity])
+            force += np.einsum("nji,j->ni", body_to_world, [0.0, 0.0, gravity])
     return force
 
 
@@ -127,14 +128,14 @@ def _phases(log: FlightLog) -> np.ndarray:
     return phase
 
 
-def _signals(log: FlightLog, angles: np.ndarray, turn: np.ndarray, phase: np.ndarray, vehicle: Vehicle,
+def _signals(log: FlightLog, angles: np.ndarray, body_to_world: np.ndarray, phase: np.ndarray, vehicle: Vehicle,
              ) -> tuple[np.ndarray, np.ndarray]:
     """Signals (n, COUNT) for effects, and `Flight.touching`. angles: (n, 3) rad, as the columns of ATTITUDE."""
     known = log.with_columns(dict(zip(ATTITUDE, angles.T, strict=True)))
     whole = {name: interpolate_missing(values) for name, values in known.columns.items()}
     signals = replay.signals_of(FlightLog(whole, known.meta), vehicle, (), PERIOD_S)
     row = prepare(vehicle, ())[0][0]
-    heights = rotor_heights(log, turn, row, phase == GROUND)
+    heights = rotor_heights(log, body_to_world, row, phase == GROUND)
     touching = np.zeros(len(log), bool)
     if heights is None:
         return signals, touching
@@ -144,5 +145,3 @@ def _signals(log: FlightLog, angles: np.ndarray, turn: np.ndarray, phase: np.nda
         low = (phase != GROUND) & (heights.mean(axis=1) < standing_height(row) + TOUCH_M)
         touching = within(low, TOUCH_S)
     return signals, touching
-
-

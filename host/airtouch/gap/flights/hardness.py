@@ -53,7 +53,7 @@ def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
     """Logarithm (blocks,) of the standard deviation of tilt, over STILL_RAD, in blocks of `length` samples."""
     if not len(first):
         return np.zeros(0)
-    tilt = flight.turn[:, 2, :2]  # the vertical in body axes: sines of pitch and roll
+    tilt = flight.body_to_world[:, 2, :2]  # the vertical in body axes: sines of pitch and roll
     cut = tilt[first[:, None] + np.arange(length)]
     return 0.5 * np.log1p(cut.var(axis=1).sum(axis=1) / STILL_RAD ** 2)
 

@@ -14,16 +14,16 @@ MOST_AHEAD = 100  #: samples at most by which a rotor passes an edge before or a
 STEP_M = 0.06  #: change of the down range between two samples from which it is a step of the floor; chosen
 
 
-def rotor_heights(log: FlightLog, turn: np.ndarray, row: np.void, on_ground: np.ndarray) -> np.ndarray | None:
+def rotor_heights(log: FlightLog, body_to_world: np.ndarray, row: np.void, on_ground: np.ndarray) -> np.ndarray | None:
     """Height (n, 4) of each rotor over what is under it, m; None without down range and position.
 
-    turn (n, 3, 3): body to world; row: of the plant (`simulation.flight.prepare`), for where rotors, range sensor and
-    legs are; on_ground (n,): bool. Without a down range the floor is taken as flat and the height is that above
+    body_to_world (n, 3, 3): rotation; row: of the plant (`simulation.flight.prepare`), for where rotors, range sensor
+    and legs are; on_ground (n,): bool. Without a down range the floor is taken as flat and the height is that above
     standing, plus the rotors' height then.
     """
-    rise = turn[:, 2, :1] * row["rotor_x"] + turn[:, 2, 1:2] * row["rotor_y"]
+    rise = body_to_world[:, 2, :1] * row["rotor_x"] + body_to_world[:, 2, 1:2] * row["rotor_y"]
     if log.has("zrange_m"):
-        return _over_steps(log, turn, row, rise)
+        return _over_steps(log, body_to_world, row, rise)
     if not log.has(POSITION[2]):
         return None
     z = interpolate_missing(log[POSITION[2]])
@@ -35,7 +35,7 @@ def standing_height(row: np.void) -> float:
     return row["range_below_rotors"] + row["leg_below_range"]
 
 
-def _over_steps(log: FlightLog, turn: np.ndarray, row: np.void, rise: np.ndarray) -> np.ndarray:
+def _over_steps(log: FlightLog, body_to_world: np.ndarray, row: np.void, rise: np.ndarray) -> np.ndarray:
     """`rotor_heights` from the down range under the middle; rise (n, 4): of each rotor over the middle, m.
 
     The edge passes under a rotor earlier or later than under the sensor, by the rotor's distance along the path over
@@ -44,19 +44,19 @@ def _over_steps(log: FlightLog, turn: np.ndarray, row: np.void, rise: np.ndarray
     height = interpolate_missing(log["zrange_m"]) + row["range_below_rotors"]
     altitude = _altitude(log, height)
     index, floor = np.arange(len(log), dtype=np.float64), altitude - height
-    ahead = _samples_ahead(log, turn, row)
+    ahead = _samples_ahead(log, body_to_world, row)
     under_rotors = np.column_stack([np.interp(index + ahead[:, i], index, floor) for i in range(4)])
     return np.maximum(altitude[:, None] - under_rotors + rise, 0.0)
 
 
-def _samples_ahead(log: FlightLog, turn: np.ndarray, row: np.void) -> np.ndarray:
+def _samples_ahead(log: FlightLog, body_to_world: np.ndarray, row: np.void) -> np.ndarray:
     """Samples (n, 4) by which each rotor passes a place earlier than the range sensor; 0 where nothing moves."""
     ahead = np.zeros((len(log), 4))
     if log.has(*VELOCITY[:2]):
         velocity = smoothed_speed(log, COURSE_S)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         moving = speed > MOVING_MPS
-        along = np.einsum("nij,nj->ni", turn[:, :2, :2].transpose(0, 2, 1), velocity)  # in body axes
+        along = np.einsum("nij,nj->ni", body_to_world[:, :2, :2].transpose(0, 2, 1), velocity)  # in body axes
         way = along[:, :1] * row["rotor_x"] + along[:, 1:] * row["rotor_y"]
         ahead[moving] = way[moving] / speed[moving, None] ** 2 / PERIOD_S
     return np.clip(ahead, -MOST_AHEAD, MOST_AHEAD)

@@ -106,7 +106,7 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
     turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
     rest = flight.phase == GROUND
     if rest.any():
-        up = flight.turn[:, 2, :] * vehicle.gravity_mps2
+        up = flight.body_to_world[:, 2, :] * vehicle.gravity_mps2
         force = np.where(rest[:, None], up + row["acc_bias"], force)
         turning = np.where(rest[:, None], 0.0, turning)
     out[:, FORCE] = flight.acceleration - force

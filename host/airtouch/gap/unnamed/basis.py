@@ -38,5 +38,5 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     columns[:, 1:] *= air[:, None]
     out = np.repeat(columns[:, :, None], 3, axis=2)
     place = BASIS.index("world_x")
-    out[:, place:place + 3] = flight.turn * air[:, None, None]
+    out[:, place:place + 3] = flight.body_to_world * air[:, None, None]
     return out
