@@ -21,6 +21,7 @@ from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects.effect import Gate
 
+PARAMETER_PRICE = 0.5  #: nats of each parameter, times the logarithm of the number of blocks (Schwarz 1978)
 KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle is known to be overhead
 
 
@@ -99,6 +100,7 @@ def _in_gate(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost:
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(base.data, base.whole, acting)
     free = sum(len(t.free) for t in acting)
-    without = base.level[bool(random_of(acting))]
-    gain = judge(base.data, base.whole, fitted.terms) - without - cost - 0.5 * free * np.log(len(base.each))
+    level_without = base.level[bool(random_of(acting))]
+    price = PARAMETER_PRICE * free * np.log(len(base.each))
+    gain = judge(base.data, base.whole, fitted.terms) - level_without - cost - price
     return GatedEffect(name, fitted, gain, cost, name)

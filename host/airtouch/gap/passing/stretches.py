@@ -28,22 +28,22 @@ WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come a
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 
 
-def stretches_of(data: Data, whole: BlockSet, without: np.ndarray, terms: Sequence[Term],
+def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: Sequence[Term],
                  ) -> tuple[Sequence[Term], Gate, float]:
     """An effect as fitted where it acts, the stretches of blocks in which it does, and nats that their choice costs.
 
-    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; without (b,): log likelihood of
-    each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
-    which it gains, ROUNDS times at most; then the stretches' ends are moved.
+    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; level_without (b,): log
+    likelihood of each in the air without the effect. The effect is fitted to the blocks that are explained worst, then
+    to those in which it gains, ROUNDS times at most; then the stretches' ends are moved.
     """
-    air, price = problem_of(data, whole).air, price_of_stretches(len(without))
+    air, price = problem_of(data, whole).air, price_of_stretches(len(level_without))
     at_the_ends = _at_the_ends(data, air)
-    acting = _explained_worst(air, without)
+    acting = _explained_worst(air, level_without)
     for _ in range(ROUNDS):
         fitted = fit(data, _part(whole, acting), terms)
-        gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - without)
+        gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - level_without)
         stretches = best_stretches(gain, air.flight, price)
-        chosen = np.zeros(len(without), bool)
+        chosen = np.zeros(len(level_without), bool)
         for first, last in stretches:
             chosen[first:last + 1] = True
         if not stretches or chosen.mean() > WHOLE:
@@ -96,11 +96,11 @@ def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     return np.bincount(problem.air.of[in_air], each[in_air])
 
 
-def _explained_worst(air: AirBlocks, without: np.ndarray) -> np.ndarray:
+def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:
     """Which blocks (b,) are explained worst: a share WORST of them, of the least log likelihood of a value."""
-    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(without)), 1)
-    out = np.zeros(len(without), bool)
-    out[np.argsort(without / count)[:max(int(WORST * len(without)), LEAST_WORST)]] = True
+    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(level_without)), 1)
+    out = np.zeros(len(level_without), bool)
+    out[np.argsort(level_without / count)[:max(int(WORST * len(level_without)), LEAST_WORST)]] = True
     return out
 
 
