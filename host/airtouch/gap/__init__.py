@@ -22,7 +22,7 @@ Where each decision is made; a folder imports only those above it:
   `random_effects` and `vibration_lines`; `clock`, what only the log's times show.
 - `passing`, what comes and goes: `gates`, of `stretches` of blocks and `bursts`; `overhead` takes its seconds from
   another vehicle's log.
-- `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
+- `unnamed`, what no effect explains: `nameless`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
 - `features`, what a flight's signals do to one another, in numbers: of its `flight_signals` the `coherence`, `moments`
   and `edge_steps`, each number a `feature`, all of them `flight_features`; their `feature_space`.

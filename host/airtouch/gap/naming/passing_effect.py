@@ -11,7 +11,7 @@ from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effect
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
-from airtouch.gap.unnamed.generic import height_gain
+from airtouch.gap.unnamed.nameless import height_gain
 
 
 def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],

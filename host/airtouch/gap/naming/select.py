@@ -1,6 +1,6 @@
 """Which effect: candidates are judged one against another and added one by one while held-out data ask for them.
 
-`none` is the hypothesis of no effect. `unknown` is a model without names (gap.unnamed.generic): it needs more
+`none` is the hypothesis of no effect. `unknown` is a model without names (gap.unnamed.nameless): it needs more
 parameters, so a named effect that is right beats it; where it gains much on top of the named effects, something is left
 that they do not explain.
 """
@@ -24,7 +24,7 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
 from airtouch.gap.signatures.term import Terms
-from airtouch.gap.unnamed.generic import generic_gain
+from airtouch.gap.unnamed.nameless import nameless_gain
 from airtouch.simulation import effects
 
 #: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
@@ -111,7 +111,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
 def nameless(on: Trial, chosen: Candidate | None) -> float:
     """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())
+    return max(sum(nameless_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())
 
 
 def _nominal_gain(data: Data) -> float:

@@ -25,7 +25,7 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.generic import unnamed_floor
+from airtouch.gap.unnamed.nameless import nameless_floor
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -64,7 +64,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     flights, left_out = split_unlike(vehicle, flights, FAR)
     declared = declared_study(vehicle, flights)
     study, fitted = _fitted_vehicle(declared, flights)
-    study = replace(study, unnamed_floor=unnamed_floor(Data(study, flights)))
+    study = replace(study, nameless_floor=nameless_floor(Data(study, flights)))
     if scatter:
         study = replace(study, scatter=baseline_scatter(study, flights, without))
     if study.simulated:

@@ -17,8 +17,8 @@ class Study:
     """What flights are compared with.
 
     vehicle, calibration: the model without effects; controller: the nominal loops, None without them; floor: power of
-    the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; unnamed_floor:
-    scatter of nominal flights in a model without names (`unnamed.columns.UnnamedFloor`); nominal: how many nominal
+    the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; nameless_floor:
+    scatter of nominal flights in a model without names (`unnamed.columns.NamelessFloor`); nominal: how many nominal
     flights there are; scatter: how strong effects seem to be in them, None without any; relations: what was learned of
     such flights (`relations.library.Library`), if anything; overhead: when another vehicle is known to be overhead,
     none where nobody knows.
@@ -29,7 +29,7 @@ class Study:
     controller: ClosedLoop | None
     floor: Floor
     response: Response | None = None
-    unnamed_floor: Any = None
+    nameless_floor: Any = None
     nominal: int = 0
     scatter: Scatter | None = None
     relations: Any = None

@@ -1,4 +1,4 @@
-"""The flight's own signals, for a regression of a hypothesis's residual (gap.unnamed.generic)."""
+"""The flight's own signals, for a regression of a hypothesis's residual (gap.unnamed.nameless)."""
 
 import numpy as np
 

@@ -34,16 +34,16 @@ OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate((
 
 
 @dataclass(frozen=True)
-class UnnamedFloor:
+class NamelessFloor:
     """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, CELLS)."""
 
     columns: np.ndarray
     power: np.ndarray
 
 
-def no_floor() -> UnnamedFloor:
+def no_floor() -> NamelessFloor:
     """The floor where no nominal flight is known: coefficients and powers without scatter."""
-    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, CELLS)))
+    return NamelessFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, CELLS)))
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Regressors:
         """Columns whose coefficient may be anything."""
         return self.columns.shape[1] - len(self.offsets)
 
-    def precision(self, floor: UnnamedFloor) -> np.ndarray:
+    def precision(self, floor: NamelessFloor) -> np.ndarray:
         """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
         nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
@@ -135,7 +135,7 @@ def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.nda
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
 
 
-def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
+def allowed_columns(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
     """Whether a column says something new beside a hypothesis, bool (WIDEST,).
 
     A random torque is in the commands that answer it: what is left follows these, as it should. And how a changed loop

@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, above_means, band_cells, channel_cells, sensor_cells
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
-from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor
+from airtouch.gap.unnamed.columns import NOTHING, NamelessFloor
 
 BELIEF = 2.0  #: nominal flights that the scatter of all channels together counts as in the band of one; chosen
 #: Least standard deviation of the logarithm of power between flights, simulated and recorded: no effect's spectrum, and
@@ -69,7 +69,7 @@ def power_factors(powers: Powers, middle: np.ndarray, spread: np.ndarray) -> tup
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
-def power_gain(trained: Powers, held_out: Powers, floor: UnnamedFloor, simulated: bool) -> float:
+def power_gain(trained: Powers, held_out: Powers, floor: NamelessFloor, simulated: bool) -> float:
     """Log likelihood that free powers, fitted to the trained half, gain on the one held out.
 
     They are those of every cell, or of all the bands of a sensor together, where slightly stronger noise shows. In

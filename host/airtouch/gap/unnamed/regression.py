@@ -8,7 +8,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Regressors, UnnamedFloor, no_floor, regressors_of
+from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
 from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
 ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
@@ -32,7 +32,8 @@ class HalfResiduals:
         self.cells = problem.cells
         self.regressors = regressors_of(data, part, problem)
 
-    def system(self, one: Regressors, values: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def normal_equations(self, one: Regressors, values: np.ndarray, residual: np.ndarray,
+                         ) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (columns, columns) and right-hand side (columns,) for values (elements,) of one channel
         of one flight.
 
@@ -43,7 +44,7 @@ class HalfResiduals:
         weighted = one.columns.conj().T * weights
         return 2.0 * (weighted @ one.columns).real, 2.0 * (weighted @ values).real
 
-    def without(self, one: Regressors, fitted: np.ndarray, floor: UnnamedFloor) -> tuple[np.ndarray, float]:
+    def residual_under(self, one: Regressors, fitted: np.ndarray, floor: NamelessFloor) -> tuple[np.ndarray, float]:
         """Residual (elements,) of one channel of one flight under fitted coefficients, and its log likelihood.
 
         What nominal flights may have of the columns is taken off as well. fitted (columns,): the coefficients that all
@@ -52,7 +53,7 @@ class HalfResiduals:
         values = self.values[one.own] - one.columns[:, :one.free] @ fitted[:one.free]
         residual, precision = values, one.precision(floor)
         for _ in range(OWN_ROUNDS):
-            normal, right = self.system(one, values, residual)
+            normal, right = self.normal_equations(one, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
             residual = values - one.columns @ x
         nu, tail = self.problem.freedom[one.own], self.problem.tail[one.own]
@@ -65,20 +66,20 @@ class HalfResiduals:
         over = squared(residuals[known]) / self.power[known]
         return Powers(over, self.problem.freedom[known], self.problem.tail[known], self.cells[known])
 
-    def without_columns(self, fitted: np.ndarray, floor: UnnamedFloor) -> np.ndarray:
-        """Residuals (elements,) under fitted coefficients (CHANNELS, WIDEST), as `without` has them of each channel
-        of each flight."""
+    def residuals_under(self, fitted: np.ndarray, floor: NamelessFloor) -> np.ndarray:
+        """`residual_under` of every channel of every flight, (elements,). fitted (CHANNELS, WIDEST): coefficients."""
         residuals = self.values.copy()
         for one in self.regressors:
-            residuals[one.own], _ = self.without(one, fitted[one.channel], floor)
+            residuals[one.own], _ = self.residual_under(one, fitted[one.channel], floor)
         return residuals
 
-    def floor_powers(self, floor: UnnamedFloor) -> Powers:
+    def floor_powers(self, floor: NamelessFloor) -> Powers:
         """`powers` without what nominal flights may have of the columns."""
-        return self.powers(self.without_columns(np.zeros((CHANNELS, WIDEST)), floor))
+        return self.powers(self.residuals_under(np.zeros((CHANNELS, WIDEST)), floor))
 
 
-def coefficients(half: HalfResiduals, channel: int, floor: UnnamedFloor, among: np.ndarray | None = None) -> np.ndarray:
+def coefficients(half: HalfResiduals, channel: int, floor: NamelessFloor, among: np.ndarray | None = None,
+                 ) -> np.ndarray:
     """Coefficients (WIDEST,) that a channel asks for, one column after another; zero for the others.
 
     among (WIDEST,): the columns that may be asked for; all by default.
@@ -94,12 +95,12 @@ def coefficients(half: HalfResiduals, channel: int, floor: UnnamedFloor, among: 
         free = _worth_asking(normal, right, allowed)
         fitted = np.zeros(WIDEST)
         fitted[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
-        residuals = [half.without(c, fitted, floor)[0] for c in sets]
+        residuals = [half.residual_under(c, fitted, floor)[0] for c in sets]
     return fitted
 
 
 def _shared_system(half: HalfResiduals, sets: Sequence[Regressors], residuals: Sequence[np.ndarray],
-                   floor: UnnamedFloor) -> tuple[np.ndarray, np.ndarray]:
+                   floor: NamelessFloor) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and right-hand side of the coefficients that all flights share, each flight's own solved for.
 
     residuals: of each of the sets of regressors under earlier coefficients.
@@ -107,7 +108,7 @@ def _shared_system(half: HalfResiduals, sets: Sequence[Regressors], residuals: S
     n = sets[0].free
     total, right = np.zeros((n, n)), np.zeros(n)
     for one, residual in zip(sets, residuals, strict=True):
-        normal, slope = half.system(one, half.values[one.own], residual)
+        normal, slope = half.normal_equations(one, half.values[one.own], residual)
         ridge = normal + np.diag(one.precision(floor))
         own = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
         total += normal[:n, :n] - normal[:n] @ own[:, :n]
@@ -133,13 +134,14 @@ def _gain(normal: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
     return 0.5 * float(right[free] @ np.linalg.solve(normal[np.ix_(free, free)], right[free]))
 
 
-def linear_gain(half: HalfResiduals, channel: int, fitted: np.ndarray, floor: UnnamedFloor) -> float:
+def linear_gain(half: HalfResiduals, channel: int, fitted: np.ndarray, floor: NamelessFloor) -> float:
     """Log likelihood that the coefficients (WIDEST,) of a channel, fitted elsewhere, gain on a half."""
     if not fitted.any():
         return 0.0
     nothing = np.zeros(WIDEST)
-    return float(gain_at_even_odds(sum(half.without(c, fitted, floor)[1] - half.without(c, nothing, floor)[1]
-                                       for c in half.regressors if c.channel == channel)))
+    own = [c for c in half.regressors if c.channel == channel]
+    return float(gain_at_even_odds(sum(half.residual_under(c, fitted, floor)[1]
+                                       - half.residual_under(c, nothing, floor)[1] for c in own)))
 
 
 def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
@@ -159,8 +161,8 @@ def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
 def _one_by_one(half: HalfResiduals, one: Regressors) -> tuple[np.ndarray, np.ndarray]:
     """Coefficient and variance (columns,) of every column of one channel of a flight, each beside the offsets."""
     n = one.free
-    residual = half.without(one, np.zeros(n), no_floor())[0]
-    normal, right = half.system(one, half.values[one.own], residual)
+    residual = half.residual_under(one, np.zeros(n), no_floor())[0]
+    normal, right = half.normal_equations(one, half.values[one.own], residual)
     estimate, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         index = [k, *range(n, len(right))]

@@ -9,7 +9,7 @@ from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signatures import candidates
-from airtouch.gap.unnamed import generic
+from airtouch.gap.unnamed import nameless
 from airtouch.gap.unnamed.basis import BASIS
 from airtouch.gap.unnamed.columns import WIDEST
 from airtouch.gap.unnamed.regression import HalfResiduals, coefficients
@@ -38,7 +38,7 @@ def sideways():
 
 def gain_of(study, flights):
     data = Data(study, flights)
-    return sum(generic.generic_gain(data, halves(data), [(), ()]))
+    return sum(nameless.nameless_gain(data, halves(data), [(), ()]))
 
 
 def test_nominal_flights_of_other_seeds_have_nothing_left(study):
@@ -49,7 +49,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
     flights = fly(1, 45, {"sideways": {"push": PUSH}})
     data = Data(study, flights)
-    push_per_speed = [coefficients(HalfResiduals(data, p, ()), 1, study.unnamed_floor)[BASIS.index("vx")]
+    push_per_speed = [coefficients(HalfResiduals(data, p, ()), 1, study.nameless_floor)[BASIS.index("vx")]
                       for p in halves(data)]
     np.testing.assert_allclose(push_per_speed, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, flights) > 30.0
@@ -66,8 +66,8 @@ def test_an_effect_with_its_name_beats_the_model_without(study):
     fits = [fit.fit(data, p, (term,)) for p in parts]
     effect_gain = sum(fit.judge(data, parts[1 - k], f.terms) - fit.judge(data, parts[1 - k], ())
                       for k, f in enumerate(fits))
-    before = sum(generic.generic_gain(data, parts, [(), ()]))
-    after = sum(generic.generic_gain(data, parts, [f.terms for f in fits]))
+    before = sum(nameless.nameless_gain(data, parts, [(), ()]))
+    after = sum(nameless.nameless_gain(data, parts, [f.terms for f in fits]))
     assert 30.0 < before < effect_gain and after < 0.15 * effect_gain
 
 
@@ -76,10 +76,10 @@ def beside(study, term, values, seed):
     data = Data(study, fly(1, seed, {term.name: values}))
     parts = halves(data)
     fits = [fit.fit(data, p, [term]).terms for p in parts]
-    gain = generic.generic_gain(data, parts, fits)[0]
+    gain = nameless.nameless_gain(data, parts, fits)[0]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generic, "answerable", lambda *_: np.ones(WIDEST, bool))
-        return gain, generic.generic_gain(data, parts, fits)[0]
+        patch.setattr(nameless, "allowed_columns", lambda *_: np.ones(WIDEST, bool))
+        return gain, nameless.nameless_gain(data, parts, fits)[0]
 
 
 def test_what_answers_a_random_torque_is_not_new_beside_it(study):

@@ -15,45 +15,45 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, UnnamedFloor, answerable, no_floor
+from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
 from airtouch.gap.unnamed.powers import power_floor, power_gain
 from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, column_floor, linear_gain
 
 LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
 
 
-def generic_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
+def nameless_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
     """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
 
     terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
     flights alone: a recorded one had calm air; and not in the band of the means, of which offsets take what they may.
     """
-    floor = data.study.unnamed_floor or no_floor()
+    floor = data.study.nameless_floor or no_floor()
     linear = power = 0.0
     for train, test in ROUND_TRIP:
         trained, held_out = (HalfResiduals(data, parts[half], terms[train]) for half in (train, test))
-        fitted = np.array([coefficients(trained, channel, floor, answerable(data, terms[train], channel))
+        fitted = np.array([coefficients(trained, channel, floor, allowed_columns(data, terms[train], channel))
                            for channel in range(CHANNELS)])
         for channel in range(CHANNELS):
             linear += linear_gain(held_out, channel, fitted[channel], floor)
-        powers = [half.powers(half.without_columns(fitted, floor)) for half in (trained, held_out)]
+        powers = [half.powers(half.residuals_under(fitted, floor)) for half in (trained, held_out)]
         power += power_gain(powers[0], powers[1], floor, data.study.simulated)
     return linear, power
 
 
 def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
     """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
-    floor = data.study.unnamed_floor or no_floor()
+    floor = data.study.nameless_floor or no_floor()
     halves = [HalfResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
     return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
                for train, test in ROUND_TRIP)
 
 
-def unnamed_floor(data: Data) -> UnnamedFloor:
+def nameless_floor(data: Data) -> NamelessFloor:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
     halves = [HalfResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     if len(halves) < 2:
         return no_floor()
-    floor = UnnamedFloor(column_floor(halves), no_floor().power)
-    return UnnamedFloor(floor.columns, power_floor([h.floor_powers(floor) for h in halves]))
+    floor = NamelessFloor(column_floor(halves), no_floor().power)
+    return NamelessFloor(floor.columns, power_floor([h.floor_powers(floor) for h in halves]))
