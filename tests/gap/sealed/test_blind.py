@@ -231,11 +231,11 @@ def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():
     def case(**nats):
         return {"ranking": [{"name": n, "nats": x} for n, x in nats.items()]}
 
-    assert blind_score.told_apart(case(mass=50.0, wind=30.0), "mass", ["wind"])
-    assert not blind_score.told_apart(case(mass=50.0, wind=45.0), "mass", ["wind"])
-    assert not blind_score.told_apart(case(mass=50.0, wind=30.0, gust=15.0), "mass", ["wind", "gust"])
-    assert blind_score.told_apart(case(mass=5.0), "mass", [])
-    assert blind_score.told_apart({"ranking": [{"name": "mass"}]}, "mass", ["wind"])  # gains not known
+    assert blind_score.separable(case(mass=50.0, wind=30.0), "mass", ["wind"])
+    assert not blind_score.separable(case(mass=50.0, wind=45.0), "mass", ["wind"])
+    assert not blind_score.separable(case(mass=50.0, wind=30.0, gust=15.0), "mass", ["wind", "gust"])
+    assert blind_score.separable(case(mass=5.0), "mass", [])
+    assert blind_score.separable({"ranking": [{"name": "mass"}]}, "mass", ["wind"])  # gains not known
 
 
 def test_answers_that_are_none(tmp_path):

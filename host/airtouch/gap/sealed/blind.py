@@ -29,7 +29,7 @@ from airtouch.simulation.effects import Active, get
 from airtouch.vehicle import Vehicle, load
 
 SCENARIO, VEHICLE = "diagnosis", "crazyflie-2.1-flow"
-CAL = 6  #: flights free of effects; chosen
+CAL, NONE = 6, 8  #: flights free of effects, to calibrate on and for the severities; chosen
 SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects; chosen
 PAIR_SEVERITIES = (1, 2)  #: places among the severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
@@ -107,7 +107,7 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
                   ) -> dict[str, tuple[float, ...]]:
     """Three severities of each kind of effect that such flights show at all, in the unit of the kind's strength."""
     vehicle = study.vehicle
-    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 8, seed)]
+    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, NONE, seed)]
     found = {}
     asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
     for number, (name, kind) in enumerate(asked.items(), 1):

@@ -167,7 +167,7 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n]["level"] == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
-    apart = {n for n, c in out.items() if told_apart(plain.get(n), single[n]["name"], _named(c))}
+    apart = {n for n, c in out.items() if separable(plain.get(n), single[n]["name"], _named(c))}
     known = {n: _chance(c, "unknown") for n, c in plain.items()}
     return {g: {"said_unknown": share(out[n]["verdict"] == "unknown" for n in names),
                 "wrong_name": share(out[n]["verdict"] == "effect" for n in names),
@@ -178,7 +178,7 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
             for g, names in groups.items() if names}
 
 
-def told_apart(case: Case | None, true: str, named: Iterable[str]) -> bool:
+def separable(case: Case | None, true: str, named: Iterable[str]) -> bool:
     """Whether held-out data gain more by an effect than by others together: as much as a first effect must gain.
 
     case: the diagnosis with all effects. True where no others are named, and where the gains are not known.

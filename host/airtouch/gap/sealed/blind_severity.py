@@ -53,7 +53,7 @@ def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], se
 
     def detected(strength: float) -> bool:
         """Whether the test tells flights with the effect at a strength from those without."""
-        return told_apart(*_log_ratios(
+        return detectable(*_log_ratios(
             [kind.active(strength, np.random.default_rng([*seeds, i])) for i in range(TRIES)],
             study, scenario, without, part_seen))
 
@@ -71,6 +71,7 @@ def _log_ratios(actives: Sequence[Active], study: Study, scenario: str, without:
     """Log ratios, nats, of a flight with each of these effects and of one without, for those that fly to the end."""
     yes, no = [], []
     for i, active in enumerate(actives):
+        # flown with the default seed, not the set's: the same manoeuvres for every set, of numbers that no set has
         log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
         if not isinstance(log, FlightLog):
             continue
@@ -81,7 +82,7 @@ def _log_ratios(actives: Sequence[Active], study: Study, scenario: str, without:
     return np.array(yes), np.array(no)
 
 
-def told_apart(yes: np.ndarray, no: np.ndarray) -> bool:
+def detectable(yes: np.ndarray, no: np.ndarray) -> bool:
     """Whether log ratios (n,) of flights with an effect, nats, stand over those of as many without.
 
     True for fewer than FEWEST: an effect so strong that it cannot fly.
@@ -95,14 +96,14 @@ def told_apart(yes: np.ndarray, no: np.ndarray) -> bool:
 
 def log_ratio(data: Data, active: Active) -> float:
     """Log likelihood of the flights under an effect with these values over that under none."""
-    term = term_of(active)
+    term = exact_term(active)
     if term.shows_in == CLOCK:
         return clock_gain(data, term)[1]
     whole = whole_of(data)
     return judge(data, whole, (term,)) - judge(data, whole, ())
 
 
-def term_of(active: Active) -> Term:
+def exact_term(active: Active) -> Term:
     """The hypothesis of exactly these values."""
     first = candidates.terms(active.effect.name)[0]
     return replace(first, values=dict(active.values))
