@@ -107,7 +107,8 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
                   ) -> dict[str, tuple[float, ...]]:
     """Three severities of each kind of effect that such flights show at all, in the unit of the kind's strength."""
     vehicle = study.vehicle
-    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, NONE, seed)]
+    logs = nominal(vehicle, NONE_FIRST, NONE, seed)
+    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in logs]
     found = {}
     asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
     for number, (name, kind) in enumerate(asked.items(), 1):
