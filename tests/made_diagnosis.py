@@ -10,7 +10,7 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import gap_map, where
+from airtouch.gap.where.gap_map import gap_map
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")
 FOUND = NamedEffect("imu_bias", {"acc_x": Quantity(0.8, 0.7, 0.9, "m/s^2")})
@@ -49,4 +49,4 @@ def of_flights(logs, effects=(FOUND,), **more):
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)
     pictures = of(study, flights, [], terms, result.headline, whole.cells)
-    return replace(result, where=tuple(where(whole)), pictures=pictures)
+    return replace(result, where=tuple(summary.cells_to_show(whole)), pictures=pictures)

@@ -32,7 +32,7 @@ from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.where import summary
-from airtouch.gap.where.gap_map import gap_map, where
+from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -135,7 +135,7 @@ def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bo
     terms = [candidates.term_of(e) for e in effects]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
-    cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + where(whole_map)))
+    cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
                        case.vehicle.name)
     return replace(

@@ -19,7 +19,7 @@ from airtouch.gap.signals.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.command_power import CommandPower, command_power, mean_spectra
-from airtouch.gap.where.gap_map import GapMap, Part, assemble, overall, part_of, where
+from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
@@ -99,14 +99,14 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     measured = _measured(studies, flights, run, progress, left_out)
     maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]
-    gap = {"before": overall(maps[0].cells), "floor": 1.0}
+    gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
-        gap["calibrated"] = overall(maps[1].cells)
+        gap["calibrated"] = summary.overall(maps[1].cells)
     notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,
-        where=tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))),
+        where=tuple(dict.fromkeys([c for c in (first,) if c is not None] + summary.cells_to_show(maps[0]))),
         flights=maps[0].flights, baseline=tuple(f.name for f in nominal),
         calibration=fitted.parameters if fitted else {},
         spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from airtouch.gap.answer.words import digits, quantity, seconds_in_words
+from airtouch.gap.answer.words import digits, leading, quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
@@ -95,7 +95,7 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
              "shrink": f"{r.shrink.value:.2f}", "why": r.why,
              "interval": "" if r.shrink.low is None or r.shrink.high is None
-             else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in summary.leading(diagnosis.ranking)]
+             else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in leading(diagnosis.ranking)]
 
 
 #: why the arm with the vehicle as declared has another gap before

@@ -13,7 +13,7 @@ from airtouch.gap.where.band_sums import stretches, sums
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.filter_bank import BANDS_HZ, filtered, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
-from airtouch.gap.where.summary import significant
+from airtouch.gap.where.summary import largest, significant
 from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
@@ -132,7 +132,7 @@ def test_largest_names_what_was_injected():
     force = noise(20.0, 0.06, 1)
     force[:, 2] += 0.5 * np.sin(2 * np.pi * 4.0 * t)
     gap_map = maps.gap_map(study(), [flight(20.0, force)], [flight(20.0, noise(20.0, 0.06, i)) for i in (2, 3)])
-    first = maps.largest(gap_map.cells)[0]
+    first = largest(gap_map.cells)[0]
     assert (first.channel, first.band_hz) == ("force_z", (2.0, 6.0)) and first.gap == pytest.approx(0.35, rel=0.1)
     assert "2-6 Hz, lift: 0.35 m/s^2" in in_words(first) and "times the floor" in in_words(first)
 
@@ -140,7 +140,7 @@ def test_largest_names_what_was_injected():
 def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
     force = noise(60.0, 0.06, 1)
     force[4000:, 0] += np.random.default_rng(0).normal(0.0, 1.0, 2000)
-    cells = maps.largest(maps.gap_map(study(), [flight(60.0, force)]).cells)
+    cells = largest(maps.gap_map(study(), [flight(60.0, force)]).cells)
     assert cells and cells[0].channel == "force_x"
     assert any(c.regime == "last third of the flight" for c in cells)
 

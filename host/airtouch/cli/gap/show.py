@@ -10,7 +10,6 @@ from airtouch.gap.answer import words
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
-from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import interval, ratio, short
 
 MOST_CELLS = 16
@@ -73,7 +72,7 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
-    for r in summary.leading(found.ranking):
+    for r in words.leading(found.ranking):
         table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"), r.why)
     screen.print(table)
     for group in found.indistinguishable:

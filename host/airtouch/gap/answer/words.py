@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airtouch.gap.result import Cell, Diagnosis, NamedEffect, Quantity
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect, Quantity, RankedCandidate
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, ratio, short
+
+MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
 
 
 def answer(diagnosis: Diagnosis) -> str:
@@ -27,7 +29,7 @@ def _where(diagnosis: Diagnosis) -> str:
         return "Nowhere does the gap stand out of its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
-    flown = len({c.phase for c in cells if c.phase != summary.GROUND})
+    flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
     return (f"The gap lies mostly in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
             f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
@@ -138,9 +140,14 @@ def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
     """Why each of the nearest effects was not named, of those that the ranking does not show with a reason."""
     if not diagnosis.unexplained:
         return []
-    shown = {r.name for r in summary.leading(diagnosis.ranking) if r.why}
+    shown = {r.name for r in leading(diagnosis.ranking) if r.why}
     near = [n for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
     return [f"{name_in_words(n['name'])}: {n['fails']}" for n in near]
+
+
+def leading(ranking: Sequence[RankedCandidate]) -> list[RankedCandidate]:
+    """The candidates that are shown: the first MOST_RANKED, and `none` and `unknown` wherever they are."""
+    return [r for i, r in enumerate(ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
 
 
 def digits(q: Quantity) -> str:

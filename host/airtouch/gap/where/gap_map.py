@@ -26,10 +26,11 @@ from airtouch.gap.where.band_sums import Sums, join, sums
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
-from airtouch.gap.where.summary import TINY, significant, sure_ratio
+from airtouch.gap.where.summary import TINY
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
+
 
 @dataclass(frozen=True)
 class Part:
@@ -93,45 +94,6 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
         if tables is not None:
             cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
-
-
-def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
-    """The significant cells with the largest ratio of lower end to upper end of the floor, largest first.
-
-    Of a channel, band and phase the regime is named in which the gap is significantly
-    larger than in the phase as a whole, if there is one.
-    """
-    cells = list(cells)
-    best: dict[tuple, Cell] = {}
-    whole = {(c.channel, c.band_hz, c.phase): c for c in cells if c.regime == "all"}
-    for c in cells:
-        key = (c.channel, c.band_hz, c.phase)
-        if not significant(c) or key not in whole:
-            continue
-        phase = whole[key]
-        if c.regime != "all" and not ((c.low or 0.0) > (phase.high or np.inf) and sure_ratio(c) > sure_ratio(phase)):
-            continue
-        if key not in best or sure_ratio(c) > sure_ratio(best[key]):
-            best[key] = c
-    return sorted(best.values(), key=sure_ratio, reverse=True)[:count]
-
-
-def where(of_map: GapMap, count: int = 10) -> list[Cell]:
-    """The largest cells, then the largest of each phase, and those from which the effects take most."""
-    chosen = largest(of_map.cells, count)
-    ordered = largest(of_map.cells, len(of_map.cells))
-    more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
-    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered if c.after is not None]
-    more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:3]]
-    others = {c for c in more if c is not None and c not in chosen}
-    return chosen + sorted(others, key=sure_ratio, reverse=True)
-
-
-def overall(cells: Iterable[Cell], key: str = "gap") -> float:
-    """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
-    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != KINDS[GROUND]
-             and getattr(c, key) is not None and c.floor > 0.0]
-    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
 
 
 def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:

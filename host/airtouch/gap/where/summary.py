@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.result import Cell, RankedCandidate
+from airtouch.gap.result import Cell, GapMap
 from airtouch.logs.segments import KINDS
 
-GROUND = "ground"
-MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
+GROUND_NAME = "ground"
+MOST_SHOWN = 10  #: cells of a map that are listed as its largest; chosen
+MOST_REDUCED = 3  #: cells that are listed because the effects take most from them; chosen
 WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse; chosen
 TINY = 1e-12  #: floor at least, in a channel's unit: no gap over a floor of 0 is infinite
 HALF = 0.5  #: fraction of a cell's energy from which on the named effects close it; chosen
@@ -108,7 +109,7 @@ def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
     short phase with one large ratio is not the gap.
     """
     weight = (lambda c: removed(c) if closes(c) else 0.0) if named else energy
-    air = [c for c in cells if c.regime == "all" and c.phase != GROUND and weight(c) > 0.0]
+    air = [c for c in cells if c.regime == "all" and c.phase != GROUND_NAME and weight(c) > 0.0]
     total: dict[tuple, float] = {}
     for c in air:
         total[c.channel, c.band_hz] = total.get((c.channel, c.band_hz), 0.0) + weight(c)
@@ -120,7 +121,7 @@ def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
 
 def same_place(cells: Iterable[Cell], one: Cell) -> list[Cell]:
     """The cells in the air of one's channel and band that stand out of their floor."""
-    return [c for c in cells if c.regime == "all" and c.phase != GROUND and stands_out(c)
+    return [c for c in cells if c.regime == "all" and c.phase != GROUND_NAME and stands_out(c)
             and (c.channel, c.band_hz) == (one.channel, one.band_hz)]
 
 
@@ -150,9 +151,43 @@ def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
     return tuple(sorted(out, key=lambda p: -p.energy))
 
 
-def leading(ranking: Sequence[RankedCandidate]) -> list[RankedCandidate]:
-    """The candidates that are shown: the first MOST_RANKED, and `none` and `unknown` wherever they are."""
-    return [r for i, r in enumerate(ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
+def largest(cells: Iterable[Cell], count: int = MOST_SHOWN) -> list[Cell]:
+    """The significant cells with the largest ratio of lower end to upper end of the floor, largest first.
+
+    Of a channel, band and phase the regime is named in which the gap is significantly larger than in the phase as a
+    whole, if there is one.
+    """
+    cells = list(cells)
+    best: dict[tuple, Cell] = {}
+    whole = {(c.channel, c.band_hz, c.phase): c for c in cells if c.regime == "all"}
+    for c in cells:
+        key = (c.channel, c.band_hz, c.phase)
+        if not significant(c) or key not in whole:
+            continue
+        phase = whole[key]
+        if c.regime != "all" and not ((c.low or 0.0) > (phase.high or np.inf) and sure_ratio(c) > sure_ratio(phase)):
+            continue
+        if key not in best or sure_ratio(c) > sure_ratio(best[key]):
+            best[key] = c
+    return sorted(best.values(), key=sure_ratio, reverse=True)[:count]
+
+
+def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
+    """The largest cells, then the largest of each phase, and those from which the effects take most."""
+    chosen = largest(of_map.cells, count)
+    ordered = largest(of_map.cells, len(of_map.cells))
+    more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
+    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered if c.after is not None]
+    more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:MOST_REDUCED]]
+    others = {c for c in more if c is not None and c not in chosen}
+    return chosen + sorted(others, key=sure_ratio, reverse=True)
+
+
+def overall(cells: Iterable[Cell], key: str = "gap") -> float:
+    """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
+    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME
+              and getattr(c, key) is not None and c.floor > 0.0]
+    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
 
 
 def rms(values: Sequence[float]) -> float:
