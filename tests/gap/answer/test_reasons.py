@@ -57,8 +57,8 @@ def test_by_the_relations_of_the_signals(name, words):
 
 def test_a_distance_is_told_as_one():
     far = selection(inference=True, of_distance=True, nameless_beside=70.0)
-    assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from none, "
-                                               "up to 30 may be chance")
+    assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from "
+                                               "none, up to 30 may be chance")
     near = selection(inference=True, of_distance=True)
     assert why_not(near, "unknown", "effect") == ("the flight lies 4 nats farther from mass than nominal flights from "
                                                   "none, up to 30 may be chance")
