@@ -1,4 +1,4 @@
-"""The map of the diagnosis names every module in its folder, no folder imports one below it, and tests mirror them."""
+"""The page of decisions names every module of the diagnosis, no folder imports one below it, and tests mirror them."""
 
 import ast
 import re
@@ -7,21 +7,22 @@ from pathlib import Path
 from airtouch import gap
 
 ROOM = Path(gap.__file__).parent
-#: The map's lines: what a folder holds, its name first
-LINES = re.findall(r"^- `(\w+)`(.*?)(?=^- |\Z)", gap.__doc__.partition("Where each decision is made")[2], re.M | re.S)
-FOLDERS = [name for name, _ in LINES if (ROOM / name).is_dir()]
+PAGE = ROOM.parents[1] / "docs" / "architecture.md"
+#: folders in the order of the package's own words, each a line that begins with its name
+FOLDERS = [name for name in re.findall(r"^(\w+)  +\S", gap.__doc__, re.M) if (ROOM / name).is_dir()]
 #: Modules that stand beside the folders, and the first folder that may not import them
 BESIDE = {"workspace": None, "second_process": None, "result": None, "measure": "answer", "diagnose": "sealed"}
 
 
-def test_every_module_is_on_the_map_in_its_folder():
-    listed = {name: set(re.findall(r"`(\w+)`", text)) - set(BESIDE) for name, text in LINES if name in FOLDERS}
-    there = {folder.name: {path.stem for path in folder.glob("*.py")} - {"__init__"}
-             for folder in ROOM.iterdir() if (folder / "__init__.py").exists() and folder.name != "example"}
-    assert listed == there
+def test_every_module_is_on_the_page_and_what_is_on_the_page_is_there():
+    there = {path.relative_to(ROOM).as_posix() for path in ROOM.rglob("*.py")
+             if path.name != "__init__.py" and path.parent.name != "example"}
+    told = set(re.findall(r"`gap/([\w/]+\.py)`", PAGE.read_text()))
+    assert {name for name in told if not name.endswith("__init__.py")} == there
 
 
-def test_the_modules_beside_the_folders_are_on_the_map():
+def test_every_folder_and_the_modules_beside_them_are_told():
+    assert sorted(FOLDERS) == sorted(f.parent.name for f in ROOM.glob("*/__init__.py") if f.parent.name != "example")
     assert {path.stem for path in ROOM.glob("*.py")} - {"__init__"} == set(BESIDE)
     assert all(f"`{name}`" in gap.__doc__ for name in BESIDE)
 

@@ -16,14 +16,14 @@ def judged(name, gain, evidence=None):
     return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
-def selection(named=("mass",), inference=False, **more):
+def selection(named=("mass",), inference=False, of_distance=False, **more):
     """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing."""
     singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
         steps.append(judged(n, total))
-    evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0) if inference else None
+    evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0, of_distance=of_distance) if inference else None
     settings = {"nameless_alone": 150.0, "nameless_beside": 4.0, "parts": (None, None),
                 "least": dict.fromkeys(EVIDENCE, 8.0),
                 "nominal": 5, "assumed": False, "nominal_gain": 0.0, **more}
@@ -53,6 +53,15 @@ def test_by_replay(name, words):
     ("unknown", "a model without names adds 4 nats, up to 30 may be left")])
 def test_by_the_relations_of_the_signals(name, words):
     assert why_not(selection(inference=True), name, "effect") == words
+
+
+def test_a_distance_is_told_as_one():
+    far = selection(inference=True, of_distance=True, nameless_beside=70.0)
+    assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from "
+                                               "none, up to 30 may be chance")
+    near = selection(inference=True, of_distance=True)
+    assert why_not(near, "unknown", "effect") == ("the flight lies 4 nats farther from mass than nominal flights from "
+                                                  "none, up to 30 may be chance")
 
 
 def test_a_second_effect_is_told_apart_from_one_that_acts_alone():

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from airtouch.gap.evidence.clock import CORRELATION_S
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, FittedTerms, fit, judge, strength_variance
 from airtouch.gap.evidence.problem import BlockSet, whole_of
+from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
@@ -83,11 +85,11 @@ def _model_error(law: ClosedLoop | None, term: Term, read: bool) -> float:
 def _in_times(data: Data, term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Scaled strength (1,) of an effect of the logged times, and its variance (1, 1).
 
-    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of an effect counted in
+    A jitter's is that of a standard deviation estimated from one sample in CORRELATION_S; that of an effect counted in
     bursts is the variance of a Poisson number of bursts.
     """
     samples = sum(len(f) for f in data.flights)
-    count = 2.0 * samples / 10.0
+    count = 2.0 * samples / (CORRELATION_S / PERIOD_S)
     if term.signature.bursts is not None:
         share, burst = (term.values[p] for p in term.signature.bursts)
         count = share * samples / (2.0 * burst - 1.0)

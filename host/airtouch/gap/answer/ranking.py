@@ -18,7 +18,11 @@ CLOSE = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
-    """The verdict: "none", "effect" or "unknown". A gap at its floor is none, whatever small differences add up to.
+    """The verdict: "none", "effect" or "unknown", by the first of these that holds:
+
+    1. the replay decides, and the gap is at its floor: "none", whatever small differences add up to;
+    2. what is left beside the effects named is more than chance leaves: "unknown";
+    3. no effect is named: "none"; else "effect".
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
     in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may be

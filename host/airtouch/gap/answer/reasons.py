@@ -1,5 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
+from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 
@@ -40,9 +41,9 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
         return against(selection)
     if candidate.gain < least:
         return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
-    if candidate.evidence < least:
+    if candidate.evidence < FIRST_GAIN:
         return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
-                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {FIRST_GAIN:.0f} are needed")
     if selection.chosen:
         return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
@@ -68,8 +69,19 @@ def against(selection: Selection) -> str:
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.least_left:.0f} may be chance")
-    return (f"a model without names gains {max(selection.nameless_beside, 0.0):.0f} nats beside it, up to "
-            f"{selection.allowed:.0f} may be left")
+    return _left(selection, "a model without names gains {} nats beside it", "from it")
+
+
+def _left(selection: Selection, gains: str, source: str) -> str:
+    """What is left, in words, with its limit; gains: the words for the gain of a model without names.
+
+    source: from what a flight lies off, where the relations of signals measured a distance.
+    """
+    nats = f"{max(selection.nameless_beside, 0.0):.0f}"
+    if selection.inference is not None and selection.inference.of_distance:
+        return (f"the flight lies {nats} nats farther {source} than nominal flights from none, up to "
+                f"{selection.allowed:.0f} may be chance")
+    return f"{gains.format(nats)}, up to {selection.allowed:.0f} may be left"
 
 
 def _why_beside(selection: Selection, step: Candidate) -> str:
@@ -85,15 +97,14 @@ def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not selection.explained:
         return "the gap as a whole is at its floor"
-    return (f"a model without names adds {max(selection.nameless_beside, 0.0):.0f} nats, up to {selection.allowed:.0f} "
-            "may be left")
+    source = " and ".join(s.name for s in selection.named) or "none"
+    return _left(selection, "a model without names adds {} nats", f"from {source}")
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.chosen is None:
-        return (f"a model without names gains {selection.nameless_beside:.0f} nats, up to {selection.allowed:.0f} "
-                "may be left")
+        return _left(selection, "a model without names gains {} nats", "from it")
     first = selection.named[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
     return f"{first} gains {gain:.0f} nats over it"

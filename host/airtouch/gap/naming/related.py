@@ -41,9 +41,11 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping
         judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(effect,))
         if effect in judged:
             steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
-    return Selection(alone, tuple(steps), inference.nameless_alone, inference.unexplained, on.parts,
-                     dict.fromkeys(alone, FIRST_GAIN), on.data.study.nominal, assumed=False, nominal_gain=0.0,
-                     simulated=True, same_models=True, inference=inference)
+    return Selection(
+        singles=alone, steps=tuple(steps), nameless_alone=inference.nameless_alone,
+        nameless_beside=inference.unexplained, parts=on.parts, least=dict.fromkeys(alone, FIRST_GAIN),
+        nominal=on.data.study.nominal, assumed=False, nominal_gain=0.0, simulated=True, same_models=True,
+        inference=inference)
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

@@ -26,9 +26,10 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
              promising: Container[str] = ()) -> dict[str, Candidate]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
 
-    candidates: variants by name; progress: is told every name. thorough: random effects in full, however little they
-    promise, and the strength of each parameter that is also tried alone from that trial: the best of several would seem
-    stronger than each of them is. promising: names that are judged in full whatever the first look says.
+    candidates: variants by name; progress: is told every name. thorough: every random effect is fitted, however little
+    it promises, and each parameter's strength is that of the variant which frees it alone, since the strength of the
+    best of several variants would be biased upwards. promising: names that are judged in full whatever the first look
+    says.
     """
     start = start_of(on, chosen)
     looks = first_looks(start, candidates, progress)

@@ -45,6 +45,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
+    # without a model of the loop the first effect must gain as much as a further one; of evidence, FIRST_GAIN is enough
     least = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     search = Search(on, candidates, alone, least, progress)
     inference = inference_of(data, list(candidates))
@@ -101,7 +102,8 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     after = nameless(on, state.steps[-1]) if state.steps else before
     last = state.steps[-1].terms if state.steps else ()
     selection = Selection(
-        state.singles, state.steps, before, after, on.parts, state.least, study.nominal,
+        singles=state.singles, steps=state.steps, nameless_alone=before, nameless_beside=after, parts=on.parts,
+        least=state.least, nominal=study.nominal,
         assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
         nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
         left_of_times=clock_left(on.data, last))

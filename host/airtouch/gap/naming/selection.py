@@ -69,8 +69,8 @@ class Selection:
     singles: the best variant of every candidate; steps: effects added one after another. nameless_alone,
     nameless_beside: gain of a model without names over no effect and over the last step; left_of_times: of the latter,
     what the logged times hold; contradicted: what the effects named lose in cells where they say what the flights do
-    not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: evidence
-    that each candidate needs as the first; inference: what named the effects, where the relations of signals did.
+    not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: nats that
+    each candidate must gain as the first; inference: what named the effects, where the relations of signals did.
 
     Of the study: nominal: how many flights gave the floor; nominal_gain: what a model without names gains in nominal
     flights as long as these; assumed: whether a chosen effect is random, or changes the loop in recorded flights;

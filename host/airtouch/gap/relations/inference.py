@@ -43,10 +43,14 @@ Shares = Mapping[tuple[str, float | None], float]  #: one number for each class,
 
 
 class Against(NamedTuple):
-    """Nats that speak against effects, and those that may where the effects are right."""
+    """Nats that speak against effects, and those that may where the effects are right.
+
+    of_distance: whether they are the excess of a flight's distance, not the gain of a disturbance without a name.
+    """
 
     nats: float
     limit: float
+    of_distance: bool
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,9 @@ class Inference:
     classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none. nameless_alone:
     nats that a disturbance without a name gains over none. unexplained: nats that speak against the likeliest effects,
     the gain of a disturbance without a name beside them or the excess of the flight's distance from them, whichever is
-    nearer its limit; limit: nats that may speak against effects that are right. readings: parameters of the likeliest
-    effects, of those that the library is calibrated for; without_sign: those of these effects whose sign does not show.
+    nearer its limit; limit: nats that may speak against effects that are right; of_distance: see `Against`.
+    readings: parameters of the likeliest effects, of those that the library is calibrated for; without_sign: those of
+    these effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
@@ -65,6 +70,7 @@ class Inference:
     nameless_alone: float
     unexplained: float
     limit: float
+    of_distance: bool = False
     readings: Mapping[str, Reading] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
 
@@ -92,6 +98,7 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     return Inference(
         classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles),
         nameless_alone=flight.nameless_evidence(flight.none), unexplained=against.nats, limit=against.limit,
+        of_distance=against.of_distance,
         readings=_readings(best), without_sign=tuple(
             f.of.effect for f in best.fits if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
 
@@ -114,13 +121,13 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
 def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: Shares) -> Against:
     """What a disturbance without a name gains beside effects."""
     share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
-    return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence)
+    return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence, False)
 
 
 def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: Shares, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
     share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
-    return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence))
+    return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence), True)
 
 
 def _largest(of: Hypothesis, shares: Shares) -> float:

@@ -23,7 +23,10 @@ Say = Callable[[str], None]  #: what a long run reports its progress to
 
 
 class Stream(IntEnum):
-    """Second number of a random generator's seed, after SEED: one for each purpose, so that none repeats another."""
+    """Second number of a random generator's seed, after SEED, one for each purpose.
+
+    `disturbed_flights` has the number of a flight there: those of the numbers below share the numbers drawn.
+    """
 
     WEAKEST = 5
     CALIBRATION = 95

@@ -76,12 +76,12 @@ class Scatter:
 
     def evidence(self, name: str, strength: np.ndarray, covariance: np.ndarray | None = None,
                  apart: np.ndarray | float = 0.0) -> float:
-        """Log likelihood that a strength (k,) has over the likeliest one that nominal flights scatter to.
+        """Nats of evidence that a fitted strength (k,) is more than nominal scatter and chance.
 
-        That one is a compromise: Student's density with `freedom` says how rare it is in nominal flights, after each
-        further parameter has paid for itself, the normal density of `covariance` (k, k) how far by chance the strength
-        was found from it; parameters that make up for one another thus count together, and one that the data leave
-        open says nothing. None: the strength is exact. apart (k,): half of what two halves of the flights differ by; of
+        The strength is nominal scatter, Student's with `freedom`, plus a chance error, normal with `covariance` (k, k);
+        the likeliest split of the two counts, after each further parameter has paid for itself. Parameters that make
+        up for one another thus count together, and one that the data leave open says nothing. None: no chance error.
+        apart (k,): half of what two halves of the flights differ by; of
         all strengths between theirs the one of least evidence counts. A parameter that the table does not know yet
         scatters as the widest of its effect's others.
         """
