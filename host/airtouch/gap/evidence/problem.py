@@ -27,7 +27,7 @@ from airtouch.simulation.effects import Active
 ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
-DOUBT = 0.25
+TORQUE_DOUBT = 0.25
 #: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
 FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
 
@@ -142,7 +142,7 @@ class Problem:
         gather, own = self.layout.gather, slice(self.replay_count)
         change = np.where(self.known[own], gather(spectra(self.data, loop)) - self.base[own], 0.0)
         steps = step_doubt(self.data, loop)
-        doubt = DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
+        doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
 
     def _noise_growth(self, change: Change) -> np.ndarray:

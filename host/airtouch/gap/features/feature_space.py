@@ -11,7 +11,7 @@ SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm on
 MIDDLE_TWO_THIRDS = (0.16, 0.84)  #: quantiles; in a normal density they are two standard deviations apart
 LONG_SHIFT = 8.0  #: length of a whitened shift above which longer ones count no more in `directions`
 SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
-DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
+VARIANCE_DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
 SMALLEST = 1e-9  #: deviation of a feature that varies at all
 
 
@@ -39,7 +39,7 @@ def standard_of(nominal: np.ndarray) -> Standard:
     return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
 
 
-def cholesky_factor(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:
+def cholesky_factor(standard: np.ndarray, doubt: float = VARIANCE_DOUBT) -> np.ndarray:
     """Lower triangle L of the covariance L L' (features, features) of nominal flights (n, features), standardised.
 
     Each feature has a variance of its own beside what nominal flights show: no simulated vehicle is as exact as the

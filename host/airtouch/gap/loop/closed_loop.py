@@ -39,7 +39,8 @@ Made = TypeVar("Made")
 #: Nepers of command power added per rad of phase beyond stability, so that a loop that could not fly fits no flight;
 #: chosen.
 UNSTABLE = 30.0
-#: fields of the plant that make the roll and pitch loops, not their noise
+#: fields of the plant that make the roll and pitch loops, not their noise; not `gain`, though it scales the plant:
+#: effects on thrust show in the replayed force, and are not judged as changes of the loop (`ratio` has gain in it)
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 PLANTS = 500  #: hypotheses whose plant is cached, chosen by memory: about 2 kB each
@@ -47,7 +48,7 @@ LEAST_NOISE_RADPS = 1e-9  #: rad/s, of a gyro that another is divided by
 LOOPS = 1000  #: spectra of an axis that are cached, chosen by memory: about 10 kB each
 
 
-class Hypothesis(NamedTuple):
+class PlantUnderEffects(NamedTuple):
     """A plant row with effects, not to be changed, and whether they change the roll and pitch loops."""
 
     row: PlantRow
@@ -84,13 +85,13 @@ class ClosedLoop:
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
-        row = self._hypothesis(active).row
+        row = self._plant(active).row
         key = row.tobytes()
         return self.workspace.once("ratio", key, lambda: self._power(row) / self.nominal_power(), PLANTS)
 
     def torque_change(self, active: Sequence[Active], f: np.ndarray) -> Change | None:
         """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is."""
-        row, changed = self._hypothesis(active)
+        row, changed = self._plant(active)
         if not changed:
             return None
 
@@ -102,11 +103,11 @@ class ClosedLoop:
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
-        return self._hypothesis(active).changes_loop
+        return self._plant(active).changes_loop
 
     def same_loop(self, one: Sequence[Active], other: Sequence[Active]) -> bool:
         """Whether the roll and pitch loops are the same under two hypotheses."""
-        return _same_loop(self._hypothesis(one).row, self._hypothesis(other).row)
+        return _same_loop(self._plant(one).row, self._plant(other).row)
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
         """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
@@ -145,11 +146,11 @@ class ClosedLoop:
         """Plant row of the vehicle as calibrated."""
         return prepare(self.vehicle, self.calibration)[0][0]
 
-    def _hypothesis(self, active: Sequence[Active]) -> Hypothesis:
+    def _plant(self, active: Sequence[Active]) -> PlantUnderEffects:
         """The vehicle as calibrated, with effects; cached."""
-        def make() -> Hypothesis:
+        def make() -> PlantUnderEffects:
             row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
-            return Hypothesis(row, not _same_loop(row, self._nominal_row))
+            return PlantUnderEffects(row, not _same_loop(row, self._nominal_row))
 
         return self.workspace.once("plant", tuple((a.effect.name, *a.values.values()) for a in active), make, PLANTS)
 

@@ -10,7 +10,8 @@ from airtouch.gap.naming.selection import Selection
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import MEAN
 
-#: share of the gap that the effect named must close: as much as the loop model may be wrong by, `problem.DOUBT`; chosen
+#: share of the gap that the effect named must close: as much as the loop model may be wrong by,
+#: `problem.TORQUE_DOUBT`; chosen
 LEAST_CLOSED = 0.25
 #: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
 #: seconds; chosen
