@@ -24,8 +24,8 @@ START_S = (0.8, 0.2)
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
 FINE, REACH = 4, 2  #: points a bin; bins that a window's leakage is followed, its main lobe; chosen
 FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
-#: power of a block over the median of its flight's blocks, above which a set-point stepped in it; chosen
-STEPPED = 5.0
+#: power of a block's commands over the median of its flight's blocks, above which a set-point stepped in it; chosen
+STEPPED_COMMAND = 5.0
 FEWEST = 3  #: blocks of a flight of which one can be unlike the others
 TINY = 1e-30  #: least power that is divided by, far below any measured
 STEPS = 12  #: iterations to the power of highest likelihood; chosen
@@ -80,13 +80,13 @@ def _without_step(power: np.ndarray) -> np.ndarray:
     if len(power) < FEWEST:
         return np.ones(len(power), bool)
     mean = np.median(power, axis=0) / np.log(2.0)  # of an exponential law, as that of a bin's power
-    return ((power / np.maximum(mean, TINY)).mean(axis=1) < STEPPED).all(axis=1)
+    return ((power / np.maximum(mean, TINY)).mean(axis=1) < STEPPED_COMMAND).all(axis=1)
 
 
 def typical(power: np.ndarray) -> np.ndarray:
     """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), with Student-like tails.
 
-    Fixed point of the likelihood's slope, as `signals.command_view` has it. The mean would follow the few blocks in
+    Fixed point of the likelihood's slope, as `signals.floor_correction` has it. The mean would follow the few blocks in
     which a set-point stepped.
     """
     estimate = power.mean(axis=0)

@@ -23,6 +23,7 @@ from airtouch.gap.loop.set_point_steps import NO_STEP, Step, step_under
 SMOOTH = 2.0  #: bins, standard deviation of the Gaussian over frequency: a block's Hann window and `response.SMOOTH`
 #: largest ratio that effects may make of a share; beyond, the loop model is not trusted; chosen
 MOST_CHANGE = 5.0
+QUIET, STEPPED = 0, 1  #: places in `Change.before` and `.share`: of level blocks, of those in which a set-point stepped
 
 
 class Change(NamedTuple):

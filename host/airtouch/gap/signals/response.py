@@ -1,4 +1,9 @@
-"""How the measured angular acceleration y follows w, what the model makes of the logged commands, in nominal flights.
+"""The torque view: measured angular acceleration y held against w, what the model makes of the logged commands.
+
+Both are spectra (blocks, bins, 3) about three axes. Nominal flights give a law E[y | w] for each of two kinds of
+blocks, quiet ones and those in which a set-point stepped (`Law`, (bins, 3) each). Of a flight under a hypothesis the
+residual (blocks, bins, 3) is y minus that, plus what effects add to it, weighted to the floor of quiet blocks
+(`Response.with_residual`). In the spectra of the gap it takes the place of measured minus modelled torque.
 
 A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the vehicle,
 and the kicks of the outer loop's steps, which did, are mostly not in it. So of w only a part is to be expected in y, by
@@ -20,13 +25,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.loop.disturbed import Disturbed
-from airtouch.gap.loop.torque_share import Change
+from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.spectra import squared
 
 FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
 QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
-STEPPED = 2.0  #: times the nominal power of the commanded torque, from which a set-point stepped; chosen
+#: power of the modelled torque over the nominal one, scaled to the flight (`_quiet`), from which a set-point stepped;
+#: chosen
+STEPPED_TORQUE = 2.0
 CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
 ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
 FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
@@ -84,7 +91,7 @@ class Law:
     power: np.ndarray
 
     def ratio(self, change: Change, kind: int) -> np.ndarray:
-        """Ratio (bins, 3) of `coherent` with effects that change the loop to that without. kind: 0 quiet, 1 stepped.
+        """Ratio (bins, 3) of `coherent` with effects that change the loop to that without. kind: QUIET or STEPPED.
 
         Of the commands a share a follows the loop model, the rest turn the vehicle as they say: q = a before + 1 - a,
         with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, or 1 where model
@@ -133,11 +140,11 @@ class Response:
         spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
         change: by effects that change the loop.
         """
-        residual = self.steady.residual(torque, change, 0)
+        residual = self.steady.residual(torque, change, QUIET)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
         if len(with_step):
             stepped = np.array(np.nan) if self.stepped is None else \
-                self.stepped.residual(torque.of_blocks(with_step), change, 1)
+                self.stepped.residual(torque.of_blocks(with_step), change, STEPPED)
             residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
         out = spectra.copy()
         out[:, FIRST_BIN:, TORQUE] = residual[:, FIRST_BIN:]
@@ -236,7 +243,7 @@ def _quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.nd
     both the noise and the steps weaker, so that a limit fixed by nominal flights would take steps for noise.
     """
     size = _sizes(modelled, nominal)
-    return size < STEPPED * np.quantile(size, CALM, axis=0) / calm if len(size) else np.zeros((0, 3), bool)
+    return size < STEPPED_TORQUE * np.quantile(size, CALM, axis=0) / calm if len(size) else np.zeros((0, 3), bool)
 
 
 def _sizes(modelled: np.ndarray, nominal: np.ndarray) -> np.ndarray:

@@ -1,0 +1,84 @@
+"""What the floor of the commands is off by in one flight, under a hypothesis.
+
+The floor may be wrong (few nominal flights, other air on other days). Its logarithm is off by a few smooth shapes
+(SHAPES, bins), each with a normal prior, whose amounts (SHAPES, AXES) are fitted anew for every flight. They are
+integrated out by Laplace's method (MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter 27);
+the cost of a correction is what that takes from the likelihood at its best amounts.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, njit
+
+from airtouch.gap.loop.command_spectra import FREEDOM, frequencies
+from airtouch.gap.loop.controller import AXES
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
+
+SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
+#: nepers of power, standard deviation of the amounts of these shapes: of the level, of the others; chosen
+SPREAD = (0.10, 0.04)
+ROUNDS = 4  #: Newton steps to the correction; chosen
+#: factor on `SPREAD` where random effects shake the loop in ways that no log holds; chosen
+WIDE = 6.0
+#: relative error of the loop model in the logarithm of a change of the commands' spectra by effects; chosen
+COMMAND_DOUBT = 0.1
+
+
+class Correction(NamedTuple):
+    """What the floor is off by in one flight, under a hypothesis.
+
+    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together;
+    covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
+    """
+
+    log_power: np.ndarray
+    cost: float
+    weight: float
+    covariance: np.ndarray
+
+
+def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> Correction:
+    """The floor's likeliest correction for the power (blocks, bins, AXES) of a flight, by Newton's method.
+
+    floor (bins, AXES): power of nominal flights; ratio (bins, AXES): what the hypothesis multiplies it by; wide: the
+    floor is as uncertain as random effects make it (WIDE). The information is that of exponential laws: 1 for each bin
+    of a block, times the block's weight.
+    """
+    over_floor, shapes = power / (floor * ratio), smooth_shapes()
+    spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1)) * (WIDE if wide else 1.0)
+    spread = np.hypot(spread, COMMAND_DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
+    weight = OVERLAP_WEIGHT * len(power)
+    normal = weight * shapes @ shapes.T + np.diag(1.0 / spread ** 2)
+    covariance = np.linalg.inv(normal)
+    amount = np.zeros((SHAPES, len(AXES)))
+    for _ in range(ROUNDS):
+        push = OVERLAP_WEIGHT * _push(over_floor, np.exp(-shapes.T @ amount))
+        amount += covariance @ (shapes @ push - amount / spread[:, None] ** 2)
+    cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
+    cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
+    return Correction(shapes.T @ amount, cost, weight, covariance)
+
+
+@cache
+def smooth_shapes() -> np.ndarray:
+    """Smooth shapes (SHAPES, bins) over the logarithm of frequency: level, slope, slow waves. Not to be changed."""
+    x = np.log(frequencies())
+    x = (x - x[0]) / (x[-1] - x[0])
+    return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])
+
+
+@njit(float64[:, ::1](float64[:, :, ::1], float64[:, ::1]), cache=True, error_model="numpy")
+def _push(over, factor):
+    """Slope (bins, axes) of the log likelihood of all blocks by the logarithm of their power.
+
+    over (blocks, bins, axes): power over the floor's, times a factor.
+    """
+    out = np.zeros(factor.shape)
+    for block in over:
+        for b in range(out.shape[0]):
+            for a in range(out.shape[1]):
+                e = block[b, a] * factor[b, a]
+                out[b, a] += (FREEDOM + 1.0) * e / (FREEDOM + e) - 1.0
+    return out
