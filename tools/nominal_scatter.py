@@ -142,7 +142,8 @@ def with_pushes(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Sca
     flights = defaultdict(list)
     for (of, *_), found in zip(groups, pool.map(_pushes_of, range(len(groups))), strict=True):
         flights[of] += found
-    return {of: replace(one, passing=one.passing | class_scatter(flights[of]).passing) for of, one in table().items()}
+    return {of: replace(one, passing={**one.passing, **class_scatter(flights[of]).passing})
+            for of, one in table().items()}
 
 
 def counts_of(text: str) -> dict[str, str]:
