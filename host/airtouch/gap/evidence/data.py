@@ -24,9 +24,9 @@ class Data:
     """Flights with their blocks and the spectra of the gap before any effect is added.
 
     slow: torque counts below the bins in which commands hold aliases only. By flight, and the first two by regime:
-    first (blocks,): first sample of each block; base (blocks, bins, COUNT): spectra of the gap, unit/sqrt(Hz); turning
-    (blocks, bins, 3): those in the air of the measured angular acceleration; quiet (blocks, 3): blocks in the air and
-    axes in which no set-point stepped; bridging (blocks, bins, COUNT): power that lost rows add in the air.
+    first (blocks,): first sample of each block; base (blocks, bins, COUNT): spectra of the gap, unit/sqrt(Hz);
+    measured_torque (blocks, bins, 3): those in the air of the measured angular acceleration; quiet (blocks, 3): blocks
+    in the air and axes in which no set-point stepped; bridging (blocks, bins, COUNT): power that lost rows add there.
     """
 
     study: Study
@@ -34,7 +34,7 @@ class Data:
     slow: bool = False
     first: list[dict[str, np.ndarray]] = field(default_factory=list)
     base: list[dict[str, np.ndarray]] = field(default_factory=list)
-    turning: list[np.ndarray] = field(default_factory=list)
+    measured_torque: list[np.ndarray] = field(default_factory=list)
     quiet: list[np.ndarray] = field(default_factory=list)
     bridging: list[np.ndarray] = field(default_factory=list)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
@@ -46,8 +46,8 @@ class Data:
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
-        self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
-                        for f, b in zip(self.flights, self.first, strict=True)]
+        self.measured_torque = [blocks(angular_acceleration(f), b[AIR], AIR)
+                                for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
             self.quiet = [self.study.response.quiet(w) for w in command_torque(self)]
         study = self.study
@@ -86,7 +86,7 @@ def _by_response(data: Data, response: Response, active: Sequence[Active], repla
     out = []
     for i, gap in enumerate(with_all):
         if data.flights[i].rates is not None:
-            torque = _torque(data.turning[i], nominal[i], driven[i], disturbed[i])
+            torque = _torque(data.measured_torque[i], nominal[i], driven[i], disturbed[i])
             gap = {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
         out.append(gap)
     return out
@@ -108,7 +108,7 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
 def command_torque(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
     return [measured - residual[AIR][:, :, TORQUE]
-            for measured, residual in zip(data.turning, _replay_spectra(data, ()), strict=True)]
+            for measured, residual in zip(data.measured_torque, _replay_spectra(data, ()), strict=True)]
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:

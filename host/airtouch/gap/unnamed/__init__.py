@@ -1,4 +1,4 @@
-"""What no named effect explains: a model without names of the residual that a hypothesis leaves.
+"""What no named effect explains: the nameless model of the residual that a hypothesis leaves.
 
 `nameless` asks how much it gains on held-out data. Its first part is the `regression` of the residual on `columns`: the
 spectra of the flight's own signals (`basis`); its second part free `powers` of every cell. `naming.select` asks for its

@@ -1,4 +1,4 @@
-"""A model without names of the residual that a hypothesis leaves.
+"""The nameless model: what the residual that a hypothesis leaves holds, without the name of an effect.
 
 Its two parts are both fitted to one half of the data and judged on the other. The first is a `regression` of every
 force, torque and rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity,

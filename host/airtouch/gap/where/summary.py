@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.gap.result import Cell, GapMap
 from airtouch.logs.segments import KINDS
 
-GROUND_NAME = "ground"
+GROUND_NAME = "ground"  #: a phase, of `segments.KINDS`
 MOST_SHOWN = 10  #: cells of a map that are listed as its largest; chosen
 MOST_REDUCED = 3  #: cells that are listed because the effects take most from them; chosen
 WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse; chosen
