@@ -62,6 +62,9 @@ def test_a_distance_is_told_as_one():
     near = selection(inference=True, of_distance=True)
     assert why_not(near, "unknown", "effect") == ("the flight lies 4 nats farther from mass than nominal flights from "
                                                   "none, up to 30 may be chance")
+    nothing = selection((), inference=True, of_distance=True)
+    assert why_not(nothing, "unknown", "none") == ("the flight lies 4 nats farther off than nominal flights, up to 30 "
+                                                   "may be chance")
 
 
 def test_a_second_effect_is_told_apart_from_one_that_acts_alone():

@@ -69,18 +69,18 @@ def against(selection: Selection) -> str:
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.least_left:.0f} may be chance")
-    return _left(selection, "a model without names gains {} nats beside it", "from it")
+    return _left(selection, "a model without names gains {} nats beside it", "it")
 
 
-def _left(selection: Selection, gains: str, source: str) -> str:
+def _left(selection: Selection, gains: str, off: str) -> str:
     """What is left, in words, with its limit; gains: the words for the gain of a model without names.
 
-    source: from what a flight lies off, where the relations of signals measured a distance.
+    off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
     nats = f"{max(selection.nameless_beside, 0.0):.0f}"
     if selection.inference is not None and selection.inference.of_distance:
-        return (f"the flight lies {nats} nats farther {source} than nominal flights from none, up to "
-                f"{selection.allowed:.0f} may be chance")
+        farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
+        return f"the flight lies {nats} nats farther {farther}, up to {selection.allowed:.0f} may be chance"
     return f"{gains.format(nats)}, up to {selection.allowed:.0f} may be left"
 
 
@@ -97,14 +97,14 @@ def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not selection.explained:
         return "the gap as a whole is at its floor"
-    source = " and ".join(s.name for s in selection.named) or "none"
-    return _left(selection, "a model without names adds {} nats", f"from {source}")
+    names = " and ".join(s.name for s in selection.named)
+    return _left(selection, "a model without names adds {} nats", names)
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.chosen is None:
-        return _left(selection, "a model without names gains {} nats", "from it")
+        return _left(selection, "a model without names gains {} nats", "")
     first = selection.named[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
     return f"{first} gains {gain:.0f} nats over it"
