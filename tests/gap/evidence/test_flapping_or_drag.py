@@ -52,9 +52,11 @@ def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, most_nats):
     """Log likelihood: 50 and 134 for a push against the speed, 32 and 87 for the moment of 15 mm of lever."""
     data = Data(study, fly(1, {"blade_flapping": {"tilt": tilt}}, 32))
     blocks = whole_of(data)
-    none = fit.fit(data, blocks, ()).gained
-    flapping, drag = (fit.fit(data, blocks, candidates.terms(name)).gained - none
-                      for name in ("blade_flapping", "rotor_drag"))
+
+    def level(terms):
+        return fit.judge(data, blocks, fit.fit(data, blocks, terms).terms)
+
+    flapping, drag = (level(candidates.terms(name)) - level(()) for name in ("blade_flapping", "rotor_drag"))
     assert min(flapping, drag) > 40.0
     assert abs(flapping - drag) < most_nats
     assert names_alike("rotor_drag") == names_alike("blade_flapping") is not None
