@@ -42,19 +42,19 @@ def gains(*cells):
 
 @pytest.mark.parametrize(("held", "further"), SAME_SENSOR)
 def test_what_is_gained_on_one_axis_counts_where_a_further_effect_gains_on_another(held, further):
-    assert thresholds.gained_where_more_is(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 50.0
+    assert thresholds.gain_in_improved_cells(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 50.0
 
 
 @pytest.mark.parametrize(("held", "further"), ELSEWHERE)
 def test_what_is_gained_in_another_sensor_band_or_view_does_not_count(held, further):
-    assert thresholds.gained_where_more_is(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 0.0
+    assert thresholds.gain_in_improved_cells(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 0.0
 
 
 def test_gains_of_the_axes_are_added_and_a_cell_counts_from_a_gain_of_one_nat():
     x, z, other = (REPLAY_VIEW, 0, FORCE_X), (REPLAY_VIEW, 0, FORCE_Z), (REPLAY_VIEW, 0, TORQUE_X)
     held = gains((x, 50.0), (z, -8.0), (other, -30.0))
-    assert thresholds.gained_where_more_is(held, held + gains((x, 3.0), (z, -1.9), (other, 5.0))) == 42.0
-    assert thresholds.gained_where_more_is(held, held + gains((x, 3.0), (z, -2.0), (other, 5.0))) == 0.0
+    assert thresholds.gain_in_improved_cells(held, held + gains((x, 3.0), (z, -1.9), (other, 5.0))) == 42.0
+    assert thresholds.gain_in_improved_cells(held, held + gains((x, 3.0), (z, -2.0), (other, 5.0))) == 0.0
 
 
 def trial(recorded=False, same_models=True):

@@ -22,31 +22,33 @@ def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[st
     effects: those named; alike: sets of names that these logs cannot tell apart; headline: the cell that the answer
     speaks of; baseline: whether there were nominal flights.
     """
-    said = [_to_tell_apart(group) for group in alike]
+    next_steps = [_to_tell_apart(group) for group in alike]
     if verdict == "unknown":
-        said += _for_an_open_gap(headline, vehicle)
+        next_steps += _for_an_open_gap(headline, vehicle)
     if verdict == "effect":
         named = " and ".join(e.name for e in effects)
-        said.append(NextStep(f"Switch on {named} with these parameters in the simulator, and fly it again.",
-                             switched_on(effects, vehicle)))
+        next_steps.append(NextStep(
+            f"Switch on {named} with these parameters in the simulator, and fly it again.",
+            switched_on(effects, vehicle)))
     if verdict == "none":
-        said.append(NextStep("Nothing to add; longer flights would lower the floor."))
+        next_steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not baseline:
-        said.append(NextStep("Give flights that are known to be nominal with --baseline: they lower the floor and show "
-                             "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+        next_steps.append(NextStep(
+            "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
+            "of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
     if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
-        said.append(NextStep("Log the gyro: it shows torque at every frequency."))
-    return tuple(said)
+        next_steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
+    return tuple(next_steps)
 
 
 def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
     """The command that flies the named effects in the simulator."""
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
-        given = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
-                 for k, q in e.parameters.items()]
+        arguments = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
+                     for k, q in e.parameters.items()]
         words += [*(("--effect-file", file) if (file := source_of(e.name)) else ()),
-                  "--effect", e.name + (":" + ",".join(given) if given else "")]
+                  "--effect", e.name + (":" + ",".join(arguments) if arguments else "")]
     return shlex.join(words)
 
 
@@ -73,16 +75,16 @@ def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
 
 def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
-    said = []
+    next_steps = []
     if headline is not None and headline.phase in MISSIONS:
-        said.append(NextStep(
+        next_steps.append(NextStep(
             f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
             collect(MISSIONS[headline.phase])))
     elif headline is not None:
-        said.append(NextStep(
+        next_steps.append(NextStep(
             "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
-    said.append(NextStep(
+    next_steps.append(NextStep(
         "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
         f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effects-file mine.py",
         ADD_AN_EFFECT))
-    return said
+    return next_steps

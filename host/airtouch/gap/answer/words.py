@@ -47,8 +47,8 @@ def _which(diagnosis: Diagnosis) -> str:
     first, *others = (_named(e) for e in diagnosis.effects)
     cell = diagnosis.headline
     if cell is not None and cell.after is not None and not summary.closes(cell):
-        said = f"The effect named, {first} (probability {chance}), does not close this cell"
-        return said + (f", nor does {joined(others)} beside it." if others else ".")
+        sentence = f"The effect named, {first} (probability {chance}), does not close this cell"
+        return sentence + (f", nor does {joined(others)} beside it." if others else ".")
     return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
 
 

@@ -57,8 +57,8 @@ def _tilt(log: FlightLog) -> np.ndarray:
         return np.zeros((n, 2))
     yaw = interpolate_missing(log["yaw_rad"]) if log.has("yaw_rad") else np.zeros(n)
     forward = np.cos(yaw) * push[:, 0] + np.sin(yaw) * push[:, 1]
-    left = -np.sin(yaw) * push[:, 0] + np.cos(yaw) * push[:, 1]
-    return np.column_stack([-np.arctan2(left, up), np.arctan2(forward, up)])
+    leftward = -np.sin(yaw) * push[:, 0] + np.cos(yaw) * push[:, 1]
+    return np.column_stack([-np.arctan2(leftward, up), np.arctan2(forward, up)])
 
 
 def smoothed_speed(log: FlightLog, deviation_s: float) -> np.ndarray:

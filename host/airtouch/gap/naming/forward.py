@@ -7,7 +7,7 @@ from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, Candidate
 from airtouch.gap.naming.shares import with_shares
-from airtouch.gap.naming.thresholds import needed_beside, random_by_misfit
+from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
 
@@ -111,7 +111,7 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     if not state.named:  # what nominal flights have as well stands beside every candidate
         there = {s.name for s in state.steps}
         singles = {**singles, **{n: j for n, j in state.tried.items() if n not in there}}
-    left_by_another = bool(state.named) and random_by_misfit(search.on, state.steps[-1], best)
+    left_by_another = bool(state.named) and is_random_misfit(search.on, state.steps[-1], best)
     steps = (*state.steps, replace(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
@@ -134,4 +134,4 @@ def _beside(search: Search, steps: Sequence[Candidate], before: Mapping[str, Can
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
     sure = {n for n, j in before.items() if j.full and j.evidence >= LEAST_GAIN and not is_random(n)}
     tried = round_of(on, worth, steps[-1], search.progress, promising=sure)
-    return tried, {n: needed_beside(on, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
+    return tried, {n: least_further_gain(on, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}

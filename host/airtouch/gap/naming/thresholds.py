@@ -26,47 +26,48 @@ ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 RANDOM_SHARE = 0.25
 
 
-def needed_beside(on: Trial, base: Candidate, more: Candidate) -> float:
+def least_further_gain(on: Trial, base: Candidate, extended: Candidate) -> float:
     """Held-out nats that a further effect must gain to be added.
 
-    base: the hypothesis of the effects before it; more: the same with the further one.
+    base: the hypothesis of the effects before it; extended: the same with the further one.
     """
     names = {t.name for t in base.terms}
-    new = [t for t in more.terms if t.name not in names]
+    new = [t for t in extended.terms if t.name not in names]
     share = RECORDED_SHARE if on.data.study.recorded else LEAST_SHARE
     if assumes(on.data, base.terms) and changes_loop(on.data, new):
         share = ASSUMED_SHARE if on.data.study.same_models else LOOP_SHARE
-    return misfit(on, base, more, share, everywhere=is_random(more.name))
+    return misfit(on, base, extended, share, everywhere=is_random(extended.name))
 
 
-def random_by_misfit(on: Trial, base: Candidate, more: Candidate) -> bool:
+def is_random_misfit(on: Trial, base: Candidate, extended: Candidate) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
-    return is_random(more.name) and more.gain - base.gain < misfit(on, base, more, RANDOM_SHARE)
+    return is_random(extended.name) and extended.gain - base.gain < misfit(on, base, extended, RANDOM_SHARE)
 
 
-def misfit(on: Trial, base: Candidate, more: Candidate, share: float, everywhere: bool = False) -> float:
+def misfit(on: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the effects before it are wrong by a share of theirs.
 
-    base, more: as for `needed_beside`. What the effects on the logged times gain is no model's and does not count. In
-    simulated flights a model is wrong where it acts, so that only cells count in which the further effect gains
-    (`gained_where_more_is`), unless `everywhere`; nor are cells looked at where it gains more than the whole share.
+    base, extended: as for `least_further_gain`. What the effects on the logged times gain is no model's and does not
+    count. In simulated flights a model is wrong where it acts, so that only cells count in which the further effect
+    gains (`gain_in_improved_cells`), unless `everywhere`; nor are cells looked at where it gains more than the whole
+    share.
     """
     whole = max(LEAST_GAIN, share * (base.gain - clock_gains(on.data, base.terms)))
-    fitted = more.full and more.fits and base.fits
-    if everywhere or on.data.study.recorded or not fitted or more.gain - base.gain >= whole:
+    fitted = extended.full and extended.fits and base.fits
+    if everywhere or on.data.study.recorded or not fitted or extended.gain - base.gain >= whole:
         return whole
-    there = gained_where_more_is(held_out_cell_gains(on, base), held_out_cell_gains(on, more))
+    there = gain_in_improved_cells(held_out_cell_gains(on, base), held_out_cell_gains(on, extended))
     return max(LEAST_GAIN, share * there)
 
 
-def gained_where_more_is(base: np.ndarray, more: np.ndarray) -> float:
+def gain_in_improved_cells(base: np.ndarray, extended: np.ndarray) -> float:
     """Nats that a hypothesis gains in those cells in which a longer one gains more than CELL_GAIN beyond it.
 
-    base, more (CELLS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one cell:
-    an effect that pushes forward and one that pushes up act on one body.
+    base, extended (CELLS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one
+    cell: an effect that pushes forward and one that pushes up act on one body.
     """
     sensor = sensor_cells()
-    before, further = (np.bincount(sensor, gains, CELLS) for gains in (base, more - base))
+    before, further = (np.bincount(sensor, gains, CELLS) for gains in (base, extended - base))
     return float(np.maximum(before[further > CELL_GAIN], 0.0).sum())
 
 

@@ -38,10 +38,18 @@ def bursts(data: Data) -> tuple[Gate, float]:
     return ((), 0.0) if whole else (tuple(gate), price)
 
 
+def thrust_residual(study: Study, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (n,) of the force along the thrust, m/s^2, 0 where it does not count, and where it counts (n,).
+
+    It does not on the ground, in bridged samples, at take-off and landing.
+    """
+    counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
+    return np.where(counts, np.nan_to_num(residual(flight, study.vehicle, study.calibration)[:, 2]), 0.0), counts
+
+
 def _pieces(study: Study, flight: Flight) -> np.ndarray:
     """Mean square (pieces,) of the force along the thrust above LIVELY_HZ, m^2/s^4; 0 where it is not known."""
-    force = np.nan_to_num(residual(flight, study.vehicle, study.calibration)[:, 2])
-    force[flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS)] = 0.0
+    force, _ = thrust_residual(study, flight)
     size = int(PIECE_S / PERIOD_S)
     fast = both_ways(highpass(LIVELY_HZ * 2.0 * PERIOD_S), force)
     return (fast[:len(force) // size * size].reshape(-1, size) ** 2).mean(axis=1)

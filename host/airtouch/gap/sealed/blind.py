@@ -99,8 +99,8 @@ def stripped(log: FlightLog) -> FlightLog:
 
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
     """Flights free of effects that end well, from a number on."""
-    every = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
-    return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
+    logs = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
+    return [stripped(log) for log in islice((x for x in logs if isinstance(x, FlightLog)), count)]
 
 
 def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, progress: Say = lambda _: None,
