@@ -49,7 +49,8 @@ def test_a_parameter_at_its_bound_stays_and_the_others_are_best_beside_it(system
     assert away[0] < 0.0, "away from its bound it is free"
     none, all_known = bounded_step(normal_equations(columns[:1], prior[:1], values, weights, x[:1]), x[:1],
                                    (low[:1], high[:1]))
-    assert none.tolist() == [0.0] and all_known.shape == (1, 1)
+    assert none.tolist() == [0.0]
+    np.testing.assert_allclose(all_known, [[1.0 / (rows.T @ rows)[0, 0]]], err_msg="at its bound: all else known")
 
 
 def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(system):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming import judging, select
+from airtouch.gap.naming import judging, rounds, select
 from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, cross_validated
 from airtouch.gap.naming.looks import HOPELESS
 from airtouch.gap.naming.rounds import round_of
@@ -41,6 +41,12 @@ def test_a_companion_must_earn_its_place_beside_the_effect(drag, names):
                    if variant[0].values["length"] == length)
     assert both.gain > alone.gain and (both.gain - alone.gain > LEAST_GAIN) == (len(names) == 2)
     assert [t.name for t in best.terms] == names and best.gain == (both if len(names) == 2 else alone).gain
+
+
+def test_a_longer_variant_must_earn_its_length_whatever_comes_first():
+    short, long = (Candidate("gust", (None,) * n, gain, (None, None), full=True) for n, gain in ((1, 30.0), (2, 31.0)))
+    for judged in ([short, long], [long, short]):
+        assert rounds.best_of_each(judged, 0)["gust"] is short
 
 
 def test_where_its_companion_alone_gains_as_much_it_is_that_which_gains():

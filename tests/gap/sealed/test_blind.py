@@ -276,3 +276,10 @@ def test_a_set_is_balanced():
     assert not any({n for n, _ in c} == {"mass", "thrust_coefficient"} for c in cases)
     counts = [sum(c == [(n, level)] for c in cases) for n in levels for level in range(3)]
     assert max(counts) - min(counts) <= 1
+
+
+@pytest.mark.parametrize(("kinds", "says"), [([], "no effect is strong enough"), (["mass"], "make a pair"),
+                                             (["mass", "thrust_coefficient"], "make a pair")])
+def test_a_set_that_cannot_be_drawn_is_refused(kinds, says):
+    with pytest.raises(AirTouchError, match=says):
+        blind.draw(100, {k: (1.0, 2.0, 4.0) for k in kinds}, np.random.default_rng(0))

@@ -1,5 +1,7 @@
 """Cells of the map against plain means, and their intervals against what they promise on random blocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -12,7 +14,7 @@ from airtouch.gap.where.filter_bank import BANDS_HZ
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
-AIRBORNE = next(k for k in range(len(KINDS)) if k != GROUND)
+AIRBORNE, OTHER = [k for k in range(len(KINDS)) if k != GROUND][:2]
 
 
 def blocks_of(rng, flights, blocks, samples=200, rms=1.0, offsets=None, phase=AIRBORNE):
@@ -63,11 +65,21 @@ def test_the_floor_of_an_offset_is_its_standard_deviation_between_flights():
     offsets = np.array([3.1, 2.9, 3.4, 2.7, 3.0, 3.3])
     sums = blocks_of(np.random.default_rng(3), len(offsets), 6, offsets=offsets)
     sensor = np.full((len(BANDS_HZ), COUNT), 0.01)
-    level, top = cell_tables.floors_of(sums, len(offsets), sensor)[AIRBORNE]
+    level, top = cell_tables.floors_of(sums, sensor)[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(np.std(offsets, ddof=1))
     assert top[0, 0, 0] > level[0, 0, 0]
-    level, _ = cell_tables.floors_of(sums, len(offsets), 10 * sensor + 1.0)[AIRBORNE]
+    level, _ = cell_tables.floors_of(sums, 10 * sensor + 1.0)[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(1.1)
+
+
+def test_the_floor_of_a_phase_that_few_flights_have_is_that_of_those_few():
+    """Two of six flights: their sample standard deviation, over one flight less than two."""
+    offsets = np.array([3.1, 2.7, 3.4, 2.9, 3.0, 3.3])
+    sums = blocks_of(np.random.default_rng(3), len(offsets), 6, offsets=offsets)
+    few = sums.flight < 2
+    sums = replace(sums, phase=np.where(few, AIRBORNE, OTHER))
+    level, _ = cell_tables.floors_of(sums, np.full((len(BANDS_HZ), COUNT), 0.01))[AIRBORNE]
+    assert level[0, 0, 0] == pytest.approx(np.std(offsets[:2], ddof=1))
 
 
 def test_without_a_baseline_the_spread_between_flights_counts_beside_the_sensor():

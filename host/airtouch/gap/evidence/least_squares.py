@@ -47,7 +47,8 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
     """
     matrix, right = equations
     n, (low, high) = len(x), bounds
-    free, covariance = np.ones(len(right), bool), np.zeros((n, n))
+    free = np.ones(len(right), bool)
+    covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], 1e-300))  # of those at a bound: all else known
     for _ in range(n + 1):
         change = np.zeros(len(right))
         where = np.flatnonzero(free)
@@ -60,7 +61,6 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
             free_parameters = where[where < n]
-            covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], 1e-300))  # of those at a bound: all else known
             covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck

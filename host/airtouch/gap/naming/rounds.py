@@ -17,7 +17,7 @@ from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
 from airtouch.gap.signatures.term import Terms
 
-FULL = 5  #: candidates that are fitted in full, after a first look at all; chosen for time
+FULL = 5  #: variants that are fitted in full, after a first look at all; chosen for time
 PROMISING = 0.5  #: of FIRST_GAIN, that one of these must gain at a first look; chosen for time
 
 
@@ -39,7 +39,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
     waiting = [*looks.unseen, *random, *means_to_fit]
     fitted = shared(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
-    best = _best_of_each([*fitted, *looked_at], len(start.terms))
+    best = best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, start.gain)
@@ -64,14 +64,14 @@ def _split(looked: Sequence[Candidate], gain: float, promising: Container[str],
     return [j for j, fit in pairs if fit], [j for j, fit in pairs if not fit]
 
 
-def _best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
+def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
     """The best hypothesis of each candidate, on top of so many terms that were there before.
 
     One with a random part or a companion must earn it, LEAST_GAIN; where its companion alone gains as much, it is that
     which gains.
     """
     best: dict[str, Candidate] = {}
-    for j in judged:
+    for j in sorted(judged, key=lambda j: len(j.terms)):
         old = best.get(j.name)
         need = LEAST_GAIN if old is not None and len(j.terms) > len(old.terms) else 0.0
         if old is None or (j.full, j.gain) > (old.full, old.gain + need):
@@ -96,8 +96,8 @@ def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
 def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], before: float) -> dict[str, Candidate]:
     """Every candidate with its evidence: what it gains over `before`, nats, and no more than its strength says.
 
-    None where the strength is the largest that can be: there the effect stands in for another. scatter: of strengths in
-    nominal flights; without one a strength says nothing.
+    It is at most 0 nats where a parameter lies at a bound: there the effect stands in for another. scatter: of
+    strengths in nominal flights; without one a strength says nothing.
     """
     out = {}
     for n, j in best.items():

@@ -7,7 +7,7 @@ A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` f
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
-from itertools import islice
+from itertools import combinations, islice
 from pathlib import Path
 from typing import Any
 
@@ -129,17 +129,26 @@ def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[l
     singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
     names = list(severities)
     every = [(n, place) for place in range(3) for n in names]
+    if not names:
+        raise AirTouchError("no effect is strong enough to be drawn; give other kinds")
+    if count > singles + none and not any(_may_pair(a, b) for a, b in combinations(names, 2)):
+        raise AirTouchError(f"{', '.join(names)}: no two of them make a pair; give more kinds")
     cases: list[list[tuple[str, int]]] = []
     while len(cases) < singles:  # every kind at every severity equally often
         cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
     for _ in range(count - singles - none):
         while True:
             a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))
-            if KINDS[a].effect != KINDS[b].effect and not interchangeable(KINDS[a].effect, KINDS[b].effect):
+            if _may_pair(a, b):
                 break
         cases.append([(n, int(rng.choice(PAIR_SEVERITIES))) for n in (a, b)])
     cases += [[] for _ in range(none)]
     return [cases[i] for i in rng.permutation(len(cases))]
+
+
+def _may_pair(a: str, b: str) -> bool:
+    """Whether two kinds are of two effects that logs can tell apart."""
+    return KINDS[a].effect != KINDS[b].effect and not interchangeable(KINDS[a].effect, KINDS[b].effect)
 
 
 def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Severities, seed: int,

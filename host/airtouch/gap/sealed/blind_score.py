@@ -198,19 +198,19 @@ def shrink(sheet: Sheet) -> dict[str, Any]:
 
 
 def parameters(sheet: Sheet) -> dict[str, Any]:
-    """Parameters of flights rightly named: relative error of each effect's vector, and whether 90 % intervals hold."""
+    """Parameters of flights rightly named: relative error of each effect's vector, in natural steps; coverage."""
     errors, held = defaultdict(list), defaultdict(list)
     for n, e in sheet.single.items():
         found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e["name"]), None) if sheet.first[n] else None
         if found is None:
             continue
-        neutral = terms(e["name"])[0].values
+        term = terms(e["name"])[0]
         known = {k: q for k, q in found["parameters"].items() if "low" in q and k in e["values"]}
-        size = np.sqrt(sum((e["values"][k] - neutral[k]) ** 2 for k in known))
+        size = np.sqrt(sum(((e["values"][k] - term.values[k]) / term.step(k)) ** 2 for k in known))
         if not known or size == 0.0:
             continue
-        errors[e["kind"]].append(float(np.sqrt(sum((q["value"] - e["values"][k]) ** 2 for k, q in known.items()))
-                                       / size))
+        off = np.sqrt(sum(((q["value"] - e["values"][k]) / term.step(k)) ** 2 for k, q in known.items()))
+        errors[e["kind"]].append(float(off / size))
         held[e["kind"]] += [q["low"] <= e["values"][k] <= q["high"] for k, q in known.items()]
     every = np.array([x for v in errors.values() for x in v])
     return {"error": median(every), "coverage": share(x for v in held.values() for x in v),

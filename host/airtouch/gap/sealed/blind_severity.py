@@ -33,7 +33,9 @@ FALSE_ALARMS, MISSES = 0.02, 0.05  #: of all tests of a flight together, and of 
 FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(MISSES))  #: deviations
 #: nats, half of what the means of two log ratios differ by whose deviations are these, as those of normal variables are
 APART = 0.5 * (FALSE_ALARM + POWER) ** 2
-SEEN = 0.5 * FALSE_ALARM ** 2  #: log ratio that chance exceeds in so many flights (Wilks 1938)
+#: nats; a normal log ratio of two exact hypotheses (mean -d^2/2, variance d^2 under none) exceeds it by chance in a
+#: share FALSE_ALARMS / len(KINDS) of flights at most, whatever d
+SEEN = 0.5 * FALSE_ALARM ** 2
 TRIES = 8  #: flights with and without the effect; chosen
 FEWEST = 3  #: of them that must fly to the end, else the effect is so strong that it is seen anyhow; chosen
 RANGE = 300.0  #: highest plausible strength over the weakest that is tried; chosen

@@ -112,8 +112,8 @@ def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.nda
     return low, high
 
 
-def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
-    """The floors by phase, of `count` nominal flights; that of AIR serves phases in which none was.
+def floors_of(nominal: Sums, sensor: np.ndarray) -> Floors:
+    """The floors by phase, of nominal flights; that of AIR serves phases in which none was.
 
     sensor: `sensor_rms`, below which no floor lies.
     """
@@ -124,7 +124,7 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
                nominal.mean)
     sources: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
     for key, source, phase in sources:
-        spread = _without_common(source, phase, count)
+        spread = _without_common(source, phase)
         table = table_of(spread, phase, seed=FLOOR_SEED) if spread is not None else None
         if table is None:
             continue
@@ -163,10 +163,10 @@ def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
     return {k: (np.broadcast_to(np.hypot(sensor, v), shape),) * 2 for k, v in spreads.items()}
 
 
-def _without_common(nominal: Sums, phase: int, count: int) -> Sums | None:
+def _without_common(nominal: Sums, phase: int) -> Sums | None:
     """The sums of one phase of the baseline without the mean that all its flights share in the lowest band.
 
-    None where no flight has the phase. count: number of nominal flights, for the unbiased variance.
+    None where no flight has the phase. The variance is unbiased: over one flight less than have the phase.
     """
     rows = nominal.phase == phase
     if not rows.any():
@@ -175,5 +175,6 @@ def _without_common(nominal: Sums, phase: int, count: int) -> Sums | None:
     total = np.maximum(weight.sum(axis=0), 1.0)[:, None]
     common = mean.sum(axis=0) / total
     spread = power[:, :, 0] - 2.0 * common * mean + weight[:, :, None] * common ** 2
+    count = len(np.unique(nominal.flight[rows]))
     power[:, :, 0] = np.maximum(spread, 0.0) * (count / (count - 1.0) if count > 1 else 1.0)
     return Sums(nominal.phase[rows], nominal.flight[rows], weight, power, mean - weight[:, :, None] * common)

@@ -82,7 +82,7 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
              effects: Sequence[str] = ()) -> GapMap:
     """The map made of the parts of flights; effects: names of the terms with which the parts were made."""
     joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
-    floors = floors_of(join([p.before for p in nominal]), len(nominal), sensor) if nominal \
+    floors = floors_of(join([p.before for p in nominal]), sensor) if nominal \
         else spreads_of(joined, sensor)
     after = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
