@@ -7,10 +7,10 @@ own group (drone, day and condition) and of other groups of the same drone. Stre
 alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
 With --keep, flights that the file holds already are not worked on again.
 
-    python tools/nominal_scatter.py [FLIGHTS] --downward    # 3 min
+    python tools/nominal_scatter.py [FLIGHTS] --passing    # 5 min
 
-measures nothing but whether pushes point down, in the same flights of the same groups, and puts that into the table
-that is shipped.
+measures nothing but what comes and goes, in the same flights of the same groups, and puts that into the table that is
+shipped.
 """
 
 import argparse
@@ -36,8 +36,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.nominal.apparent import apparent
-from airtouch.gap.passing.one_sided import DOWNWARD, downward
+from airtouch.gap.nominal.apparent import apparent, passing_sizes
 from airtouch.gap.sealed import blind
 from airtouch.gap.signatures import scatter_estimates
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, table
@@ -126,24 +125,23 @@ def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
                         "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in comparisons]
 
 
-def pushes(data: Data) -> ApparentStrengths:
-    """Whether pushes point down in a flight, and nothing else."""
-    return ApparentStrengths({}, {}, 0.0, {DOWNWARD: downward(data)})
+def passing_alone(data: Data) -> ApparentStrengths:
+    """What comes and goes in a flight, and nothing else."""
+    return ApparentStrengths({}, {}, 0.0, passing_sizes(data))
 
 
-def _pushes_of(i: int) -> list[ApparentStrengths]:
+def _passing_of(i: int) -> list[ApparentStrengths]:
     """The same of every flight of a group."""
     *_, vehicle, files = _GROUPS[i]
-    return [one for _, one in held_out(files, vehicle, look=pushes)]
+    return [one for _, one in held_out(files, vehicle, look=passing_alone)]
 
 
-def with_pushes(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
-    """The classes of the table that is shipped, with what their flights have of DOWNWARD."""
+def with_passing(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
+    """The classes of the table that is shipped, with what comes and goes in their flights measured anew."""
     flights = defaultdict(list)
-    for (of, *_), found in zip(groups, pool.map(_pushes_of, range(len(groups))), strict=True):
-        flights[of] += found
-    return {of: replace(one, passing={**one.passing, **class_scatter(flights[of]).passing})
-            for of, one in table().items()}
+    for (of, *_), group in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
+        flights[of] += group
+    return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
 
 
 def counts_of(text: str) -> dict[str, str]:
@@ -196,13 +194,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"))
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--downward", action="store_true")
+    parser.add_argument("--passing", action="store_true")
     args = parser.parse_args()
-    if args.downward:
+    if args.passing:
         _GROUPS[:] = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
         with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
             shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
-            write(args.out, text_of(with_pushes(pool, _GROUPS), counts_of(shipped.read_text(encoding="utf-8"))))
+            write(args.out, text_of(with_passing(pool, _GROUPS), counts_of(shipped.read_text(encoding="utf-8"))))
         return
     row_of = {}
     if args.keep and args.keep.exists():

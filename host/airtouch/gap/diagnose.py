@@ -192,6 +192,12 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     """
     selection = select(data, candidates.all_candidates(without), say, without)
     gap = gap_of(data, selection.parts, selection.chosen)
+    for name in recorded.loop_effects_beside_others(data, selection):
+        others = select(data, candidates.all_candidates((*without, name)), say, (*without, name))
+        left = gap_of(data, others.parts, others.chosen)
+        if gap.named.share.value - left.named.share.value < recorded.LEAST_CLOSED:
+            without, gap = (*without, name), left
+            selection = replace(others, singles={**selection.singles, **others.singles})
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
         selection = recorded.without_names(selection)

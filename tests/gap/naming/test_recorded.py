@@ -5,7 +5,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.naming.recorded import LEAST_CLOSED, STANDS_OUT, closes_too_little, must_close_the_gap
+from airtouch.gap.naming.recorded import (
+    LEAST_CLOSED,
+    STANDS_OUT,
+    closes_too_little,
+    loop_effects_beside_others,
+    must_close_the_gap,
+)
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import terms
 
@@ -37,3 +43,13 @@ def test_what_passes_must_close_a_gap_only_where_one_stands_out():
     assert not closes_too_little(data, passing, STANDS_OUT, little)
     assert closes_too_little(data, loop, 1.0, little)
     assert not closes_too_little(data, loop, 2.0, enough)
+
+
+def test_beside_others_every_effect_of_the_loop_is_held_against_the_gap():
+    wake = replace(terms("downwash")[0], gate=((0, 1),))
+    several = [SimpleNamespace(name=n) for n in ("actuator_delay", "downwash", "mass")]
+    both = SimpleNamespace(chosen=SimpleNamespace(terms=(terms("actuator_delay")[0], wake, terms("mass")[0])),
+                           named=several)
+    assert loop_effects_beside_others(flights(recorded=True), both) == ["actuator_delay"]
+    assert loop_effects_beside_others(flights(recorded=False), both) == []
+    assert loop_effects_beside_others(flights(recorded=True), named("actuator_delay")) == [], "alone"

@@ -9,8 +9,7 @@ from scipy.stats import skew
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.passing.bursts import LIVELY_HZ
-from airtouch.gap.passing.one_sided import HIGHEST_HZ, downward
+from airtouch.gap.passing.one_sided import PUSHES_HZ, downward
 from airtouch.gap.passing.stretches import ENDS
 from airtouch.gap.signals.channels import residual
 from gap_flights import fly
@@ -32,8 +31,10 @@ def pushed(nominal, force_mps2):
 def test_it_is_the_skewness_of_the_filtered_force(study, nominal_flight, force_mps2):
     flight = pushed(nominal_flight, force_mps2)
     counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
-    force = np.where(counts, np.nan_to_num(residual(flight, study.vehicle, study.calibration)[:, 2]), 0.0)
-    for hertz, kind in ((HIGHEST_HZ, "lowpass"), (LIVELY_HZ, "highpass")):
+    force = residual(flight, study.vehicle, study.calibration)[:, 2]
+    samples = np.arange(len(force))
+    force = np.interp(samples, samples[counts], force[counts])
+    for hertz, kind in zip(PUSHES_HZ, ("highpass", "lowpass"), strict=True):
         force = sosfiltfilt(butter(2, hertz * 2.0 * PERIOD_S, kind, output="sos"), force)
     assert downward(Data(study, [flight])) == pytest.approx(-skew(force[counts]), rel=0.01, abs=0.01)
 

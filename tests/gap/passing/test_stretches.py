@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.passing.bursts import LIVELY, PIECE_S, bursts
+from airtouch.gap.passing.bursts import FORCE, bursts
 from airtouch.gap.passing.stretches import MOST_STRETCHES, best_stretches, price_of_stretches
 from hovers import FLOOR, hover
 
@@ -48,12 +48,13 @@ def shaken(since_s, until_s, factor):
 
 
 def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
-    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)], slow=True))
+    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)], slow=True), FORCE)
     (name, since, until), = gate
-    assert name == "shaken" and since == pytest.approx(12.0, abs=PIECE_S) and until == pytest.approx(14.0, abs=PIECE_S)
-    assert price == pytest.approx(price_of_stretches(int(30.0 / PIECE_S)))
+    assert name == "shaken"
+    assert (since, until) == pytest.approx((12.0, 14.0), abs=FORCE.piece_s)
+    assert price == pytest.approx(price_of_stretches(int(30.0 / FORCE.piece_s)))
 
 
-@pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(LIVELY)])
+@pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(FORCE.lively)])
 def test_a_calm_or_hardly_livelier_stretch_is_no_burst(factor):
-    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)], slow=True)) == ((), 0.0)
+    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)], slow=True), FORCE) == ((), 0.0)

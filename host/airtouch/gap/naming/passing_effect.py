@@ -7,6 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
@@ -56,6 +57,7 @@ def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
     sizes = {key: size_of(gain / data.seconds, strength)}
-    if key == OVERHEAD and DOWNWARD in data.study.scatter.passing:
-        sizes[DOWNWARD] = downward(data)
+    if key == OVERHEAD:
+        of_wakes = {UNSTEADY_YAW: unsteady_yaw, DOWNWARD: downward}
+        sizes |= {name: measure(data) for name, measure in of_wakes.items() if name in data.study.scatter.passing}
     return min(gain, LEAST_GAIN + data.study.scatter.unusual(sizes))

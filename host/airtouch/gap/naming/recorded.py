@@ -3,12 +3,14 @@
 Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither is what a gap comes from.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.term import Term
 
 #: share of the gap that the effect named must close: as much as the loop model may be wrong by,
 #: `problem.TORQUE_DOUBT`; chosen
@@ -50,8 +52,21 @@ def comes_and_goes(selection: Selection) -> bool:
 
 def changes_the_loop(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
-    law, chosen = data.study.controller, selection.chosen
-    if law is None or chosen is None or len(selection.named) != 1:
+    chosen = selection.chosen
+    return chosen is not None and len(selection.named) == 1 and _of_the_loop(data, chosen.terms)
+
+
+def loop_effects_beside_others(data: Data, selection: Selection) -> list[str]:
+    """Effects of the control loop that recorded flights name beside others: each must close LEAST_CLOSED more."""
+    chosen = selection.chosen
+    if not data.study.recorded or chosen is None or len(selection.named) < 2:
+        return []
+    return [s.name for s in selection.named if _of_the_loop(data, [t for t in chosen.terms if t.name == s.name])]
+
+
+def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:
+    """Whether terms that always act change the control loop."""
+    law, mean = data.study.controller, [t for t in terms if t.shows_in == MEAN and not t.gate]
+    if law is None or not mean:
         return False
-    terms = [t for t in chosen.terms if t.shows_in == MEAN and not t.gate]
-    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.signature.loop_only for t in terms))
+    return law.changes_loop([t.active() for t in mean]) or any(t.signature.loop_only for t in mean)

@@ -14,6 +14,7 @@ from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
+from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.second_process import shared
@@ -44,12 +45,16 @@ def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
     singles = round_of(on, all_candidates(without), None, thorough=True)
-    passing = gated_effects(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
-    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
-    sizes[DOWNWARD] = downward(data)
     return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                             nameless(on, None) / data.seconds, sizes)
+                             nameless(on, None) / data.seconds, passing_sizes(data, without))
+
+
+def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
+    """Size of each effect that comes and goes but those of `without`, and the two measures of a wake beside it."""
+    passing = gated_effects(data, without)
+    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
+    return {**sizes, UNSTEADY_YAW: unsteady_yaw(data), DOWNWARD: downward(data)}
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:

@@ -1,67 +1,108 @@
-"""Bursts: stretches in which the force along the thrust is far livelier than in the rest of the flight.
+"""Bursts: stretches in which a vehicle is shaken far more than in the rest of the flight.
 
-A wake that is flown through lasts shorter than a block, and the spectra of blocks would not show when.
+A wake that is flown through lasts shorter than a block, and the spectra of blocks would not show when. Two signals
+show it: the force along the thrust, and the yaw torque above the band in which the vehicle is steered. Rotors in a wake
+draw an unsteady torque, and commands hardly move the yaw axis that fast.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.filters import both_ways, highpass
+from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, price_of_stretches
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects.effect import Gate
 
-#: no number here has a source: all were chosen
-PIECE_S = 0.16  #: s, length of the pieces of the force along the thrust in which bursts are sought
-LIVELY_HZ = 1.0  #: frequency above which a burst shows
-LIVELY = 6.0  #: power of a burst over the flight's median
-DEGREES = 3.0  #: independent values in a piece
-LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is sought
+UNSTEADY_YAW = "unsteady_yaw"  #: of `Scatter.passing`, what nominal flights have of `unsteady_yaw`
 
 
-def bursts(data: Data) -> tuple[Gate, float]:
-    """The bursts of all flights, and nats that their choice costs; none where they are all of the flights' time."""
+@dataclass(frozen=True)
+class Signal:
+    """A channel of the residual (a column of `residual`), and its band, Hz, in pieces of so many seconds.
+
+    freedom: independent values in a piece; lively: power of a burst over the flight's median.
+    """
+
+    column: int
+    band_hz: tuple[float, float]
+    piece_s: float
+    freedom: float
+    lively: float = 6.0
+
+
+#: no number of the force has a source: all were chosen
+FORCE = Signal(2, (1.0, 50.0), 0.16, 3.0)
+#: band and length of the pieces were chosen among six and two on wakes of recorded flights (host/docs/looks.md,
+#: 2026-11-25 21:00); freedom: twice the band's width times the piece's length
+YAW = Signal(5, (15.0, 40.0), 0.32, 16.0)
+LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is sought; chosen
+
+
+def bursts(data: Data, signal: Signal) -> tuple[Gate, float]:
+    """The bursts of a signal in all flights, and nats that their choice costs; none where they fill the flights."""
     gate: list[tuple[str, float, float]] = []
     price = 0.0
     for flight in data.flights:
-        gain = _gains(_pieces(data.study, flight))
+        gain = _gains(_powers(data.study, flight, signal), signal)
         known = int(np.isfinite(gain).sum())
         if known < LEAST_PIECES:
             continue
         stretches = best_stretches(gain, np.zeros(len(gain), int), price_of_stretches(known))
-        gate += [(flight.name, a * PIECE_S, (b + 1) * PIECE_S) for a, b in stretches]
+        gate += [(flight.name, a * signal.piece_s, (b + 1) * signal.piece_s) for a, b in stretches]
         price += price_of_stretches(known) * len(stretches)
     seconds = sum(end - begin for _, begin, end in gate)
     whole = seconds > WHOLE * data.seconds
     return ((), 0.0) if whole else (tuple(gate), price)
 
 
-def thrust_residual(study: Study, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-    """Residual (n,) of the force along the thrust, m/s^2, 0 where it does not count, and where it counts (n,).
+def unsteady_yaw(data: Data) -> float:
+    """Log of the arithmetic over the geometric mean of the yaw torque's power in pieces of YAW.
 
-    It does not on the ground, in bridged samples, at take-off and landing.
+    It is 0 where the torque is equally strong all along (Wiener entropy, in time), and grows with bursts. Each flight's
+    powers are over their geometric mean; 0 where nothing is known.
     """
-    counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
-    return np.where(counts, np.nan_to_num(residual(flight, study.vehicle, study.calibration)[:, 2]), 0.0), counts
+    powers = [p[p > 0.0] for flight in data.flights for p in (_powers(data.study, flight, YAW),)]
+    over = [p / np.exp(np.log(p).mean()) for p in powers if len(p) >= LEAST_PIECES]
+    return float(np.log(np.concatenate(over).mean())) if over else 0.0
 
 
-def _pieces(study: Study, flight: Flight) -> np.ndarray:
-    """Mean square (pieces,) of the force along the thrust above LIVELY_HZ, m^2/s^4; 0 where it is not known."""
-    force, _ = thrust_residual(study, flight)
-    size = int(PIECE_S / PERIOD_S)
-    fast = both_ways(highpass(LIVELY_HZ * 2.0 * PERIOD_S), force)
-    return (fast[:len(force) // size * size].reshape(-1, size) ** 2).mean(axis=1)
+def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A column of the residual in a band (n,), and which of its samples count (n,).
+
+    None counts on the ground, at take-off or landing, nor one that bridges lost rows; straight lines lead over them.
+    """
+    values = residual(flight, study.vehicle, study.calibration)[:, column]
+    counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS)) & np.isfinite(values)
+    if not counts.any():
+        return np.zeros(len(values)), counts
+    samples = np.arange(len(values))
+    out = np.interp(samples, samples[counts], values[counts])
+    low, high = (2.0 * hertz * PERIOD_S for hertz in band_hz)
+    out = both_ways(highpass(low), out)
+    return (both_ways(lowpass(high), out) if high < 1.0 else out), counts
 
 
-def _gains(power: np.ndarray) -> np.ndarray:
-    """Nats (pieces,) that a power LIVELY times the median gains over the median; -inf where it is 0.
+def _powers(study: Study, flight: Flight, signal: Signal) -> np.ndarray:
+    """Mean square (pieces,) of a signal in its band; 0 in pieces with a sample that does not count."""
+    fast, counts = in_band(study, flight, signal.column, signal.band_hz)
+    size = round(signal.piece_s / PERIOD_S)
+    pieces = len(fast) // size
+    power = (fast[:pieces * size].reshape(pieces, size) ** 2).mean(axis=1)
+    return np.where(counts[:pieces * size].reshape(pieces, size).all(axis=1), power, 0.0)
 
-    It is the log likelihood ratio of a chi-square of DEGREES. A piece counts as if it were no livelier than LIVELY.
+
+def _gains(power: np.ndarray, signal: Signal) -> np.ndarray:
+    """Nats (pieces,) that a power `lively` times the median gains over the median; -inf where it is 0.
+
+    It is the log likelihood ratio of a chi-square of `freedom`. A piece counts as if it were no livelier than that.
     """
     known = power > 0.0
     if not known.any():
         return np.full(len(power), -np.inf)
-    over = np.minimum(power / np.median(power[known]), LIVELY)
-    return np.where(known, 0.5 * DEGREES * (over * (1.0 - 1.0 / LIVELY) - np.log(LIVELY)), -np.inf)
+    over = np.minimum(power / np.median(power[known]), signal.lively)
+    gain = 0.5 * signal.freedom * (over * (1.0 - 1.0 / signal.lively) - np.log(signal.lively))
+    return np.where(known, gain, -np.inf)

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
-from airtouch.gap.passing.bursts import bursts
+from airtouch.gap.passing.bursts import FORCE, YAW, bursts
 from airtouch.gap.passing.stretches import LEAST_BLOCKS, each_block, stretches_of
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
@@ -73,11 +73,12 @@ def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEff
     base = no_effect(data)
     if base is None:
         return {}
-    lively, out = bursts(data), {}
+    lively, out = [bursts(data, signal) for signal in (FORCE, YAW)], {}
     for name, variants in candidates.gated_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
-        where = [tried for v in variants for tried in (stretches_of(data, base.whole, base.each, v), (v, *lively))]
+        where = [tried for v in variants for tried in (stretches_of(data, base.whole, base.each, v),
+                                                       *((v, gate, cost) for gate, cost in lively))]
         acting = [_in_gate(base, name, terms, gate, cost) for terms, gate, cost in where if gate]
         if acting:
             out[name] = max(acting, key=lambda effect: effect.gain)

@@ -60,10 +60,10 @@ def size_of(rate: float, strength: np.ndarray) -> float:
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate: mean and standard deviation of its square root; passing by effect: of its size, and of how far pushes point
-    down (`passing.one_sided`). vehicle: whose flights a class of the table was measured on. middle: mean (k,) of the
-    strengths of a random effect, which are never negative; the others' is 0. exact: whether the flights come from the
-    models that effects are fitted with.
+    rate: mean and standard deviation of its square root; passing by effect: of its size, of how unsteady the yaw torque
+    is and of how far pushes point down (`passing.bursts`, `passing.one_sided`). vehicle: whose flights a class of the
+    table was measured on. middle: mean (k,) of the strengths of a random effect, which are never negative; the others'
+    is 0. exact: whether the flights come from the models that effects are fitted with.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -148,11 +148,11 @@ def _exceeded(count: int, freedom: float) -> float:
     """The sum of `count` rarities, of positive draws alone, that a share FALSE_SHARE of Student's draws exceeds."""
     if count == 1:
         return float(_rarity(stdtrit(freedom, 1.0 - FALSE_SHARE), freedom))
-    draws = stdtrit(freedom, (np.arange(QUANTILES) + 0.5) / QUANTILES)
-    one = sums = _rarity(np.maximum(draws, 0.0), freedom)
-    for _ in range(count - 1):
-        sums = np.add.outer(sums, one).ravel()
-    return float(np.quantile(sums, 1.0 - FALSE_SHARE))
+    share = (np.arange(QUANTILES) + 0.5) / QUANTILES
+    one = sums = _rarity(np.maximum(stdtrit(freedom, share), 0.0), freedom)
+    for _ in range(count - 2):
+        sums = np.quantile(np.add.outer(sums, one), share)  # as many again, of the same distribution
+    return float(np.quantile(np.add.outer(sums, one), 1.0 - FALSE_SHARE))
 
 
 def _least_within(strength: np.ndarray, apart: np.ndarray, chance: np.ndarray) -> np.ndarray:
