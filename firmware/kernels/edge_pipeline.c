@@ -165,7 +165,7 @@ static uint8_t decode(edgePipeline_t *pipeline, float probability, bool armed) {
   if (!isfinite(probability) || pipeline->sinceEdge < config->dwellSamples) {
     return EDGE_NONE;
   }
-  if (pipeline->over ? probability > config->probabilityExit : probability < config->probabilityEntry) {
+  if (!(pipeline->over ? probability <= config->probabilityExit : probability >= config->probabilityEntry)) {
     return EDGE_NONE;
   }
   pipeline->over = !pipeline->over;
