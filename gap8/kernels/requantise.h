@@ -1,6 +1,7 @@
 /**
  * @file requantise.h
- * From an int32 accumulator to an int8 activation: the one rounding of this project.
+ * From an int32 accumulator to an int8 activation: the rounding between int8 layers; inputs are
+ * rounded by `networkInt8Quantise`.
  *
  * gemmlowp's double rounding, as TensorFlow Lite Micro does it: a rounding, doubling
  * high multiplication (ties up), then a rounding shift to the right (ties away from

@@ -116,8 +116,8 @@ void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float 
 
 /**
  * Changes settings between two steps. What uses a setting begins anew, nothing else: another band the band power
- * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector all of it; another
- * false-alarm probability is in force at once. The counters stay.
+ * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector, or enable
+ * changed, all of it; another false-alarm probability is in force at once. The counters stay.
  * @param params  receives what is in force
  * @return how many were out of range and put right
  */
