@@ -32,13 +32,13 @@ typedef struct {
   decoderConfig_t config;
   float recent[2][EDGE_DECODER_RING];  ///< entry and exit logits, newest at `newest`
   uint32_t newest;
-  float peak;         ///< logit at the crossing of the edge that waits
-  uint32_t due;       ///< steps until it is reported
-  uint8_t waiting;    ///< its kind: 0 none, 1 entry, 2 exit
-  float slow;         ///< smoothed over logit
-  uint32_t airborne;  ///< steps in the air
-  uint32_t since;     ///< steps since the last edge
-  bool over;          ///< over a platform
+  float peak;              ///< logit at the crossing of the edge that waits
+  uint32_t due;            ///< steps until it is reported
+  uint8_t waiting;         ///< its kind: 0 none, 1 entry, 2 exit
+  float smoothedOver;      ///< smoothed over logit
+  uint32_t airborneSteps;  ///< steps in the air without a break
+  uint32_t since;          ///< steps since the last edge
+  bool over;               ///< over a platform
 } edgeDecoder_t;
 
 /** Sets the decoder up; the settings are copied. */

@@ -52,16 +52,16 @@ typedef struct {
   bandPower_t band;
   frCfar_t cfar;
   exponentialMean_t forceMean;
-  float held[10];       ///< last finite acc, gyro, PWM
-  float thrustAxis[3];  ///< last finite R e_z
-  float voltageFactor;  ///< of the last known voltage
+  float held[HELD_VALUES];  ///< last finite acc, gyro, PWM
+  float thrustAxis[3];      ///< last finite R e_z
+  float voltageFactor;      ///< of the last known voltage
   float bandPower[EDGE_PIPELINE_CHANNELS];
   float features[EDGE_PIPELINE_SENSORS];
   uint32_t nonFinite;
   uint32_t sinceAlert;  ///< samples, EDGE_NEVER before any
   uint32_t sinceEdge;
-  uint32_t airborne;  ///< samples
-  bool over;          ///< the decoder's state: over a platform
+  uint32_t airborneSteps;  ///< samples in the air without a break
+  bool over;               ///< the decoder's state: over a platform
   float bandStorage[EDGE_PIPELINE_BAND_FLOATS];
   float cfarStorage[EDGE_PIPELINE_MAX_CELLS];
 } edgePipeline_t;

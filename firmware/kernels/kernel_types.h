@@ -17,6 +17,9 @@ enum {
   EDGE_DECODER_LOGITS = 3  ///< what the decoder reads of a step (edge_decoder.h): over, entry, exit
 };
 
+/** Where the last finite values of a sample lie in an array of them: acceleration, rate, motors. */
+enum { HELD_ACC = 0, HELD_GYRO = 3, HELD_PWM = 6, HELD_VALUES = 10 };
+
 /** What the disturbance force needs to know of a vehicle; SI units, PWM 0..65535. */
 typedef struct {
   float mass;            ///< kg

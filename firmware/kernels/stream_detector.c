@@ -41,7 +41,7 @@ bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const fl
   motionChannelsStep(&detector->motion, acc, gyro, pwm, channels);
   streamQuantise(&detector->quantisation, channels, MOTION_CHANNELS, quantised);
   const int8_t *output = streamInt8Step(detector->network, &detector->state, quantised);
-  const bool airborne = detector->motion.airborne > 0;
+  const bool airborne = detector->motion.airborneSteps > 0;
   *event = (streamEvent_t){.ready = output != NULL, .airborne = airborne};
   if (output != NULL) {
     for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, fields
 class Parameters:
     """The defaults of every function here.
 
-    The settings of the paper's section 7.1 where it gives one (rate, window, band, P_FA, cells); the project's own where
-    marked. "(kernels.md)" names the part of that page that describes a choice.
+    The settings of the paper's section 7.1 where it gives one (rate, window, band, P_FA, cells); the project's own
+    where marked. "(kernels.md)" names the part of that page that describes a choice.
     """
 
     sample_rate_hz: float = 100.0  #: rate of all nine channels
@@ -28,12 +28,14 @@ class Parameters:
     #: FR-CFAR input: time constant of f_w,z's mean, samples. Project: "What FR-CFAR tests" (kernels.md), 1 s
     force_mean_samples: float = 100.0
     #: physical filter: an alert vouches for edges this many samples after it. Project: "What FR-CFAR tests"
-    #: (kernels.md) counts the edges with an alert within this half second; `airtouch train --detector paper` tunes a model's own
+    #: (kernels.md) counts the edges with an alert within this half second; `airtouch train --detector paper` tunes a
+    #: model's own
     alert_hold: int = 50
-    #: decoding: airborne while the mean PWM is above this, 0 to 65535. Project: round number, 23 % of the weight of
-    #: crazyflie-2.1-flow (vehicles/crazyflie-2.1-brushless.toml, which has its own)
+    #: decoding: airborne while the mean PWM is above this, 0 to 65535. Project: a round number without a source; it
+    #: lifts 23 % of the weight of crazyflie-2.1-flow (vehicles/crazyflie-2.1-brushless.toml, which has its own)
     arm_pwm: float = 15000.0
-    #: decoding: airborne for so long before an edge can be reported, samples. Project: round number, 1 s
+    #: decoding: airborne for so long before an edge can be reported, samples. Project: a round number without a
+    #: source, 1 s
     arm_samples: int = 100
     #: decoding: over the platform from this probability up. Project: "From probability to edge" (kernels.md), for
     #: models without tuning; `airtouch train --detector paper` tunes a model's own, as of the two below
