@@ -24,8 +24,8 @@ void appLogEvent(appCore_t *core, const edgeEvent_t *event) {
 void appLogLink(appCore_t *core) {
   const linkCounters_t *counters = &core->link.counters;
   appLog_t *log = &core->log;
-  log->dropped = counters->dropped;
-  log->lost = counters->lost;
+  log->dropped = counters->packetsDropped;
+  log->lost = counters->samplesLost;
   log->timeouts = counters->timeouts;
   log->gap8Resets = counters->resets;
   log->gap8Uptime = counters->uptimeMs;
