@@ -90,7 +90,7 @@ typedef struct {
  * @param algorithm  an edgeLinkAlgorithm_t
  * @param digest     of the model that the GAP8 must have
  * @param refill     samples of the past that the network needs, at most LINK_HISTORY
- * @param nonce      other after each start of this processor
+ * @param nonce      very likely other after each start of this processor
  * @param session    1 to 255, other than that of the stream before
  */
 void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t digest[EDGE_LINK_DIGEST_BYTES],

@@ -51,7 +51,7 @@ bool appCoreStep(appCore_t *core, const appSample_t *sample) {
     runDetector(core, &event);
     appLogLink(core);
   }
-  core->log.health = appHealthOf(core);
+  core->log.health = appHealthStep(core);
   const bool reported = core->reported;
   core->reported = false;
   return reported;

@@ -102,7 +102,7 @@ bool appParamsSame(const appParams_t *one, const appParams_t *other);
  * @param params    NULL for those shipped; put right where they are out of range
  * @param haveGap8  whether there is an AI-deck; without one the detectors of the GAP8 fall back to
  *                  the same one on the STM32 (`best`) or to FR-CFAR alone (`paper`)
- * @param nonce     other after each start of the processor
+ * @param nonce     very likely other after each start of the processor
  */
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
 

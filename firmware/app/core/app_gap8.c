@@ -53,7 +53,7 @@ void appSendChannels(appCore_t *core) {
 void appRunLocal(appCore_t *core) {
   linkAnswer_t answer;
   bool answered;
-  appLocalBegin(&core->local, &core->link, &core->best, core->arena);
+  appLocalUpdate(&core->local, &core->link, &core->best, core->arena);
   for (int i = 0; i < APP_LOCAL_SAMPLES; i++) {
     if (!appLocalStep(&core->local, &core->link, &core->best, &answer, &answered)) {
       return;
