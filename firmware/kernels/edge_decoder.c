@@ -42,7 +42,7 @@ static void remember(edgeDecoder_t *decoder, float entry, float leave) {
   decoder->recent[1][decoder->newest] = leave;
 }
 
-// Steps since the event logit of this kind peaked, the latest of equal peaks.
+/** Steps since the event logit of this kind peaked, the latest of equal peaks. */
 static uint32_t findPeak(edgeDecoder_t *decoder, int kind) {
   uint32_t back = 0;
   decoder->peak = -LOGIT_LIMIT - 1.0f;
@@ -56,7 +56,7 @@ static uint32_t findPeak(edgeDecoder_t *decoder, int kind) {
   return back;
 }
 
-// Whether an edge is seen at this step.
+/** Whether an edge is seen at this step. */
 static bool fires(const edgeDecoder_t *decoder, float over) {
   const decoderConfig_t *config = &decoder->config;
   const float now = decoder->recent[decoder->over ? 1 : 0][decoder->newest];
@@ -67,7 +67,7 @@ static bool fires(const edgeDecoder_t *decoder, float over) {
   return event || late;
 }
 
-// The edge that waits moves to a higher peak, or comes nearer to its time.
+/** The edge that waits moves to a higher peak, or comes nearer to its time. */
 static void wait(edgeDecoder_t *decoder) {
   const float now = decoder->recent[decoder->waiting - 1][decoder->newest];
   if (now > decoder->peak) {

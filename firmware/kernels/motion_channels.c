@@ -32,7 +32,7 @@ static void start(motionChannels_t *motion, const float motors[4], float thrust)
   motion->started = true;
 }
 
-// The thrust of now joins the queue; what leaves it moves the lagged thrust.
+/** The thrust of now joins the queue; what leaves it moves the lagged thrust. */
 static void lagThrust(motionChannels_t *motion, float thrust) {
   motion->lagged += motion->config.lagGain * (motion->delayed[0] - motion->lagged);
   for (int i = 1; i < MOTION_THRUST_DELAY; i++) {

@@ -16,8 +16,8 @@ ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"  #: the sensors
 class Channel:
     """One motion channel.
 
-    swing: its nominal swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is reflected
-    left to right. sensors: those that it needs.
+    swing: its nominal swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is
+    reflected left to right. sensors: those that it needs.
     """
 
     name: str

@@ -70,7 +70,7 @@ static bool paperStreamSays(uint32_t sequence, int8_t *output) {
   rollingInt8_t rolling;
   rollingInt8Init(&rolling, &airtouchRolling, AIRTOUCH_ROLLING_STRIDE, arena);
   const uint32_t span =
-      (uint32_t)(rolling.receptive + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
+      (uint32_t)(rolling.receptiveSamples + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
   for (uint32_t i = 0; i < span; i++) {
     uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
     float x[AIRTOUCH_ROLLING_COLUMNS];
