@@ -4,7 +4,8 @@
 
 /**
  * log2 of a positive, normal float: its exponent, and of its mantissa m in [0.7, 1.41] the
- * series of 2 atanh((m - 1) / (m + 1)) / ln 2.
+ * series of 2 atanh((m - 1) / (m + 1)) / ln 2. Its own series: naturalLogarithm in start_up_math.h has other terms,
+ * and so other bits.
  */
 static float log2OfNormal(float x) {
   uint32_t bits;
