@@ -38,7 +38,7 @@ uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float h
 }
 
 /** cos and sin of 2 pi i / n; the angle is reduced in integers, so that it stays exact to the last bits. */
-static void twiddle(uint32_t i, uint32_t n, float *cosine, float *sine) {
+static void twiddleFactor(uint32_t i, uint32_t n, float *cosine, float *sine) {
   const uint32_t quadrant = 4 * i / n;
   const uint32_t rest = 4 * i - quadrant * n;
   const bool swap = 2 * rest > n;
@@ -106,7 +106,7 @@ bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float
   const float share = self->scale * (float)window;
   self->gain = 1.0f / (3.0f * share * share);
   for (uint32_t i = 0; i < window; i++) {
-    twiddle(i, window, &self->cosine[i], &self->sine[i]);
+    twiddleFactor(i, window, &self->cosine[i], &self->sine[i]);
   }
   bandPowerReset(self);
   return true;

@@ -4,9 +4,9 @@
 
 #include "sample_guard.h"
 
-// Of thrust: half and twice the nominal voltage. A battery beyond that is a fault of the sensor.
-#define LEAST_FACTOR 0.25f
-#define MOST_FACTOR 4.0f
+// Of thrust, over that at the nominal voltage: half and twice that voltage. A battery beyond is a fault of the sensor.
+#define THRUST_FACTOR_MIN 0.25f
+#define THRUST_FACTOR_MAX 4.0f
 
 bool voltageKnown(float vbat) { return vbat >= 0.1f && vbat <= 1000.0f; }
 
@@ -15,7 +15,7 @@ float voltageFactor(const airtouchVehicle_t *vehicle, float vbat) {
     return 1.0f;
   }
   const float ratio = vbat / vehicle->nominalVoltage;
-  return clampFloat(ratio * ratio, LEAST_FACTOR, MOST_FACTOR);
+  return clampFloat(ratio * ratio, THRUST_FACTOR_MIN, THRUST_FACTOR_MAX);
 }
 
 float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]) {

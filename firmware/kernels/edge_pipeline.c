@@ -7,6 +7,7 @@
 #include "disturbance_force.h"
 #include "sample_guard.h"
 
+// Samples at which counts stop, 124 days: "never yet", far above any setting of 16 bits and far from wrapping.
 #define EDGE_NEVER (UINT32_C(1) << 30)
 
 static const uint16_t sensorAxes[EDGE_PIPELINE_SENSORS] = {3, 3, 3};
@@ -93,10 +94,10 @@ static uint32_t holdFinite(const float *value, int count, float limit, float *he
 /** Keeps the finite values of @p sample in the pipeline, counts the others. */
 static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
   float *held = pipeline->held;
-  pipeline->nonFinite += holdFinite(sample->acc, 3, ACC_LIMIT, held) +
-                         holdFinite(sample->gyro, 3, RATE_LIMIT, held + 3) +
-                         holdFinite(sample->pwm, 4, PWM_LIMIT, held + 6);
-  for (int i = 6; i < 10; i++) {
+  pipeline->nonFinite += holdFinite(sample->acc, 3, ACC_LIMIT, held + HELD_ACC) +
+                         holdFinite(sample->gyro, 3, RATE_LIMIT, held + HELD_GYRO) +
+                         holdFinite(sample->pwm, 4, PWM_LIMIT, held + HELD_PWM);
+  for (int i = HELD_PWM; i < HELD_VALUES; i++) {
     held[i] = held[i] > 0.0f ? held[i] : 0.0f;
   }
   holdFinite(sample->thrustAxis, 3, AXIS_LIMIT, pipeline->thrustAxis);
@@ -108,9 +109,9 @@ static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
 static bool findFeatures(edgePipeline_t *pipeline) {
   const float *held = pipeline->held;
   float channel[EDGE_PIPELINE_CHANNELS];
-  memcpy(channel, held, 6 * sizeof(float));
+  memcpy(channel, held, HELD_PWM * sizeof(float));
   for (int i = 1; i < 4; i++) {
-    channel[5 + i] = held[6 + i] - held[6];
+    channel[5 + i] = held[HELD_PWM + i] - held[HELD_PWM];
   }
   if (!bandPowerStep(&pipeline->band, channel, pipeline->bandPower)) {
     return false;
@@ -130,8 +131,8 @@ static float cfarInput(edgePipeline_t *pipeline, const edgeEvent_t *event) {
 
 static void findForce(edgePipeline_t *pipeline, edgeEvent_t *event) {
   const edgePipelineConfig_t *config = &pipeline->config;
-  const float thrust = totalThrust(&config->vehicle, pipeline->held + 6) * pipeline->voltageFactor;
-  disturbanceForce(&config->vehicle, pipeline->held, thrust, pipeline->thrustAxis, event->force);
+  const float thrust = totalThrust(&config->vehicle, pipeline->held + HELD_PWM) * pipeline->voltageFactor;
+  disturbanceForce(&config->vehicle, pipeline->held + HELD_ACC, thrust, pipeline->thrustAxis, event->force);
   event->forceNorm = forceNorm(event->force);
   event->cfarPower = cfarInput(pipeline, event);
   event->alert = frCfarStep(&pipeline->cfar, event->cfarPower, &event->threshold);
@@ -144,13 +145,13 @@ static void findForce(edgePipeline_t *pipeline, edgeEvent_t *event) {
 }
 
 static bool isArmed(edgePipeline_t *pipeline) {
-  const float *pwm = pipeline->held + 6;
+  const float *pwm = pipeline->held + HELD_PWM;
   if (0.25f * (pwm[0] + pwm[1] + pwm[2] + pwm[3]) > pipeline->config.armPwm) {
-    pipeline->airborne += pipeline->airborne < EDGE_NEVER ? 1u : 0u;
+    pipeline->airborneSteps += pipeline->airborneSteps < EDGE_NEVER ? 1u : 0u;
   } else {
-    pipeline->airborne = 0;
+    pipeline->airborneSteps = 0;
   }
-  return pipeline->airborne >= pipeline->config.armSamples;
+  return pipeline->airborneSteps >= pipeline->config.armSamples;
 }
 
 /** Hysteresis from probability to edges; EDGE_NONE, EDGE_ENTRY or EDGE_EXIT. */
@@ -165,7 +166,7 @@ static uint8_t decode(edgePipeline_t *pipeline, float probability, bool armed) {
   if (!isfinite(probability) || pipeline->sinceEdge < config->dwellSamples) {
     return EDGE_NONE;
   }
-  if (pipeline->over ? probability > config->probabilityExit : probability < config->probabilityEntry) {
+  if (!(pipeline->over ? probability <= config->probabilityExit : probability >= config->probabilityEntry)) {
     return EDGE_NONE;
   }
   pipeline->over = !pipeline->over;

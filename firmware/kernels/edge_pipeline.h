@@ -10,7 +10,7 @@
  *   desktop's bits.
  * Threads: no globals: different objects may be used at once; one object by one thread at a time.
  * Memory: edgePipeline_t alone, under 12 kB; 172 bytes of stack.
- * Cost: 4,300 instructions of a Cortex-M4 a sample, 4,520 at worst.
+ * Cost: 4,300 instructions of a Cortex-M4 a sample, 4,520 at worst (`python -m tools.emulator.count`).
  */
 #pragma once
 
@@ -52,26 +52,30 @@ typedef struct {
   bandPower_t band;
   frCfar_t cfar;
   exponentialMean_t forceMean;
-  float held[10];       ///< last finite acc, gyro, PWM
-  float thrustAxis[3];  ///< last finite R e_z
-  float voltageFactor;  ///< of the last known voltage
+  float held[HELD_VALUES];  ///< last finite acc, gyro, PWM
+  float thrustAxis[3];      ///< last finite R e_z
+  float voltageFactor;      ///< of the last known voltage
   float bandPower[EDGE_PIPELINE_CHANNELS];
   float features[EDGE_PIPELINE_SENSORS];
   uint32_t nonFinite;
   uint32_t sinceAlert;  ///< samples, EDGE_NEVER before any
   uint32_t sinceEdge;
-  uint32_t airborne;  ///< samples
-  bool over;          ///< the decoder's state: over a platform
+  uint32_t airborneSteps;  ///< samples in the air without a break
+  bool over;               ///< the decoder's state: over a platform
   float bandStorage[EDGE_PIPELINE_BAND_FLOATS];
   float cfarStorage[EDGE_PIPELINE_MAX_CELLS];
 } edgePipeline_t;
 
-/** Fills @p config with the paper's settings and this @p vehicle. */
+/**
+ * Fills @p config with the defaults and this @p vehicle. The settings of the paper's section 7.1 where it gives one
+ * (rate, window, band, P_FA, cells); the project's own where kernel_types.h marks them.
+ */
 void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t *vehicle);
 
 /**
  * Sets a pipeline up; the settings are copied.
- * @return false for settings out of range or larger than this build's room
+ * @return false for settings out of range or larger than this build's room; a threshold that is NaN (armPwm,
+ *         probabilityEntry, probabilityExit) is taken, and never reached
  */
 bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config);
 
@@ -82,14 +86,13 @@ bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *conf
  */
 bool edgePipelineSetBand(edgePipeline_t *pipeline, float lowHz, float highHz);
 
-/** Another probability of false alarm, in force at once. @return false, with nothing changed, outside 0..1 */
+/** Another probability of false alarm, in force at once. @return false, nothing changed, unless FLT_MIN <= pFa < 1 */
 bool edgePipelineSetFalseAlarm(edgePipeline_t *pipeline, float pFa);
 
 /**
  * Takes one sample and says what it means.
  * @param event  every field is written
  * @return whether an edge is reported at this sample
- * Costs about 4,300 instructions of a Cortex-M4, at most 5,200 (`python -m tools.emulator.count`).
  * Never fails: values that are not finite hold the last finite one.
  */
 bool edgePipelineStep(edgePipeline_t *pipeline, const edgeSample_t *sample, edgeEvent_t *event);

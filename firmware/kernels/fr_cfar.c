@@ -7,6 +7,7 @@
 #include "sample_guard.h"
 #include "start_up_math.h"
 
+// Of a cell, in its unit: the square of SAMPLE_LIMIT. The sum of MAX_CELLS such cells is still a float.
 #define POWER_LIMIT 1e30f
 #define MAX_CELLS 32767u
 

@@ -38,14 +38,14 @@ typedef struct {
 /**
  * Sets a detector up.
  * @param storage  FR_CFAR_FLOATS(leadingWindow, guardCells) floats that outlive it
- * @return false for an empty leading window, more than 32767 cells, a probability
- *         outside 0..1 or too little storage
+ * @return false for an empty leading window, more than 32767 cells, too little storage, or unless
+ *         FLT_MIN <= pFa < 1
  */
 bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage, size_t floats);
 
 /**
  * Another probability of false alarm; the cells stay, so the next threshold is known at once.
- * @return false, with nothing changed, outside 0..1
+ * @return false, with nothing changed, unless FLT_MIN <= pFa < 1
  */
 bool frCfarSetFalseAlarm(frCfar_t *self, float pFa);
 

@@ -17,6 +17,9 @@ enum {
   EDGE_DECODER_LOGITS = 3  ///< what the decoder reads of a step (edge_decoder.h): over, entry, exit
 };
 
+/** Where the last finite values of a sample lie in an array of them: acceleration, rate, motors. */
+enum { HELD_ACC = 0, HELD_GYRO = 3, HELD_PWM = 6, HELD_VALUES = 10 };
+
 /** What the disturbance force needs to know of a vehicle; SI units, PWM 0..65535. */
 typedef struct {
   float mass;            ///< kg
@@ -25,35 +28,39 @@ typedef struct {
   float nominalVoltage;  ///< V at which the thrust curve holds; 0 where unknown
 } airtouchVehicle_t;
 
-/** Settings of the edge pipeline; edgePipelineDefaults() fills them with the paper's. */
+/**
+ * Settings of the edge pipeline, which edgePipelineDefaults() fills in. The settings of the paper's section 7.1 where
+ * it gives one (rate, window, band, P_FA, cells); the project's own where marked.
+ */
 typedef struct {
   float sampleRateHz;
   float lowHz;  ///< band, both edges included
   float highHz;
   float pFa;               ///< FR-CFAR: probability of false alarm
-  float forceMeanSamples;  ///< time constant of f_w,z's mean, samples
-  float armPwm;            ///< airborne while the mean PWM is above this
-  float probabilityEntry;  ///< over the platform from here up
-  float probabilityExit;   ///< off it from here down
+  float forceMeanSamples;  ///< project: time constant of f_w,z's mean, samples
+  float armPwm;            ///< project: airborne while the mean PWM is above this
+  float probabilityEntry;  ///< project: over the platform from here up
+  float probabilityExit;   ///< project: off it from here down
   uint16_t window;         ///< band power: samples
   uint16_t hop;            ///< band power: samples between two outputs
   uint16_t leadingWindow;  ///< FR-CFAR: cells
   uint16_t guardCells;     ///< FR-CFAR: cells
-  uint16_t alertHold;      ///< an alert vouches for edges this many samples after it
-  uint16_t armSamples;     ///< airborne for so long before an edge is reported
-  uint16_t dwellSamples;   ///< at least so long between two edges
-  uint8_t cfarNorm;        ///< 0: squared deviation of f_w,z from its mean; 1: ||f_w||
+  uint16_t alertHold;      ///< project: an alert vouches for edges this many samples after it
+  uint16_t armSamples;     ///< project: airborne for so long before an edge is reported
+  uint16_t dwellSamples;   ///< project: at least so long between two edges
+  uint8_t cfarNorm;        ///< 0, project: squared deviation of f_w,z from its mean; 1: ||f_w||
   uint8_t physicalFilter;  ///< 1: edges without a recent alert are dropped
   airtouchVehicle_t vehicle;
 } edgePipelineConfig_t;
 
 /** One sample of every sensor. */
 typedef struct {
-  float acc[3];         ///< world axes, m/s^2, gravity included (+g along z at rest)
+  float acc[3];         ///< m/s^2, gravity included (+g along z at rest), in world axes, or level axes where the caller
+                        ///< turns yaw off (the app does)
   float gyro[3];        ///< rad/s
   float pwm[4];         ///< 0..65535
   float vbat;           ///< V, NaN for none
-  float thrustAxis[3];  ///< R e_z in world axes; NaN holds the last one, at first (0, 0, 1)
+  float thrustAxis[3];  ///< R e_z in the axes of acc; NaN holds the last one, at first (0, 0, 1)
   float probability;    ///< the network's latest P(over a platform), NaN for none
 } edgeSample_t;
 
@@ -61,7 +68,7 @@ typedef struct {
 typedef struct {
   float bandPower[9];   ///< the last band powers, NaN before the first
   float features[3];    ///< their fusion: acceleration, rate, motors
-  float force[3];       ///< f_w, N, world axes
+  float force[3];       ///< f_w, N, in the axes of acc: world, or level axes where the caller turns yaw off
   float forceNorm;      ///< ||f_w||, N
   float cfarPower;      ///< the cell under test
   float threshold;      ///< its threshold, NaN until known
@@ -77,12 +84,12 @@ typedef struct {
 /** Settings of the motion channels (motion_channels.h). */
 typedef struct {
   airtouchVehicle_t vehicle;
-  float inverseScale[MOTION_CHANNELS - 1];  ///< 1 over each channel's usual swing
-  float limit;                              ///< channels are clamped to this magnitude, in usual swings
+  float inverseScale[MOTION_CHANNELS - 1];  ///< 1 over each channel's nominal swing
+  float limit;                              ///< channels are clamped to this magnitude, in nominal swings
   float armPwm;                             ///< airborne while the mean PWM is above this
   float slowGain;                           ///< of the slow means, a sample
   float lagGain;                            ///< of the thrust's lag, a sample
-  float leastThrust;                        ///< N; the usual thrust is never taken to be less
+  float leastThrust;                        ///< N; the mean thrust is never taken to be less
   uint32_t settleSamples;                   ///< after take-off the slow means follow at once for so long
 } motionConfig_t;
 

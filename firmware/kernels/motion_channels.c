@@ -12,12 +12,13 @@ void motionChannelsInit(motionChannels_t *motion, const motionConfig_t *config) 
 
 static void hold(motionChannels_t *motion, const float acc[3], const float gyro[3], const float pwm[4]) {
   for (int i = 0; i < 3; i++) {
-    guardWithin(acc[i], ACC_LIMIT, &motion->held[i]);
-    guardWithin(gyro[i], RATE_LIMIT, &motion->held[3 + i]);
+    guardWithin(acc[i], ACC_LIMIT, &motion->held[HELD_ACC + i]);
+    guardWithin(gyro[i], RATE_LIMIT, &motion->held[HELD_GYRO + i]);
   }
   for (int i = 0; i < 4; i++) {
-    guardWithin(pwm[i], PWM_LIMIT, &motion->held[6 + i]);
-    motion->held[6 + i] = motion->held[6 + i] > 0.0f ? motion->held[6 + i] : 0.0f;
+    float *held = &motion->held[HELD_PWM + i];
+    guardWithin(pwm[i], PWM_LIMIT, held);
+    *held = *held > 0.0f ? *held : 0.0f;
   }
 }
 
@@ -28,10 +29,10 @@ static void start(motionChannels_t *motion, const float motors[4], float thrust)
   }
   motion->lagged = thrust;
   motion->slowThrust = thrust;
-  motion->started = 1;
+  motion->started = true;
 }
 
-// The thrust of now joins the queue; what leaves it moves the lagged thrust.
+/** The thrust of now joins the queue; what leaves it moves the lagged thrust. */
 static void lagThrust(motionChannels_t *motion, float thrust) {
   motion->lagged += motion->config.lagGain * (motion->delayed[0] - motion->lagged);
   for (int i = 1; i < MOTION_THRUST_DELAY; i++) {
@@ -44,30 +45,30 @@ void motionChannelsStep(motionChannels_t *motion, const float acc[3], const floa
                         float channels[MOTION_CHANNELS]) {
   const motionConfig_t *config = &motion->config;
   hold(motion, acc, gyro, pwm);
-  const float *a = motion->held;
-  const float *m = motion->held + 6;
+  const float *a = motion->held + HELD_ACC;
+  const float *m = motion->held + HELD_PWM;
   const float motors[4] = {m[2] + m[3] - m[0] - m[1], m[0] + m[3] - m[1] - m[2], m[0] + m[2] - m[1] - m[3],
                            0.25f * (m[0] + m[1] + m[2] + m[3])};
   const float thrust = totalThrust(&config->vehicle, m);
   if (!motion->started) {
     start(motion, motors, thrust);
   }
-  motion->airborne = motors[3] > config->armPwm ? motion->airborne + 1 : 0;
+  motion->airborneSteps = motors[3] > config->armPwm ? motion->airborneSteps + 1 : 0;
   lagThrust(motion, thrust);
   // While the drone takes off the means follow at once, so that they start from hover.
-  const float gain = motion->airborne > config->settleSamples ? config->slowGain : 1.0f;
+  const float gain = motion->airborneSteps > config->settleSamples ? config->slowGain : 1.0f;
   for (int i = 0; i < 4; i++) {
     motion->slow[i] += gain * (motors[i] - motion->slow[i]);
     channels[6 + i] = motors[i] - motion->slow[i];
   }
   motion->slowThrust += gain * (motion->lagged - motion->slowThrust);
-  const float usual = motion->slowThrust > config->leastThrust ? motion->slowThrust : config->leastThrust;
+  const float meanThrust = motion->slowThrust > config->leastThrust ? motion->slowThrust : config->leastThrust;
   const float gravity = config->vehicle.gravity;
-  for (int i = 0; i < 6; i++) {
+  for (int i = 0; i < HELD_PWM; i++) {
     channels[i] = motion->held[i];
   }
   channels[2] -= gravity;
-  channels[10] = a[2] - gravity * motion->lagged / usual;
+  channels[10] = a[2] - gravity * motion->lagged / meanThrust;
   channels[MOTION_CHANNELS - 1] = 0.0f;
   for (int i = 0; i < MOTION_CHANNELS - 1; i++) {
     channels[i] = clampFloat(channels[i] * config->inverseScale[i], -config->limit, config->limit);

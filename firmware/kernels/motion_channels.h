@@ -1,7 +1,7 @@
 /**
  * @file motion_channels.h
  * What the streaming detector sees of a sample: twelve channels without the slow
- * drift of battery and trim, each in units of its own usual swing.
+ * drift of battery and trim, each in units of its own nominal swing.
  *
  * 0-2   level acceleration x, y, z without gravity, m/s^2
  * 3-5   angular rate x, y, z, rad/s
@@ -17,6 +17,7 @@
  */
 #pragma once
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "kernel_types.h"
@@ -30,13 +31,13 @@ extern "C" {
 /** The channels' memory; plain values, no pointers. */
 typedef struct {
   motionConfig_t config;
-  float held[10];                      ///< last finite acc, gyro, PWM
+  float held[HELD_VALUES];             ///< last finite acc, gyro, PWM
   float slow[4];                       ///< slow means of the motor channels
   float slowThrust;                    ///< slow mean of the lagged thrust, N
   float lagged;                        ///< thrust behind delay and lag, N
   float delayed[MOTION_THRUST_DELAY];  ///< thrust on its way, oldest first
-  uint32_t airborne;                   ///< samples in the air
-  uint8_t started;                     ///< a first sample was seen
+  uint32_t airborneSteps;              ///< samples in the air without a break
+  bool started;                        ///< a first sample was seen
 } motionChannels_t;
 
 /** Sets the memory up; the settings are copied. Scales and time constants must be positive. */

@@ -3,9 +3,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sample_guard.h"
-
-#define QUANTISED_LIMIT 1024.0f  // beyond int8 whatever the zero point
+#include "requantise.h"
 
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena) {
@@ -26,11 +24,7 @@ bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion
 
 void streamQuantise(const streamQuantisation_t *quantisation, const float *channels, int32_t count, int8_t *q) {
   for (int32_t i = 0; i < count; i++) {
-    const float scaled = channels[i] / quantisation->inputScale + 0.5f;
-    const float value = clampFloat(scaled, -QUANTISED_LIMIT, QUANTISED_LIMIT);
-    const int32_t towardsZero = (int32_t)value;
-    const int32_t down = towardsZero - ((float)towardsZero > value ? 1 : 0) + quantisation->inputZeroPoint;
-    q[i] = (int8_t)(down < INT8_MIN ? INT8_MIN : (down > INT8_MAX ? INT8_MAX : down));
+    q[i] = quantiseInput(channels[i], quantisation->inputScale, quantisation->inputZeroPoint);
   }
 }
 
@@ -41,7 +35,7 @@ bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const fl
   motionChannelsStep(&detector->motion, acc, gyro, pwm, channels);
   streamQuantise(&detector->quantisation, channels, MOTION_CHANNELS, quantised);
   const int8_t *output = streamInt8Step(detector->network, &detector->state, quantised);
-  const bool airborne = detector->motion.airborne > 0;
+  const bool airborne = detector->motion.airborneSteps > 0;
   *event = (streamEvent_t){.ready = output != NULL, .airborne = airborne};
   if (output != NULL) {
     for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {

@@ -57,7 +57,7 @@ enum {
 
 /** RESET: the header's session begins. */
 typedef struct {
-  uint32_t nonce;  ///< other after each start of the STM32, so that session numbers may begin anew
+  uint32_t nonce;  ///< very likely other after each start of the STM32, so that session numbers may begin anew
   uint8_t algorithm;
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];  ///< of the model whose answers the STM32 will understand
 } edgeLinkReset_t;

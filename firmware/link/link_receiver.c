@@ -73,7 +73,7 @@ static void useSample(linkReceiver_t *receiver, const uint8_t sample[EDGE_LINK_S
       keepAnswer(receiver, output);
     }
   }
-  receiver->taken++;
+  receiver->samplesTaken++;
   receiver->expected++;
 }
 
@@ -84,7 +84,7 @@ static uint8_t useSamples(linkReceiver_t *receiver, uint32_t first, const edgeLi
     receiver->empty = false;
     resetNetwork(receiver, oldest);
   } else if (edgeLinkAfter(oldest, receiver->expected) > 0) {
-    receiver->lost += oldest - receiver->expected;
+    receiver->samplesLost += oldest - receiver->expected;
     resetNetwork(receiver, oldest);
   }
   if (edgeLinkAfter(first, receiver->expected) > 0) {
@@ -94,7 +94,7 @@ static uint8_t useSamples(linkReceiver_t *receiver, uint32_t first, const edgeLi
     if (first + (uint32_t)i == receiver->expected) {
       useSample(receiver, features->sample[i]);
     } else {
-      receiver->repeated++;
+      receiver->samplesRepeated++;
     }
   }
   return 0;
@@ -118,7 +118,7 @@ static void fillResult(const linkReceiver_t *receiver, edgeLinkResult_t *result,
 uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16_t length, uint8_t *reply) {
   edgeLinkPacket_t packet;
   if (!edgeLinkParse(bytes, length, &packet)) {
-    receiver->refused++;
+    receiver->packetsRefused++;
     return 0;
   }
   edgeLinkPacket_t answer = {.type = EDGE_LINK_RESULT, .session = packet.session, .sequence = packet.sequence};
@@ -126,7 +126,7 @@ uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16
   if (packet.type == EDGE_LINK_RESET) {
     beginSession(receiver, &packet);
   } else if (packet.type != EDGE_LINK_FEATURES) {
-    receiver->refused++;
+    receiver->packetsRefused++;
     return 0;
   }
   receiver->beats = LINK_BEATS;
@@ -151,9 +151,9 @@ uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint
   edgeLinkHeartbeat_t *beat = &packet.heartbeat;
   beat->uptimeMs = uptimeMs;
   beat->expected = receiver->expected;
-  beat->taken = receiver->taken;
-  beat->lost = receiver->lost;
-  beat->refused = receiver->refused;
+  beat->taken = receiver->samplesTaken;
+  beat->lost = receiver->samplesLost;
+  beat->refused = receiver->packetsRefused;
   beat->flags = flagsOf(receiver);
   if (receiver->network != NULL) {
     beat->algorithm = receiver->network->algorithm;

@@ -18,7 +18,7 @@
 extern "C" {
 #endif
 
-#define LINK_BEATS 20  ///< heartbeats after the last packet: ten seconds of them
+#define LINK_BEATS 20  ///< heartbeats after the last packet: ten seconds of them; no source: round number
 
 /** A network as the receiver sees it. */
 typedef struct {
@@ -50,10 +50,10 @@ typedef struct {
     uint32_t sequence;
     int8_t output[EDGE_LINK_OUTPUTS];
   } answer[EDGE_LINK_ANSWERS];  ///< the last ones, oldest first
-  uint32_t taken;
-  uint32_t lost;
-  uint32_t refused;
-  uint32_t repeated;  ///< samples that had been used before
+  uint32_t samplesTaken;        ///< used since start
+  uint32_t samplesLost;         ///< that never came
+  uint32_t packetsRefused;      ///< that were not understood
+  uint32_t samplesRepeated;     ///< that had been used before
   uint32_t heartbeats;
   uint8_t beats;  ///< heartbeats left until another packet comes
 } linkReceiver_t;

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define HOLD_OFF_STEPS 4
+#define HOLD_OFF_STEPS 4  // after a rewind, in which requests for another are old news; no source: round number
 
 /** The stream begins with as much of the past as the network needs. */
 static void rebase(linkSender_t *sender) {
@@ -26,13 +26,14 @@ static uint8_t nextSession(const linkSender_t *sender) {
 static void restartAnew(linkSender_t *sender) { restart(sender, nextSession(sender)); }
 
 /** The next try is due. */
-static void endWait(linkSender_t *sender) { sender->waited = UINT16_MAX; }
+static void makeRetryDue(linkSender_t *sender) { sender->sinceRetry = UINT16_MAX; }
 
-/** A try is made: the next one comes after the same wait, or twice that where the silence has cost samples. */
-static void beginWait(linkSender_t *sender) {
-  sender->waited = 0;
+/** A try is made: the next one comes after the same interval, or twice that where the silence has cost samples. */
+static void noteRetry(linkSender_t *sender) {
+  sender->sinceRetry = 0;
   if (sender->silent >= LINK_HISTORY) {
-    sender->wait = (uint16_t)(2 * sender->wait < LINK_RETRY_MOST ? 2 * sender->wait : LINK_RETRY_MOST);
+    sender->retryInterval =
+        (uint16_t)(2 * sender->retryInterval < LINK_RETRY_MOST ? 2 * sender->retryInterval : LINK_RETRY_MOST);
   }
 }
 
@@ -43,8 +44,8 @@ void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t diges
   sender->algorithm = algorithm;
   sender->refill = refill < LINK_HISTORY ? refill : LINK_HISTORY;
   sender->nonce = nonce;
-  sender->wait = LINK_RETRY_STEPS;
-  endWait(sender);
+  sender->retryInterval = LINK_RETRY_STEPS;
+  makeRetryDue(sender);
   restart(sender, session == 0 ? 1 : session);
 }
 
@@ -53,7 +54,7 @@ static void count(uint16_t *steps) { *steps = (uint16_t)(*steps + (*steps < UINT
 /** Moves the base past what the history no longer holds. */
 static void forget(linkSender_t *sender) {
   if (sender->samples - sender->base > LINK_HISTORY) {
-    sender->counters.lost += sender->samples - sender->base - LINK_HISTORY;
+    sender->counters.samplesLost += sender->samples - sender->base - LINK_HISTORY;
     sender->base = sender->samples - LINK_HISTORY;
     if (edgeLinkAfter(sender->base, sender->next) > 0) {
       sender->next = sender->base;
@@ -69,7 +70,7 @@ void linkSenderPush(linkSender_t *sender, const uint8_t sample[EDGE_LINK_SAMPLE_
   }
   forget(sender);
   count(&sender->silent);
-  count(&sender->waited);
+  count(&sender->sinceRetry);
   sender->holdOff = (uint8_t)(sender->holdOff - (sender->holdOff > 0 ? 1 : 0));
   if (sender->silent >= LINK_DOWN_STEPS && (sender->state == LINK_UP || sender->state == LINK_FILLING)) {
     sender->state = LINK_DOWN;
@@ -104,17 +105,21 @@ static void packFeatures(linkSender_t *sender, edgeLinkPacket_t *packet) {
   sender->next = from + packet->features.count;
 }
 
-/** Whether the sender may speak; goes back to the base where no answer has come for too long. */
-static bool mayContinue(linkSender_t *sender) {
-  const bool silent = sender->silent >= LINK_RETRY_STEPS;
-  if (silent && sender->waited >= sender->wait) {
-    sender->counters.timeouts++;
-    sender->next = sender->base;
-    sender->outstanding = 0;
-    beginWait(sender);
-    return true;
-  }
-  return !silent && sender->outstanding < LINK_WINDOW;
+static bool isSilent(const linkSender_t *sender) { return sender->silent >= LINK_RETRY_STEPS; }
+
+/** Whether no answer has come for so long that everything unconfirmed is sent again. */
+static bool retryDue(const linkSender_t *sender) {
+  return isSilent(sender) && sender->sinceRetry >= sender->retryInterval;
+}
+
+/** Everything unconfirmed is sent again. */
+static void rewindToBase(linkSender_t *sender) { sender->next = sender->base; }
+
+static void retry(linkSender_t *sender) {
+  sender->counters.timeouts++;
+  rewindToBase(sender);
+  sender->outstanding = 0;
+  noteRetry(sender);
 }
 
 uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
@@ -122,20 +127,22 @@ uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
   sender->sending = false;
   const bool refused = sender->state == LINK_REFUSED;
   if (refused || sender->state == LINK_STARTING) {
-    if (sender->waited < sender->wait || (refused && sender->waited < LINK_REFUSED_STEPS)) {
+    if (sender->sinceRetry < sender->retryInterval || (refused && sender->sinceRetry < LINK_REFUSED_STEPS)) {
       return 0;
     }
-    beginWait(sender);
+    noteRetry(sender);
     if (refused) {  // as another session: a RESET of the one that the GAP8 refused changes nothing there
       sender->session = nextSession(sender);
       packet.session = sender->session;
     }
     packReset(sender, &packet);
   } else {
-    if (sender->next == sender->samples && sender->silent < LINK_RETRY_STEPS) {
+    if ((sender->next == sender->samples && !isSilent(sender)) || sender->base == sender->samples) {
       return 0;
     }
-    if (sender->base == sender->samples || !mayContinue(sender)) {
+    if (retryDue(sender)) {
+      retry(sender);
+    } else if (isSilent(sender) || sender->outstanding >= LINK_WINDOW) {
       return 0;
     }
     packFeatures(sender, &packet);
@@ -149,7 +156,7 @@ void linkSenderSent(linkSender_t *sender, bool taken) {
     sender->outstanding = (uint8_t)(sender->outstanding + (sender->sending && sender->outstanding < 255 ? 1 : 0));
     return;
   }
-  sender->counters.dropped++;
+  sender->counters.packetsDropped++;
   if (sender->sending) {
     sender->next = sender->sendingFrom;
   }
@@ -189,8 +196,8 @@ static void confirm(linkSender_t *sender, const edgeLinkResult_t *result) {
     }
   }
   if ((result->flags & EDGE_LINK_GAP) && sender->holdOff == 0) {
-    sender->counters.goneBack++;
-    sender->next = sender->base;
+    sender->counters.rewinds++;
+    rewindToBase(sender);
     sender->holdOff = HOLD_OFF_STEPS;
   }
 }
@@ -227,19 +234,19 @@ static void takeHeartbeat(linkSender_t *sender, uint8_t session) {
     restartAnew(sender);
   }
   if (!ours || sender->state != LINK_REFUSED) {
-    endWait(sender);
+    makeRetryDue(sender);
   }
 }
 
 int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, linkAnswer_t *answers) {
   edgeLinkPacket_t packet;
   if (!edgeLinkParse(bytes, length, &packet)) {
-    sender->counters.refused++;
+    sender->counters.packetsRefused++;
     return 0;
   }
   const bool result = packet.type == EDGE_LINK_RESULT;
   if (!result && packet.type != EDGE_LINK_HEARTBEAT) {
-    sender->counters.refused++;
+    sender->counters.packetsRefused++;
     return 0;
   }
   sender->counters.received++;
@@ -252,7 +259,7 @@ int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, 
     return 0;  // an answer to an earlier session
   }
   sender->silent = 0;
-  sender->wait = LINK_RETRY_STEPS;
+  sender->retryInterval = LINK_RETRY_STEPS;
   return takeResult(sender, &packet.result, answers);
 }
 

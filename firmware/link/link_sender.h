@@ -21,12 +21,18 @@
 extern "C" {
 #endif
 
-#define LINK_HISTORY 288        ///< samples kept: the longest fault that leaves no gap, in steps
-#define LINK_WINDOW 8           ///< packets on their way, at most
-#define LINK_RETRY_STEPS 10     ///< without an answer until everything unconfirmed is sent again
-#define LINK_RETRY_MOST 320     ///< between two tries; after LINK_HISTORY steps of silence each wait is twice the last
-#define LINK_DOWN_STEPS 50      ///< without an answer until the link counts as down
-#define LINK_REFUSED_STEPS 100  ///< between two resets to a GAP8 that has another model
+/**
+ * Samples kept: the longest fault that leaves no gap, in steps. 2.88 s: it holds the 257 samples that `best`, the
+ * longest network, needs before it answers, in whole words of 32 flags (appCore_t.airborneBits); no source for the
+ * rest.
+ */
+#define LINK_HISTORY 288
+#define LINK_WINDOW 8        ///< packets on their way, at most; no source: round number
+#define LINK_RETRY_STEPS 10  ///< without an answer until everything unconfirmed is sent again; no source: round number
+/** Steps between two tries; after LINK_HISTORY steps of silence each interval is twice the last. Five doublings. */
+#define LINK_RETRY_MOST 320
+#define LINK_DOWN_STEPS 50      ///< without an answer until the link counts as down; no source: round number
+#define LINK_REFUSED_STEPS 100  ///< between two resets to a GAP8 that has another model; no source: round number
 
 typedef enum {
   LINK_STARTING = 0,  ///< no answer to the reset yet
@@ -44,15 +50,15 @@ typedef struct {
 
 /** What went wrong so far, and how far the answers lag. */
 typedef struct {
-  uint32_t sent;      ///< packets given to the transport
-  uint32_t dropped;   ///< packets that the transport did not take
-  uint32_t received;  ///< good packets from the GAP8
-  uint32_t refused;   ///< packets that were not understood
-  uint32_t timeouts;  ///< times that everything unconfirmed was sent again for want of an answer
-  uint32_t goneBack;  ///< times that the GAP8 asked for samples again
-  uint32_t lost;      ///< samples too old to be sent again
-  uint32_t resets;    ///< of the GAP8 that were noticed
-  uint32_t uptimeMs;  ///< the GAP8's, of its last heartbeat
+  uint32_t sent;            ///< packets given to the transport
+  uint32_t packetsDropped;  ///< packets that the transport did not take
+  uint32_t received;        ///< good packets from the GAP8
+  uint32_t packetsRefused;  ///< packets that were not understood
+  uint32_t timeouts;        ///< times that everything unconfirmed was sent again for want of an answer
+  uint32_t rewinds;         ///< times that the GAP8 asked for samples again
+  uint32_t samplesLost;     ///< samples too old to be sent again
+  uint32_t resets;          ///< of the GAP8 that were noticed
+  uint32_t uptimeMs;        ///< the GAP8's, of its last heartbeat
 } linkCounters_t;
 
 /** The sender; plain values, no pointers. */
@@ -61,16 +67,16 @@ typedef struct {
   uint8_t history[LINK_HISTORY][EDGE_LINK_SAMPLE_BYTES];
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   uint32_t nonce;
-  uint32_t samples;     ///< pushed so far: the next one's sequence
-  uint32_t base;        ///< the oldest unconfirmed one
-  uint32_t next;        ///< the next one to send
-  uint32_t lastAnswer;  ///< sequence of the last answer given
-  uint16_t refill;      ///< samples that the network needs before it answers
-  uint16_t silent;      ///< steps since the GAP8's last packet
-  uint16_t waited;      ///< steps since the last try: a reset, or everything that is unconfirmed again
-  uint16_t wait;        ///< steps from one try to the next
-  uint8_t outstanding;  ///< packets on their way
-  uint8_t holdOff;      ///< steps in which requests to go back are old news
+  uint32_t samples;        ///< pushed so far: the next one's sequence
+  uint32_t base;           ///< the oldest unconfirmed one
+  uint32_t next;           ///< the next one to send
+  uint32_t lastAnswer;     ///< sequence of the last answer given
+  uint16_t refill;         ///< samples that the network needs before it answers
+  uint16_t silent;         ///< steps since the GAP8's last packet
+  uint16_t sinceRetry;     ///< steps since the last try: a reset, or everything that is unconfirmed again
+  uint16_t retryInterval;  ///< steps from one try to the next
+  uint8_t outstanding;     ///< packets on their way
+  uint8_t holdOff;         ///< steps in which requests to go back are old news
   uint8_t session;
   uint8_t algorithm;
   uint8_t state;  ///< a linkState_t
@@ -84,7 +90,7 @@ typedef struct {
  * @param algorithm  an edgeLinkAlgorithm_t
  * @param digest     of the model that the GAP8 must have
  * @param refill     samples of the past that the network needs, at most LINK_HISTORY
- * @param nonce      other after each start of this processor
+ * @param nonce      very likely other after each start of this processor
  * @param session    1 to 255, other than that of the stream before
  */
 void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t digest[EDGE_LINK_DIGEST_BYTES],

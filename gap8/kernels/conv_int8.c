@@ -7,7 +7,7 @@
 
 enum { LANES = 4 };  // positions at a time
 
-// What does not change from block to block.
+/** What does not change from block to block. */
 typedef struct {
   const layerInt8_t *layer;
   const int8_t *input;
@@ -24,14 +24,14 @@ typedef struct {
   int32_t outColumns;
 } convPlan_t;
 
-// A place in the output, and where its positions begin.
+/** A place in the output, and where its positions begin. */
 typedef struct {
   int32_t place;
   int32_t row;
   int32_t column;
 } convPlace_t;
 
-int32_t convCanPool(const layerInt8_t *pool) {
+bool convCanPool(const layerInt8_t *pool) {
   return pool->kind == LAYER_MAX_POOL && pool->kernelRows * pool->kernelColumns == 2;
 }
 
@@ -58,7 +58,7 @@ static convPlan_t plan(const jobInt8_t *job) {
 
 enum { PIECE = 16 };  // bytes that are copied at once
 
-// One patch: pieces of rows of the input, one after the other, each a multiple of four bytes.
+/** One patch: pieces of rows of the input, one after the other, each a multiple of four bytes. */
 static void copyWords(const int8_t *from, int8_t *to, int32_t rows, int32_t span, int32_t rowStride) {
   for (; rows > 0; rows--, from += rowStride - span) {
     int32_t left = span;
@@ -71,7 +71,7 @@ static void copyWords(const int8_t *from, int8_t *to, int32_t rows, int32_t span
   }
 }
 
-// The same for pieces of one byte.
+/** The same for pieces of one byte. */
 static void copySingles(const int8_t *from, int8_t *to, int32_t rows, int32_t rowStride) {
   do {
     *to++ = *from;
@@ -79,7 +79,7 @@ static void copySingles(const int8_t *from, int8_t *to, int32_t rows, int32_t ro
   } while (--rows > 0);
 }
 
-// The same for pieces of any length.
+/** The same for pieces of any length. */
 static void copyBytes(const int8_t *from, int8_t *to, int32_t rows, int32_t span, int32_t rowStride) {
   for (; rows > 0; rows--, from += rowStride) {
     for (int32_t i = 0; i < span; i++) {
@@ -88,10 +88,11 @@ static void copyBytes(const int8_t *from, int8_t *to, int32_t rows, int32_t span
   }
 }
 
-// The patches of `count` outputs from `at` on, `area` for each; `at` then stands behind them.
+/** The patches of `count` outputs from `at` on, `area` for each; `at` then stands behind them. */
 static void gather(const convPlan_t *p, convPlace_t *at, int32_t count, int8_t *patches) {
   const layerInt8_t *layer = p->layer;
-  const int32_t words = layer->inChannels % 4 == 0, rows = layer->kernelRows;
+  const bool words = layer->inChannels % 4 == 0;
+  const int32_t rows = layer->kernelRows;
   for (; count > 0; count--, at->place++) {
     const int8_t *from = p->input + at->row * p->rowStride + at->column * layer->inChannels;
     for (int32_t i = p->area; i > 0; i--, from += p->next, patches += CONV_MAX_FILTER) {
@@ -111,7 +112,7 @@ static void gather(const convPlan_t *p, convPlace_t *at, int32_t count, int8_t *
   }
 }
 
-// The outputs of one channel from the sums of its lanes: one each, or one for two.
+/** The outputs of one channel from the sums of its lanes: one each, or one for two. */
 ALWAYS_INLINE void write(int8_t *to, int32_t channels, requantiser_t r, int32_t lanes, int32_t area, int32_t s0,
                          int32_t s1, int32_t s2, int32_t s3) {
   if (area == 2) {
@@ -133,8 +134,10 @@ ALWAYS_INLINE void write(int8_t *to, int32_t channels, requantiser_t r, int32_t 
   }
 }
 
-// Pairs of channels of all lanes, sums in registers: lanes and area are constants at each call.
-// A last channel without a partner is done twice.
+/**
+ * Pairs of channels of all lanes, sums in registers: lanes and area are constants at each call.
+ * A last channel without a partner is done twice.
+ */
 ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t pair, int32_t end,
                               int32_t lanes, int32_t area) {
   const layerInt8_t layer = *p->layer;  // a copy: the bytes written here might alias it
@@ -178,7 +181,7 @@ ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t
   }
 }
 
-// Channels of all lanes, sparse weights.
+/** Channels of all lanes, sparse weights. */
 ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t channel, int32_t end,
                                   int32_t lanes, int32_t area) {
   const layerInt8_t *layer = p->layer;
@@ -212,7 +215,7 @@ ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, in
   }
 }
 
-// A block of one to four lanes: its channels, or pairs of them, from `unit` to `end`.
+/** A block of one to four lanes: its channels, or pairs of them, from `unit` to `end`. */
 typedef void block_t(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t unit, int32_t end);
 
 #define BLOCK(name, inner, lanes, area)                                                                 \
@@ -240,7 +243,7 @@ void convInt8(const jobInt8_t *job) {
   _Alignas(4) int8_t patches[LANES * CONV_MAX_FILTER] = {0};  // what a filter is filled up with stays zero
   const convPlan_t p = plan(job);
   const int32_t channels = p.layer->outChannels;
-  const int32_t sparse = p.layer->kind == LAYER_SPARSE_CONV;
+  const bool sparse = p.layer->kind == LAYER_SPARSE_CONV;
   const int32_t units = sparse ? channels : (channels + 1) / 2;
   const int32_t most = LANES / p.area;  // outputs of a block
   const int32_t items = (p.outputs + most - 1) / most * units;

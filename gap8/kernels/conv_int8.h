@@ -10,6 +10,8 @@
  */
 #pragma once
 
+#include <stdbool.h>
+
 #include "job_int8.h"
 
 #ifdef __cplusplus
@@ -39,7 +41,7 @@ void convInt8(const jobInt8_t *job);
 /**
  * @brief Whether convInt8 can do a pool on the way: two positions to one.
  */
-int32_t convCanPool(const layerInt8_t *pool);
+bool convCanPool(const layerInt8_t *pool);
 
 #ifdef __cplusplus
 }

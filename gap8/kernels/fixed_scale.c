@@ -2,8 +2,11 @@
 
 #include <string.h>
 
-// log2 of a positive, normal float: its exponent, and of its mantissa m in [0.7, 1.41] the
-// series of 2 atanh((m - 1) / (m + 1)) / ln 2.
+/**
+ * log2 of a positive, normal float: its exponent, and of its mantissa m in [0.7, 1.41] the
+ * series of 2 atanh((m - 1) / (m + 1)) / ln 2. Its own series: naturalLogarithm in start_up_math.h has other terms,
+ * and so other bits.
+ */
 static float log2OfNormal(float x) {
   uint32_t bits;
   memcpy(&bits, &x, sizeof(bits));
@@ -24,7 +27,7 @@ static float log2OfNormal(float x) {
 void fixedScaleApply(const fixedScale_t *scale, const float *features, float *x) {
   for (int32_t i = 0; i < scale->columns; i++) {
     float value = features[i] > FIXED_SCALE_SMALLEST ? features[i] : FIXED_SCALE_SMALLEST;
-    value = value < 3.0e38f ? value : 3.0e38f;
+    value = value < FIXED_SCALE_LARGEST ? value : FIXED_SCALE_LARGEST;
     const float deviations = (log2OfNormal(value) - scale->mean[i]) * scale->inverseDeviation[i];
     const float above = deviations < -FIXED_SCALE_LIMIT ? -FIXED_SCALE_LIMIT : deviations;
     x[i] = above > FIXED_SCALE_LIMIT ? FIXED_SCALE_LIMIT : above;

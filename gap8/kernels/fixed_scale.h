@@ -29,6 +29,7 @@ typedef struct {
 } fixedScale_t;
 
 #define FIXED_SCALE_SMALLEST 9.094947017729282e-13f  // 2^-40: a smaller feature counts as this
+#define FIXED_SCALE_LARGEST 3.0e38f                  // below FLT_MAX: a larger feature, infinity too, counts as this
 #define FIXED_SCALE_LIMIT 4.0f                       // deviations at which inputs are clamped
 
 /**

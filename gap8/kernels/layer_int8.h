@@ -22,6 +22,7 @@
  */
 #pragma once
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -71,7 +72,7 @@ typedef struct {
 enum { LAYER_MAX_VALUES = 1 << 16 };  // of a layer's input or output: all that the cluster's L1 holds
 
 /** Whether a shape has values, and no more than there can be: its size may be computed then. */
-static inline int32_t shapeFits(int32_t rows, int32_t columns, int32_t channels) {
+static inline bool shapeFits(int32_t rows, int32_t columns, int32_t channels) {
   return rows >= 1 && columns >= 1 && channels >= 1 && rows <= LAYER_MAX_VALUES && columns <= LAYER_MAX_VALUES / rows &&
          channels <= LAYER_MAX_VALUES / (rows * columns);
 }

@@ -1,21 +1,21 @@
 #include "network_int8.h"
 
-#include <math.h>
 #include <stddef.h>
 
 #include "conv_int8.h"
 #include "dense_int8.h"
 #include "max_pool_int8.h"
+#include "requantise.h"
 #include "sparse_dense_int8.h"
 
 static int32_t inputSize(const layerInt8_t *layer) { return layer->inRows * layer->inColumns * layer->inChannels; }
 
 static int32_t outputSize(const layerInt8_t *layer) { return layer->outRows * layer->outColumns * layer->outChannels; }
 
-// Layers that step i takes: two where a pool is done with the convolution before it.
+/** Layers that step i takes: two where a pool is done with the convolution before it. */
 static int32_t layersOfStep(const networkInt8_t *network, int32_t i) {
   const int32_t kind = network->layers[i].kind;
-  const int32_t conv = kind == LAYER_CONV || kind == LAYER_SPARSE_CONV;
+  const bool conv = kind == LAYER_CONV || kind == LAYER_SPARSE_CONV;
   return conv && i + 1 < network->layerCount && convCanPool(&network->layers[i + 1]) ? 2 : 1;
 }
 
@@ -29,11 +29,11 @@ int32_t networkInt8ArenaBytes(const networkInt8_t *network) {
   return largest;
 }
 
-static int layerFits(const layerInt8_t *layer) {
+static bool layerFits(const layerInt8_t *layer) {
   if (!shapeFits(layer->inRows, layer->inColumns, layer->inChannels) ||
       !shapeFits(layer->outRows, layer->outColumns, layer->outChannels) ||
       !shapeFits(layer->kernelRows, layer->kernelColumns, layer->inChannels)) {
-    return 0;
+    return false;
   }
   switch (layer->kind) {
     case LAYER_CONV:
@@ -48,7 +48,7 @@ static int layerFits(const layerInt8_t *layer) {
              layer->outColumns == layer->inColumns / layer->kernelColumns && layer->outChannels == layer->inChannels;
     case LAYER_DENSE: return layer->outRows == 1 && layer->outColumns == 1;
     case LAYER_SPARSE_DENSE: return layer->outRows == 1 && layer->outColumns == 1 && inputSize(layer) % 4 == 0;
-    default: return 0;
+    default: return false;
   }
 }
 
@@ -64,12 +64,7 @@ int32_t networkInt8Check(const networkInt8_t *network) {
 
 void networkInt8Quantise(const networkInt8_t *network, const float *x, int32_t count, int8_t *q) {
   for (int32_t i = 0; i < count; i++) {
-    const float zeroPoint = (float)network->inputZeroPoint;
-    float value = floorf(x[i] / network->inputScale + 0.5f) + zeroPoint;
-    value = value == value ? value : zeroPoint;
-    value = value < -128.0f ? -128.0f : value;
-    value = value > 127.0f ? 127.0f : value;
-    q[i] = (int8_t)value;
+    q[i] = quantiseInput(x[i], network->inputScale, network->inputZeroPoint);
   }
 }
 
@@ -89,10 +84,10 @@ const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *inp
   // never writes over its own input.
   const int32_t bytes = networkInt8ArenaBytes(network);
   const int8_t *x = input;
-  int32_t atEnd = 0;
+  bool atEnd = false;
   for (int32_t i = 0; i < network->layerCount; i += layersOfStep(network, i)) {
-    const int32_t pooled = layersOfStep(network, i) > 1;
-    const layerInt8_t *last = &network->layers[i + pooled];
+    const bool pooled = layersOfStep(network, i) > 1;
+    const layerInt8_t *last = &network->layers[pooled ? i + 1 : i];
     int8_t *y = atEnd ? arena + bytes - alignedBytes(outputSize(last)) : arena;
     layerInt8Run(&(jobInt8_t){.layer = &network->layers[i],
                               .pool = pooled ? last : NULL,

@@ -1,6 +1,7 @@
 /**
  * @file requantise.h
- * From an int32 accumulator to an int8 activation: the one rounding of this project.
+ * From an int32 accumulator to an int8 activation: the rounding between int8 layers; inputs are
+ * rounded by quantiseInput.
  *
  * gemmlowp's double rounding, as TensorFlow Lite Micro does it: a rounding, doubling
  * high multiplication (ties up), then a rounding shift to the right (ties away from
@@ -33,6 +34,19 @@ static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
 #else
   return (x + towardsZero + (int32_t)(1u << (exponent - 1))) >> exponent;
 #endif
+}
+
+#define QUANTISE_LIMIT 1024.0f  ///< steps: beyond int8 whatever the zero point, and well within int32
+
+/** An input of a network: floor(x / scale + 0.5) + zeroPoint, clamped to int8; NaN counts as 0. */
+static inline int8_t quantiseInput(float x, float scale, int32_t zeroPoint) {
+  const float scaled = x / scale + 0.5f;
+  if (!(scaled >= -QUANTISE_LIMIT && scaled <= QUANTISE_LIMIT)) {
+    return (int8_t)(scaled > 0.0f ? INT8_MAX : (scaled < 0.0f ? INT8_MIN : zeroPoint));
+  }
+  const int32_t towardsZero = (int32_t)scaled;
+  const int32_t q = towardsZero - ((float)towardsZero > scaled ? 1 : 0) + zeroPoint;
+  return (int8_t)(q < INT8_MIN ? INT8_MIN : (q > INT8_MAX ? INT8_MAX : q));
 }
 
 /** Zero point and clamp of a layer's output, read once: bytes that a kernel writes might alias the layer. */

@@ -5,21 +5,21 @@
 
 #include "conv_int8.h"
 
-static int32_t isConv(const layerInt8_t *layer) {
-  return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV;
-}
+static bool isConv(const layerInt8_t *layer) { return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV; }
 
-// Whether a layer slides over the rows of its input.
-static int32_t slides(const layerInt8_t *layer) { return isConv(layer) || layer->kind == LAYER_MAX_POOL; }
+/** Whether a layer slides over the rows of its input. */
+static bool slides(const layerInt8_t *layer) { return isConv(layer) || layer->kind == LAYER_MAX_POOL; }
 
-// How far apart neighbouring rows of a layer's input lie, in samples: in the window, and as the rolling network
-// computes them. A pool multiplies both, until the second reaches the stride.
+/**
+ * How far apart neighbouring rows of a layer's input lie, in samples: in the window, and as the rolling network
+ * computes them. A pool multiplies both, until the second reaches the stride.
+ */
 typedef struct {
   int32_t window;
   int32_t rolling;
 } spacing_t;
 
-// A step of one layer, for one row of output: as many rows of input as it reads for that.
+/** A step of one layer, for one row of output: as many rows of input as it reads for that. */
 static void beginStep(rollingStep_t *step, const layerInt8_t *layer) {
   step->layer = *layer;
   if (slides(layer)) {
@@ -31,7 +31,7 @@ static void beginStep(rollingStep_t *step, const layerInt8_t *layer) {
   step->period = 1;
 }
 
-// A convolution whose rows only the pool reads: both at once, the rows never stored.
+/** A convolution whose rows only the pool reads: both at once, the rows never stored. */
 static void joinPool(rollingStep_t *step, const layerInt8_t *conv, const layerInt8_t *pool) {
   step->pool = *pool;
   step->pool.inRows = pool->kernelRows;
@@ -47,49 +47,49 @@ static void passPool(rollingInt8_t *self, const layerInt8_t *pool, spacing_t *sp
   spacing->window *= pool->kernelRows;
 }
 
-// Plans a convolution or a pool, and the pool behind a convolution where both are one step. @return layers planned
+/** Plans a convolution or a pool, and the pool behind a convolution where both are one step. @return layers planned */
 static int32_t planSliding(rollingInt8_t *self, rollingStep_t *step, const layerInt8_t *layer, const layerInt8_t *next,
                            spacing_t *spacing) {
-  const int32_t joined = isConv(layer) && next != NULL && convCanPool(next) && spacing->rolling == spacing->window &&
-                         spacing->rolling * next->kernelRows <= self->stride;
+  const bool joined = isConv(layer) && next != NULL && convCanPool(next) && spacing->rolling == spacing->window &&
+                      spacing->rolling * next->kernelRows <= self->stride;
   step->dilation = spacing->window / spacing->rolling;
   step->taps = layer->kernelRows;
   step->rowBytes = layer->inColumns * layer->inChannels;
-  self->receptive += (layer->kernelRows - 1) * spacing->window;
+  self->receptiveSamples += (layer->kernelRows - 1) * spacing->window;
   if (layer->kind == LAYER_MAX_POOL) {
     step->period = spacing->rolling * layer->kernelRows <= self->stride ? layer->kernelRows : 1;
     passPool(self, layer, spacing);
   } else if (joined) {
     joinPool(step, layer, next);
-    self->receptive += (next->kernelRows - 1) * spacing->window;
+    self->receptiveSamples += (next->kernelRows - 1) * spacing->window;
     passPool(self, next, spacing);
   }
   spacing->rolling *= step->period;
   return joined ? 2 : 1;
 }
 
-// Plans the first dense layer, which reads the rows of the layer before it.
+/** Plans the first dense layer, which reads the rows of the layer before it. */
 static void planFirstDense(rollingInt8_t *self, rollingStep_t *step, const layerInt8_t *layer,
                            const spacing_t *spacing) {
   step->dilation = spacing->window / spacing->rolling;
   step->taps = layer->inRows;
   step->rowBytes = layer->inColumns * layer->inChannels;
-  self->receptive += (layer->inRows - 1) * spacing->window;
+  self->receptiveSamples += (layer->inRows - 1) * spacing->window;
 }
 
-int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32_t stride) {
+bool rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32_t stride) {
   spacing_t spacing = {1, 1};
-  int32_t dense = 0;
+  bool dense = false;
   if (networkInt8Check(network) >= 0 || network->layerCount < 1 || stride < 1 || stride > ROLLING_MAX_STRIDE) {
-    return 0;
+    return false;
   }
   memset(self, 0, sizeof(*self));
   self->stride = stride;
-  self->receptive = 1;
+  self->receptiveSamples = 1;
   for (int32_t i = 0; i < network->layerCount;) {
     const layerInt8_t *layer = &network->layers[i];
     if (self->stepCount == ROLLING_MAX_STEPS || (dense && slides(layer))) {
-      return 0;
+      return false;
     }
     rollingStep_t *step = &self->steps[self->stepCount++];
     beginStep(step, layer);
@@ -102,7 +102,7 @@ int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32
     } else {
       planFirstDense(self, step, layer, &spacing);
     }
-    dense = 1;
+    dense = true;
     i++;
   }
   return dense && spacing.rolling == stride;
@@ -125,9 +125,9 @@ int32_t rollingInt8ArenaBytes(const networkInt8_t *network, int32_t stride) {
   return rollingInt8Plan(&planned, network, stride) ? rollingInt8PlanBytes(&planned) : 0;
 }
 
-int32_t rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32_t stride, int8_t *arena) {
+bool rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32_t stride, int8_t *arena) {
   if (!rollingInt8Plan(self, network, stride)) {
-    return 0;
+    return false;
   }
   for (int32_t i = 0; i < self->stepCount; i++) {
     self->steps[i].ring = arena;
@@ -135,7 +135,7 @@ int32_t rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32
   }
   self->output = arena;
   rollingInt8Reset(self);
-  return 1;
+  return true;
 }
 
 void rollingInt8Reset(rollingInt8_t *self) {
@@ -149,13 +149,15 @@ void rollingInt8Reset(rollingInt8_t *self) {
   }
 }
 
-// Where the next input row goes; it is copied `taps` rows further on when it is complete, so that
-// the newest taps rows of its phase always lie one after the other.
+/**
+ * Where the next input row goes; it is copied `taps` rows further on when it is complete, so that
+ * the newest taps rows of its phase always lie one after the other.
+ */
 static int8_t *nextRow(const rollingStep_t *step) {
   return step->ring + step->phase * alignedBytes(2 * step->taps * step->rowBytes) + step->place * step->rowBytes;
 }
 
-// The row at nextRow is complete. Returns the oldest of the newest taps rows of its phase.
+/** The row at nextRow is complete. Returns the oldest of the newest taps rows of its phase. */
 static const int8_t *push(rollingStep_t *step) {
   int8_t *row = nextRow(step);
   memcpy(row + step->taps * step->rowBytes, row, (size_t)step->rowBytes);
@@ -169,7 +171,7 @@ static const int8_t *push(rollingStep_t *step) {
 
 const int8_t *rollingInt8Step(rollingInt8_t *self, const int8_t *sample) {
   memcpy(nextRow(&self->steps[0]), sample, (size_t)self->steps[0].rowBytes);
-  self->seen += self->seen < self->receptive ? 1 : 0;
+  self->seen += self->seen < self->receptiveSamples ? 1 : 0;
   for (int32_t i = 0; i < self->stepCount; i++) {
     rollingStep_t *step = &self->steps[i];
     const int8_t *rows = push(step);
@@ -185,5 +187,5 @@ const int8_t *rollingInt8Step(rollingInt8_t *self, const int8_t *sample) {
                               .core = 0,
                               .cores = 1});
   }
-  return self->seen >= self->receptive ? self->output : NULL;
+  return self->seen >= self->receptiveSamples ? self->output : NULL;
 }

@@ -10,6 +10,8 @@
  */
 #pragma once
 
+#include <stdbool.h>
+
 #include "network_int8.h"
 
 #ifdef __cplusplus
@@ -40,21 +42,21 @@ typedef struct {
   rollingStep_t steps[ROLLING_MAX_STEPS];
   int8_t *output;  ///< of the last step
   int32_t stepCount;
-  int32_t stride;     ///< samples to one output
-  int32_t ahead;      ///< samples by which an output is earlier than its window's end
-  int32_t receptive;  ///< samples that an output depends on
-  int32_t seen;       ///< samples since the reset, at most receptive
+  int32_t stride;            ///< samples to one output
+  int32_t ahead;             ///< samples by which an output is earlier than its window's end
+  int32_t receptiveSamples;  ///< samples that an output depends on
+  int32_t seen;              ///< samples since the reset, at most receptiveSamples
 } rollingInt8_t;
 
 /**
- * @brief Work out steps, stride, ahead and receptive, without an arena: for rollingInt8Init, and to ask.
+ * @brief Work out steps, stride, ahead and receptiveSamples, without an arena: for rollingInt8Init, and to ask.
  *
  * A network can roll where networkInt8Check accepts it, dense layers follow its convolutions
  * and pools, and the stride is what its first pools make together: 1, 2 or 4 for the paper's.
  *
- * @return 1, or 0 where this network cannot roll at this stride.
+ * @return false where this network cannot roll at this stride.
  */
-int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32_t stride);
+bool rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32_t stride);
 
 /**
  * @brief Bytes of arena of a network that rollingInt8Plan has planned.
@@ -74,12 +76,12 @@ int32_t rollingInt8ArenaBytes(const networkInt8_t *network, int32_t stride);
  * Needs an arena of rollingInt8ArenaBytes bytes, aligned to 4, and the network's constants, for as long as
  * `self` lives. The same constants serve windows and the stream.
  *
- * @return 1, or 0 where the network cannot roll at this stride; `self` is then of no use.
+ * @return false where the network cannot roll at this stride; `self` is then of no use.
  */
-int32_t rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32_t stride, int8_t *arena);
+bool rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32_t stride, int8_t *arena);
 
 /**
- * @brief Forget the past: the next output comes after `receptive` samples.
+ * @brief Forget the past: the next output comes after `receptiveSamples` samples.
  */
 void rollingInt8Reset(rollingInt8_t *self);
 

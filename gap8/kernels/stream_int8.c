@@ -10,7 +10,7 @@ static int32_t ringRows(const streamConv_t *conv) { return (conv->layer.inRows -
 
 static int32_t patchBytes(const layerInt8_t *layer) { return alignedBytes(layer->inRows * layer->inChannels); }
 
-// The widest of what the patch holds: the taps of a conv, then the head's output.
+/** The widest of what the patch holds: the taps of a conv, then the head's output. */
 static int32_t widestPatch(const streamInt8_t *network) {
   int32_t widest = alignedBytes(network->head->outChannels);
   for (int32_t i = 0; i < network->convCount; i++) {
@@ -20,7 +20,7 @@ static int32_t widestPatch(const streamInt8_t *network) {
   return widest;
 }
 
-// What the head reads; a conv that it does not read writes its row there first.
+/** What the head reads; a conv that it does not read writes its row there first. */
 static int32_t skipBytes(const streamInt8_t *network) {
   int32_t widest = network->head->inRows * network->head->inChannels;
   for (int32_t i = 0; i < network->firstSkip; i++) {
@@ -39,11 +39,11 @@ int32_t streamInt8ArenaBytes(const streamInt8_t *network) {
   return bytes;
 }
 
-static int layerFits(const layerInt8_t *layer) {
+static bool layerFits(const layerInt8_t *layer) {
   if (!shapeFits(layer->inRows, 1, layer->inChannels) || !shapeFits(1, 1, layer->outChannels)) {
-    return 0;
+    return false;
   }
-  const int dense =
+  const bool dense =
       layer->kind == LAYER_DENSE || (layer->kind == LAYER_SPARSE_DENSE && layer->inRows * layer->inChannels % 4 == 0);
   return dense && layer->inColumns == 1 && layer->outRows == 1 && layer->outColumns == 1;
 }
@@ -55,15 +55,15 @@ int32_t streamInt8Check(const streamInt8_t *network) {
   int32_t skipped = 0;
   for (int32_t i = 0; i < network->convCount; i++) {
     const streamConv_t *conv = &network->convs[i];
-    const int follows = i == 0 || conv->layer.inChannels == network->convs[i - 1].layer.outChannels;
+    const bool follows = i == 0 || conv->layer.inChannels == network->convs[i - 1].layer.outChannels;
     if (!layerFits(&conv->layer) || !follows || conv->dilation < 1 || (i == 0 && conv->dilation != 1) ||
         !shapeFits(conv->layer.inRows, conv->dilation, conv->layer.inChannels)) {
       return i;
     }
     skipped += i >= network->firstSkip ? conv->layer.outChannels : 0;
   }
-  const int from = network->firstSkip >= 0 && network->firstSkip < network->convCount;
-  const int fits = layerFits(network->head) && network->head->inRows * network->head->inChannels == skipped;
+  const bool from = network->firstSkip >= 0 && network->firstSkip < network->convCount;
+  const bool fits = layerFits(network->head) && network->head->inRows * network->head->inChannels == skipped;
   return fits && from ? -1 : network->convCount;
 }
 
@@ -85,8 +85,10 @@ static void push(const streamConv_t *conv, streamState_t *state, int32_t i, cons
   memcpy(state->rings[i] + state->newest[i] * conv->layer.inChannels, row, (size_t)conv->layer.inChannels);
 }
 
-// The taps of conv i, oldest first, into the patch. The oldest is the row after the
-// newest, since the ring is as long as the conv looks back.
+/**
+ * The taps of conv i, oldest first, into the patch. The oldest is the row after the
+ * newest, since the ring is as long as the conv looks back.
+ */
 static void gather(const streamConv_t *conv, streamState_t *state, int32_t i) {
   const int32_t rows = ringRows(conv);
   const int32_t channels = conv->layer.inChannels;

@@ -10,7 +10,11 @@ from dataclasses import asdict, dataclass, fields
 
 @dataclass(frozen=True)
 class Parameters:
-    """The paper's settings (section 7.1), the defaults of every function here."""
+    """The defaults of every function here.
+
+    The settings of the paper's section 7.1 where it gives one (rate, window, band, P_FA, cells); the project's own
+    where marked. "(kernels.md)" names the part of that page that describes a choice.
+    """
 
     sample_rate_hz: float = 100.0  #: rate of all nine channels
     band_window: int = 200  #: FC-FE: STFT window, samples
@@ -21,13 +25,23 @@ class Parameters:
     guard_cells: int = 15  #: FR-CFAR: cells between them and the cell under test
     p_fa: float = 1e-6  #: FR-CFAR: probability of false alarm
     feature_window: int = 100  #: network: fused features it sees, samples
-    force_mean_samples: float = 100.0  #: FR-CFAR input: time constant of f_w,z's mean, samples
-    alert_hold: int = 50  #: physical filter: an alert vouches for edges this many samples after it
-    arm_pwm: float = 15000.0  #: decoding: airborne while the mean PWM is above this
-    arm_samples: int = 100  #: decoding: airborne for so long before an edge can be reported, samples
-    probability_entry: float = 0.6  #: decoding: over the platform from this probability up
-    probability_exit: float = 0.4  #: decoding: off the platform from this probability down
-    dwell_samples: int = 25  #: decoding: at least so long between two edges, samples
+    #: FR-CFAR input: time constant of f_w,z's mean, samples. Project: "What FR-CFAR tests" (kernels.md), 1 s
+    force_mean_samples: float = 100.0
+    #: physical filter: an alert vouches for edges this many samples after it. Project: "What FR-CFAR tests"
+    #: (kernels.md) counts the edges with an alert within this half second; `airtouch train --detector paper` tunes a
+    #: model's own
+    alert_hold: int = 50
+    #: decoding: airborne while the mean PWM is above this, 0 to 65535. Project: a round number without a source; it
+    #: lifts 23 % of the weight of crazyflie-2.1-flow (vehicles/crazyflie-2.1-brushless.toml, which has its own)
+    arm_pwm: float = 15000.0
+    #: decoding: airborne for so long before an edge can be reported, samples. Project: a round number without a
+    #: source, 1 s
+    arm_samples: int = 100
+    #: decoding: over the platform from this probability up. Project: "From probability to edge" (kernels.md), for
+    #: models without tuning; `airtouch train --detector paper` tunes a model's own, as of the two below
+    probability_entry: float = 0.6
+    probability_exit: float = 0.4  #: decoding: off the platform from this probability down. Project: likewise
+    dwell_samples: int = 25  #: decoding: at least so long between two edges, samples. Project: likewise
 
 
 DEFAULT = Parameters()

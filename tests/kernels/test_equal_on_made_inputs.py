@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from equality import EPS, RELATIVE, TINY, band_power_excess, same_alerts, worst
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import airtouch.kernels as kernels
 import airtouch.reference as reference
+from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
 from airtouch.reference.fr_cfar import hold_power
 from airtouch.vehicle import load
@@ -113,10 +115,11 @@ def test_streaming_z_score_equals_the_reference(x, tau):
 
 
 @checks
-@given(signals(10), st.sampled_from([1, 4]))
-def test_edge_pipeline_equals_the_reference(sensors, hop):
+@given(signals(10), st.sampled_from([1, 4]), st.sampled_from([{}, {"probability_entry": np.nan},
+                                                              {"probability_exit": np.nan}]))
+def test_edge_pipeline_equals_the_reference(sensors, hop, thresholds):
     acc, gyro, pwm = sensors[:, :3], sensors[:, 3:6], sensors[:, 6:]
-    config = reference.EdgePipelineConfig(replace(DEFAULT, band_hop=hop))
+    config = reference.EdgePipelineConfig(replace(DEFAULT, band_hop=hop, **thresholds))
     probability = np.float32(np.sin(np.arange(len(sensors)) / 30.0) / 2 + 0.5)
     ours, truth = (pipeline(acc, gyro, pwm, VEHICLE, probability=probability, config=config)
                    for pipeline in (kernels.edge_pipeline, reference.edge_pipeline))
@@ -126,6 +129,25 @@ def test_edge_pipeline_equals_the_reference(sensors, hop):
     for name in ("band_power", "features"):
         np.testing.assert_array_equal(np.isnan(getattr(ours, name)), np.isnan(getattr(truth, name)))
     assert np.isfinite(ours.force).all() and np.isfinite(ours.cfar_power).all()
+
+
+@pytest.mark.parametrize("thresholds", [{"probability_entry": np.nan}, {"probability_exit": np.nan},
+                                        {"probability_entry": np.nan, "probability_exit": np.nan}])
+def test_a_threshold_that_is_no_number_is_never_reached(thresholds):
+    config = reference.EdgePipelineConfig(replace(DEFAULT, **thresholds), physical_filter=False)
+    signals = np.tile([0.0, 0.0, 9.81], (500, 1)), np.zeros((500, 3)), np.full((500, 4), 45000.0)
+    probability = np.where(np.arange(500) // 100 % 2, 0.5, 0.9)
+    ours, truth = (pipeline(*signals, VEHICLE, probability=probability, config=config)
+                   for pipeline in (kernels.edge_pipeline, reference.edge_pipeline))
+    np.testing.assert_array_equal(ours.edge, truth.edge)
+    assert np.count_nonzero(truth.edge) == ("probability_entry" not in thresholds)
+
+
+@pytest.mark.parametrize("p_fa", [0.0, 1e-40, 1.0, np.nan])
+def test_a_probability_beyond_the_kernels_range_is_refused_by_both(p_fa):
+    for module in (kernels, reference):
+        with pytest.raises(AirTouchError, match="the probability of false alarm must be"):
+            module.fr_cfar(np.ones(10), p_fa=p_fa)
 
 
 def test_the_smallest_amplitude_told_from_nothing():

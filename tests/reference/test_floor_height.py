@@ -41,7 +41,7 @@ def test_only_a_change_of_more_than_a_step_is_the_floors(change, steps):
 def test_the_thresholds_are_those_of_the_header_that_flies():
     header = (Path(__file__).parents[2] / "firmware/app/core/floor_height.h").read_text("utf-8")
     thresholds = {name: float(value) for name, value in re.findall(r"#define FLOOR_(\w+) ([\d.]+)[fu]", header)}
-    assert len(thresholds) == 9 and thresholds == {name: getattr(floor_height, name) for name in thresholds}
+    assert len(thresholds) == 10 and thresholds == {name: getattr(floor_height, name) for name in thresholds}
 
 
 @pytest.mark.parametrize(("step", "steps"), [(STEP_M, 0), (math.nextafter(STEP_M, 1.0), 1)])

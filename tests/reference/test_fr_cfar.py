@@ -59,7 +59,8 @@ def test_cells_that_are_not_powers():
     np.testing.assert_allclose(threshold, [np.nan, 0, 0, 2, 2, 3])
 
 
-@pytest.mark.parametrize("settings", [dict(leading_window=0), dict(guard_cells=-1), dict(p_fa=0.0), dict(p_fa=1.0)])
+@pytest.mark.parametrize("settings", [dict(leading_window=0), dict(guard_cells=-1), dict(p_fa=0.0), dict(p_fa=1.0),
+                                      dict(p_fa=1e-40), dict(p_fa=np.nan)])
 def test_settings_out_of_range_are_refused(settings):
     with pytest.raises(AirTouchError):
         fr_cfar(np.ones(10), **settings)

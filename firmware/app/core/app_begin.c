@@ -64,7 +64,7 @@ static bool beginBest(appCore_t *core) {
 }
 
 /** Kernels, detector and stream begin anew; counters stay. */
-static void begin(appCore_t *core) {
+static void beginDetector(appCore_t *core) {
   core->networksFit = beginBest(core) && core->networksFit;
   core->detector = detectorInForce(core);
   core->log.detector = core->detector;
@@ -101,12 +101,12 @@ void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint
     core->log.paramErrors = appParamsClamp(&core->params);
   }
   setVehicle(core, &airtouchStreamMotion.vehicle, airtouchStreamMotion.armPwm);
-  begin(core);
+  beginDetector(core);
 }
 
 void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float armPwm) {
   setVehicle(core, vehicle, armPwm);
-  begin(core);
+  beginDetector(core);
 }
 
 /** Networks of the band's features begin a new stream with another band. `best` uses no band. */
@@ -128,7 +128,7 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   }
   core->params = *params;
   if (params->detector != old.detector || params->enable != old.enable) {
-    begin(core);
+    beginDetector(core);
     return errors;
   }
   if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth) {

@@ -30,7 +30,7 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
 /** The complementary estimator gives no horizontal acceleration: it stays 0, or what another one gave last. */
 static void watchHorizontal(appCore_t *core, const appSample_t *sample) {
   const bool same = sample->acc[0] == core->horizontal[0] && sample->acc[1] == core->horizontal[1];
-  if (!same || sample->accInBody || core->pipeline.airborne == 0) {
+  if (!same || sample->accInBody || core->pipeline.airborneSteps == 0) {
     core->still = 0;
   } else if (core->still < APP_STILL_STEPS) {
     core->still++;
@@ -51,7 +51,7 @@ bool appCoreStep(appCore_t *core, const appSample_t *sample) {
     runDetector(core, &event);
     appLogLink(core);
   }
-  core->log.health = appHealthOf(core);
+  core->log.health = appHealthStep(core);
   const bool reported = core->reported;
   core->reported = false;
   return reported;

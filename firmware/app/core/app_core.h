@@ -102,7 +102,7 @@ bool appParamsSame(const appParams_t *one, const appParams_t *other);
  * @param params    NULL for those shipped; put right where they are out of range
  * @param haveGap8  whether there is an AI-deck; without one the detectors of the GAP8 fall back to
  *                  the same one on the STM32 (`best`) or to FR-CFAR alone (`paper`)
- * @param nonce     other after each start of the processor
+ * @param nonce     very likely other after each start of the processor
  */
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
 
@@ -116,8 +116,8 @@ void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float 
 
 /**
  * Changes settings between two steps. What uses a setting begins anew, nothing else: another band the band power
- * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector all of it; another
- * false-alarm probability is in force at once. The counters stay.
+ * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector, or enable
+ * changed, all of it; another false-alarm probability is in force at once. The counters stay.
  * @param params  receives what is in force
  * @return how many were out of range and put right
  */

@@ -37,7 +37,7 @@ void appTakeLogits(appCore_t *core, const float logits[EDGE_DECODER_LOGITS], boo
 void appStepBest(appCore_t *core) {
   const float *held = core->pipeline.held;
   streamEvent_t event;
-  streamDetectorStep(&core->best, held, held + 3, held + 6, &event);
+  streamDetectorStep(&core->best, held + HELD_ACC, held + HELD_GYRO, held + HELD_PWM, &event);
   if (event.ready) {
     appTakeLogits(core, event.logits, event.airborne, event.edge);
   }

@@ -9,7 +9,7 @@
 /** Whether edges without a recent FR-CFAR alert are dropped. */
 bool appFilters(const appCore_t *core);
 
-/** An edge of a kind (an edgeKind_t, or 3 where it is not known), now. */
+/** An edge of a kind, now: EDGE_ENTRY, EDGE_EXIT, or 3 (EDGE_UNKNOWN). */
 void appReport(appCore_t *core, uint8_t kind);
 
 /** Logistic function. */

@@ -44,16 +44,16 @@ void appSendChannels(appCore_t *core) {
   const float *held = core->pipeline.held;
   float channels[MOTION_CHANNELS];
   int8_t quantised[EDGE_LINK_SAMPLE_BYTES];
-  motionChannelsStep(&core->best.motion, held, held + 3, held + 6, channels);
+  motionChannelsStep(&core->best.motion, held + HELD_ACC, held + HELD_GYRO, held + HELD_PWM, channels);
   streamQuantise(&core->best.quantisation, channels, MOTION_CHANNELS, quantised);
-  setAirborne(core, core->link.samples, core->best.motion.airborne > 0);
+  setAirborne(core, core->link.samples, core->best.motion.airborneSteps > 0);
   linkSenderPush(&core->link, (const uint8_t *)quantised);
 }
 
 void appRunLocal(appCore_t *core) {
   linkAnswer_t answer;
   bool answered;
-  appLocalBegin(&core->local, &core->link, &core->best, core->arena);
+  appLocalUpdate(&core->local, &core->link, &core->best, core->arena);
   for (int i = 0; i < APP_LOCAL_SAMPLES; i++) {
     if (!appLocalStep(&core->local, &core->link, &core->best, &answer, &answered)) {
       return;

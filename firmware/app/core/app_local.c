@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-void appLocalBegin(appLocal_t *local, const linkSender_t *link, streamDetector_t *best, int8_t *arena) {
+void appLocalUpdate(appLocal_t *local, const linkSender_t *link, streamDetector_t *best, int8_t *arena) {
   if (link->state == LINK_UP && link->silent < APP_LOCAL_AFTER) {
     local->missing = 0;
     local->runs = false;

@@ -20,8 +20,8 @@ typedef struct {
   bool runs;
 } appLocal_t;
 
-/** A step begins: begins or ends the run as the link's state says. @param arena  the network's */
-void appLocalBegin(appLocal_t *local, const linkSender_t *link, streamDetector_t *best, int8_t *arena);
+/** Once a step, before appLocalStep(): begins or ends the run as the link's state says. @param arena  the network's */
+void appLocalUpdate(appLocal_t *local, const linkSender_t *link, streamDetector_t *best, int8_t *arena);
 
 /**
  * Uses one sample of the link's history.

@@ -24,8 +24,8 @@ void appLogEvent(appCore_t *core, const edgeEvent_t *event) {
 void appLogLink(appCore_t *core) {
   const linkCounters_t *counters = &core->link.counters;
   appLog_t *log = &core->log;
-  log->dropped = counters->dropped;
-  log->lost = counters->lost;
+  log->dropped = counters->packetsDropped;
+  log->lost = counters->samplesLost;
   log->timeouts = counters->timeouts;
   log->gap8Resets = counters->resets;
   log->gap8Uptime = counters->uptimeMs;
@@ -47,7 +47,7 @@ static uint16_t linkHealth(const appCore_t *core) {
   }
 }
 
-uint16_t appHealthOf(appCore_t *core) {
+uint16_t appHealthStep(appCore_t *core) {
   static const uint16_t flags[APP_EVENTS] = {APP_NON_FINITE, APP_PARAM_CLAMPED, APP_DROPPED, APP_LATE};
   uint16_t health = appUsesGap8(core) ? linkHealth(core) : 0;
   for (int i = 0; i < APP_EVENTS; i++) {

@@ -21,5 +21,5 @@ void appLogEvent(appCore_t *core, const edgeEvent_t *event);
 /** The link's counters; takes the probability back where the last answer is too old. */
 void appLogLink(appCore_t *core);
 
-/** The health flags of this step; ages the events. */
-uint16_t appHealthOf(appCore_t *core);
+/** A step of health: the flags of now, and each event is a step older. */
+uint16_t appHealthStep(appCore_t *core);

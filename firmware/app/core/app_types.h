@@ -35,7 +35,7 @@ typedef struct {
 /** What the app says; the LOG group `airtouch`. */
 typedef struct {
   float feature[3];      ///< fused features: acceleration, rate, motors
-  float force[3];        ///< f_w, N, world axes
+  float force[3];        ///< f_w, N, level axes: world turned by the yaw
   float cfarPower;       ///< FR-CFAR: the cell under test, N^2
   float threshold;       ///< FR-CFAR: its threshold, N^2; NaN until known
   float probability;     ///< P(over a platform); NaN until known

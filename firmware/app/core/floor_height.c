@@ -2,14 +2,14 @@
 
 #include <math.h>
 
-static void keep(floorHeight_t *state, float plumb, uint32_t ms) {
+static void keepReading(floorHeight_t *state, float plumb, uint32_t ms) {
   state->range = plumb;
   state->time = ms;
   state->known = true;
 }
 
 /** The sum of steps down to nothing, where it is all but that. */
-static void fade(floorHeight_t *state, float seconds) {
+static void fadeFloor(floorHeight_t *state, float seconds) {
   const float most = FLOOR_FADE_MPS * seconds;
   if (fabsf(state->floor) > FLOOR_HOME_M) {
     return;
@@ -17,7 +17,7 @@ static void fade(floorHeight_t *state, float seconds) {
   state->floor = fabsf(state->floor) <= most ? 0.0f : state->floor - copysignf(most, state->floor);
 }
 
-static void step(floorHeight_t *state, float jump) {
+static void takeStep(floorHeight_t *state, float jump) {
   state->floor -= jump;
   state->steps++;
   if (!(fabsf(state->floor) <= FLOOR_MOST_M)) {
@@ -28,7 +28,7 @@ static void step(floorHeight_t *state, float jump) {
 float floorHeightRange(floorHeight_t *state, float distance, uint32_t ms, float cosine, float climb, float height) {
   const bool usable = isfinite(distance) && distance >= 0.0f && isfinite(climb) && isfinite(height);
   if (!usable || !(cosine >= FLOOR_TILT_COSINE && cosine <= 1.0f)) {
-    return cosine >= 0.1f && cosine <= 1.0f ? distance + state->floor / cosine : distance;
+    return cosine >= FLOOR_BEAM_COSINE && cosine <= 1.0f ? distance + state->floor / cosine : distance;
   }
   const float plumb = distance * cosine;
   const uint32_t since = ms - state->time;
@@ -41,11 +41,11 @@ float floorHeightRange(floorHeight_t *state, float distance, uint32_t ms, float 
     const float jump = plumb - state->range - climb * seconds;
     const float longer = plumb > state->range ? plumb : state->range;
     if (fabsf(jump) > FLOOR_STEP_M + FLOOR_TILT_SHARE * longer * (1.0f - cosine)) {
-      step(state, jump);
+      takeStep(state, jump);
     }
-    fade(state, seconds);
+    fadeFloor(state, seconds);
   }
-  keep(state, plumb, ms);
+  keepReading(state, plumb, ms);
   return distance + state->floor / cosine;
 }
 

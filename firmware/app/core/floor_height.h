@@ -14,6 +14,7 @@
 #define FLOOR_STEP_M 0.06f          ///< least step of the floor: a climb of 1 m/s makes 0.025 m between two readings
 #define FLOOR_TILT_SHARE 0.5f       ///< of the range times (1 - cosine of the tilt), by which that grows
 #define FLOOR_TILT_COSINE 0.87f     ///< of 30 degrees: with more tilt no step is learnt
+#define FLOOR_BEAM_COSINE 0.1f      ///< of 84 degrees: with more tilt the reading is passed on as it is; round number
 #define FLOOR_GAP_MS 150u           ///< six readings; after a longer gap a reading is compared with the height instead
 #define FLOOR_TRUST_M 0.15f         ///< the floor is kept after a gap where the height agrees with it so closely
 #define FLOOR_HOME_M 0.08f          ///< a smaller sum of steps is the first floor; the sum then fades

@@ -23,12 +23,13 @@
 #define GIVE_UP M2T(100)  // so late that the missed steps are left out
 
 static appCore_t core;
-static appParams_t wanted = APP_PARAMS_DEFAULTS;  // the PARAM group; compared with what is in force before each step
+// The PARAM group; compared with what is in force before each step.
+static appParams_t wantedParams = APP_PARAMS_DEFAULTS;
 static volatile TickType_t lastStep;
 
 /** Takes changed parameters over; those out of range are written back as they were put right. */
 static void takeParams(void) {
-  const appParams_t asked = wanted;
+  const appParams_t asked = wantedParams;
   if (appParamsSame(&asked, &core.params)) {
     return;
   }
@@ -38,13 +39,13 @@ static void takeParams(void) {
   }
   DEBUG_PRINT("Parameter out of range, put right\n");
   taskENTER_CRITICAL();
-  if (appParamsSame(&wanted, &asked)) {
-    wanted = inForce;
+  if (appParamsSame(&wantedParams, &asked)) {
+    wantedParams = inForce;
   }
   taskEXIT_CRITICAL();
 }
 
-static void step(bool late) {
+static void runStep(bool late) {
   static appSample_t sample;
   const uint64_t start = usecTimestamp();
   takeParams();
@@ -57,9 +58,9 @@ static void step(bool late) {
   appCoreTime(&core, (uint32_t)(usecTimestamp() - start), late);
 }
 
-static void start(void) {
+static void startApp(void) {
   const bool gap8 = gap8PortPresent();
-  appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());  // the first step takes what is wanted
+  appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());  // no two starts are likely to take the same time
   appCoreSetVehicle(&core, &airtouchVehicle, AIRTOUCH_VEHICLE_ARM_PWM);
   if (!appSensorsInit()) {
     appCoreNoSensor(&core);
@@ -69,7 +70,7 @@ static void start(void) {
 }
 
 void appMain(void) {
-  start();
+  startApp();
   TickType_t due = xTaskGetTickCount();
   while (1) {
     vTaskDelayUntil(&due, PERIOD);
@@ -78,7 +79,7 @@ void appMain(void) {
     if (behind > GIVE_UP) {
       due = now;
     }
-    step(behind >= PERIOD);
+    runStep(behind >= PERIOD);
     lastStep = xTaskGetTickCount();
   }
 }
@@ -165,27 +166,27 @@ LOG_GROUP_STOP(airtouch)
  */
 PARAM_GROUP_START(airtouch)
 /** @brief 0: nothing is computed, nothing is sent */
-PARAM_ADD(PARAM_UINT8, enable, &wanted.enable)
+PARAM_ADD(PARAM_UINT8, enable, &wantedParams.enable)
 /** @brief 0 FR-CFAR, 1 best; on the GAP8: 2 best, 3 paper, 4 paper-stream */
-PARAM_ADD(PARAM_UINT8, detector, &wanted.detector)
+PARAM_ADD(PARAM_UINT8, detector, &wantedParams.detector)
 /** @brief Edges need an FR-CFAR alert: 0 never, 1 always, 2 as the detector was trained */
-PARAM_ADD(PARAM_UINT8, filter, &wanted.filter)
+PARAM_ADD(PARAM_UINT8, filter, &wantedParams.filter)
 /** @brief FC-FE: middle of the band, 2 to 48 [Hz] */
-PARAM_ADD(PARAM_FLOAT, bandMid, &wanted.bandMid)
+PARAM_ADD(PARAM_FLOAT, bandMid, &wantedParams.bandMid)
 /** @brief FC-FE: width of the band, 0.6 to 2 [Hz] */
-PARAM_ADD(PARAM_FLOAT, bandWidth, &wanted.bandWidth)
+PARAM_ADD(PARAM_FLOAT, bandWidth, &wantedParams.bandWidth)
 /** @brief FR-CFAR: probability of false alarm, 1e-12 to 0.5 */
-PARAM_ADD(PARAM_FLOAT, pFa, &wanted.pFa)
+PARAM_ADD(PARAM_FLOAT, pFa, &wantedParams.pFa)
 /** @brief paper: over a platform from this probability up */
-PARAM_ADD(PARAM_FLOAT, probIn, &wanted.probabilityIn)
+PARAM_ADD(PARAM_FLOAT, probIn, &wantedParams.probabilityIn)
 /** @brief paper: off it from this probability down */
-PARAM_ADD(PARAM_FLOAT, probOut, &wanted.probabilityOut)
+PARAM_ADD(PARAM_FLOAT, probOut, &wantedParams.probabilityOut)
 /** @brief best: an entry fires above this logit */
-PARAM_ADD(PARAM_FLOAT, scoreIn, &wanted.scoreIn)
+PARAM_ADD(PARAM_FLOAT, scoreIn, &wantedParams.scoreIn)
 /** @brief best: an exit fires above this logit */
-PARAM_ADD(PARAM_FLOAT, scoreOut, &wanted.scoreOut)
+PARAM_ADD(PARAM_FLOAT, scoreOut, &wantedParams.scoreOut)
 /** @brief paper: at least so long between two edges, 10 to 1000 [10 ms] */
-PARAM_ADD(PARAM_UINT16, probDwell, &wanted.probabilityDwell)
+PARAM_ADD(PARAM_UINT16, probDwell, &wantedParams.probabilityDwell)
 /** @brief filter: an FR-CFAR alert vouches for edges so long, 1 to 1000 [10 ms] */
-PARAM_ADD(PARAM_UINT16, alertHold, &wanted.alertHold)
+PARAM_ADD(PARAM_UINT16, alertHold, &wantedParams.alertHold)
 PARAM_GROUP_STOP(airtouch)

@@ -21,41 +21,41 @@ static const char *const names[VARIABLES][2] = {{"stateEstimate", "z"},  {"state
                                                 {"stateEstimate", "qx"}, {"stateEstimate", "qy"},
                                                 {"gyro", "x"},           {"gyro", "y"}};
 static logVarId_t ids[VARIABLES];
-static bool found;
+static bool variablesFound;
 static uint8_t enable;
 static floorHeight_t state;
 
 /** @return false where the firmware lacks a variable: then everything stays as it is */
-static bool look(void) {
-  if (!found) {
+static bool findVariables(void) {
+  if (!variablesFound) {
     bool all = true;
     for (int i = 0; i < VARIABLES; i++) {
       ids[i] = logGetVarId(names[i][0], names[i][1]);
       all = all && logVarIdIsValid(ids[i]);
     }
-    found = all;
+    variablesFound = all;
   }
-  return found;
+  return variablesFound;
 }
 
 /** Of the angle between beam and plumb, as the estimator counts it. */
-static float cosine(void) {
+static float tiltCosine(void) {
   const float x = logGetFloat(ids[QX]), y = logGetFloat(ids[QY]);
   const float up = 1.0f - 2.0f * (x * x + y * y);
   const float angle = acosf(up < -1.0f ? -1.0f : (up > 1.0f ? 1.0f : up)) - HALF_CONE;
   return angle > 0.0f ? cosf(angle) : 1.0f;
 }
 
-static void range(tofMeasurement_t *tof) {
+static void correctRange(tofMeasurement_t *tof) {
   if (!supervisorIsFlying()) {
     state = (floorHeight_t){.steps = state.steps};
     return;
   }
-  tof->distance = floorHeightRange(&state, tof->distance, xTaskGetTickCount(), cosine(), logGetFloat(ids[CLIMB]),
+  tof->distance = floorHeightRange(&state, tof->distance, xTaskGetTickCount(), tiltCosine(), logGetFloat(ids[CLIMB]),
                                    logGetFloat(ids[HEIGHT]));
 }
 
-static void flow(flowMeasurement_t *flow) {
+static void correctFlow(flowMeasurement_t *flow) {
   const float share = floorHeightFlow(&state, logGetFloat(ids[HEIGHT]));
   const float scale = COUNTS_PER_RADIAN * RADIANS_PER_DEGREE * flow->dt;
   const float turnX = -scale * logGetFloat(ids[RATE_Y]), turnY = scale * logGetFloat(ids[RATE_X]);
@@ -68,7 +68,7 @@ void __wrap_estimatorEnqueue(const measurement_t *measurement);
 
 void __wrap_estimatorEnqueue(const measurement_t *measurement) {
   const bool tof = measurement->type == MeasurementTypeTOF;
-  if (!enable || !(tof || measurement->type == MeasurementTypeFlow) || !look()) {
+  if (!enable || !(tof || measurement->type == MeasurementTypeFlow) || !findVariables()) {
     if (!enable) {
       state = (floorHeight_t){.steps = state.steps};
     }
@@ -77,9 +77,9 @@ void __wrap_estimatorEnqueue(const measurement_t *measurement) {
   }
   measurement_t changed = *measurement;
   if (tof) {
-    range(&changed.data.tof);
+    correctRange(&changed.data.tof);
   } else if (state.floor != 0.0f) {
-    flow(&changed.data.flow);
+    correctFlow(&changed.data.flow);
   }
   __real_estimatorEnqueue(&changed);
 }

@@ -197,7 +197,7 @@ int32_t gap8CoreInit(gap8Core_t *core, const gap8Models_t *models, const gap8Tea
     addNetwork(core, &count, AIRTOUCH_ROLLING_SHA256,
                (linkNetwork_t){.reset = resetPaperStream,
                                .step = stepPaperStream,
-                               .window = (uint16_t)core->paperStream.state.receptive,
+                               .window = (uint16_t)core->paperStream.state.receptiveSamples,
                                .stride = AIRTOUCH_ROLLING_STRIDE,
                                .algorithm = EDGE_LINK_PAPER_STREAM});
   }

@@ -6,6 +6,7 @@
 // It speaks when spoken to: not a byte before the STM32's first packet, since each one has its risk
 // (host/docs/flash.md). What there is to say until then is noted.
 #include <stdbool.h>
+#include <string.h>
 
 #include "bsp/bsp.h"
 #include "pmsis.h"

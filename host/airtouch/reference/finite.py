@@ -9,6 +9,7 @@ ACC_LIMIT = 240.0  #: m/s^2, full scale of the IMU: 24 g
 RATE_LIMIT = 40.0  #: rad/s, full scale of the IMU: 2000 degrees/s
 PWM_MAX = 65535.0
 AXIS_LIMIT = 1.0  #: of a unit vector's components
+FLOAT32_MIN = float(np.finfo(np.float32).tiny)  #: FLT_MIN in C, the smallest normal float32
 FLOAT32_MAX = float(np.finfo(np.float32).max)  #: samples beyond it are infinite to the kernels
 
 

@@ -7,7 +7,7 @@ reading changed by beyond the vertical velocity is the floor's. See firmware/app
 import math
 
 #: floor_height.h says what each is and why.
-STEP_M, TILT_SHARE, TILT_COSINE = 0.06, 0.5, 0.87
+STEP_M, TILT_SHARE, TILT_COSINE, BEAM_COSINE = 0.06, 0.5, 0.87, 0.1
 GAP_MS, TRUST_M, HOME_M, FADE_MPS, MOST_M, FLOW_NEAREST_M = 150, 0.15, 0.08, 0.05, 2.5, 0.08
 
 
@@ -26,7 +26,7 @@ class FloorHeight:
         """
         plumb = distance * cosine
         if not (math.isfinite(plumb + climb + height) and distance >= 0.0 and TILT_COSINE <= cosine <= 1.0):
-            return distance + self.floor / cosine if 0.1 <= cosine <= 1.0 else distance
+            return distance + self.floor / cosine if BEAM_COSINE <= cosine <= 1.0 else distance
         if self._last is None or ms - self._last[1] > GAP_MS:
             if abs(plumb + self.floor - height) > TRUST_M:
                 self.floor = 0.0

@@ -5,7 +5,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
-from airtouch.reference.finite import FLOAT32_MAX
+from airtouch.reference.finite import FLOAT32_MAX, FLOAT32_MIN
 
 POWER_LIMIT = float(np.float32(1e30))  #: cells are clamped to this, the square of SAMPLE_LIMIT
 
@@ -60,5 +60,6 @@ def check_settings(guard_cells: int, leading_window: int, p_fa: float) -> None:
         raise AirTouchError(f"FR-CFAR: the leading window must be at least 1 cell, not {leading_window}")
     if int(guard_cells) != guard_cells or guard_cells < 0:
         raise AirTouchError(f"FR-CFAR: guard cells must be 0 or more, not {guard_cells}")
-    if not 0 < p_fa < 1:
-        raise AirTouchError(f"FR-CFAR: the probability of false alarm must lie between 0 and 1, not {p_fa}")
+    if not FLOAT32_MIN <= p_fa < 1:
+        raise AirTouchError("FR-CFAR: the probability of false alarm must be a normal float32 below 1, at least "
+                            f"{FLOAT32_MIN:.2g}, not {p_fa}")

@@ -16,8 +16,8 @@ ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"  #: the sensors
 class Channel:
     """One motion channel.
 
-    swing: its usual swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is reflected
-    left to right. sensors: those that it needs.
+    swing: its nominal swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is
+    reflected left to right. sensors: those that it needs.
     """
 
     name: str
@@ -49,7 +49,7 @@ THRUST_DELAY = 2  #: samples from a command to its thrust
 class MotionConfig:
     """Settings; the samples are those of a 100 Hz log.
 
-    scale: usual swing of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
+    scale: nominal swing of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
     clamped to that many swings. slow_samples: time constant of the motors' slow means.
     """
 
@@ -66,7 +66,7 @@ class MotionConfig:
 def motion_channels(
     acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, config: MotionConfig | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Channels (n, 12) in units of their usual swing, and airborne (n,) bool. Causal.
+    """Channels (n, 12) in units of their nominal swing, and airborne (n,) bool. Causal.
 
     acc_level: (n, 3) m/s^2, level axes, gravity in z. gyro: (n, 3) rad/s. pwm: (n, 4).
     Columns as NAMES: the motors' roll, pitch, yaw and mean have their slow mean taken off; `unexplained

@@ -21,7 +21,7 @@ static void silent(void) {
 static int sentBefore;
 
 static void chooseGap8(int step) {
-  wanted.detector = step >= 100 && step < 700 ? APP_BEST_GAP8 : APP_BEST;
+  wantedParams.detector = step >= 100 && step < 700 ? APP_BEST_GAP8 : APP_BEST;
   check(step > 100 || (sent == 0 && registered == 0), "nothing is sent before it is asked for");
   if (step == 700) {
     check(registered == 1 && sent > 500, "the GAP8 gets the samples");
@@ -38,7 +38,7 @@ static void gap8OnRequest(void) {
 
 static void wantGap8(int step) {
   (void)step;
-  wanted.detector = APP_BEST_GAP8;
+  wantedParams.detector = APP_BEST_GAP8;
 }
 
 static void noDeck(void) {
@@ -50,7 +50,7 @@ static void noDeck(void) {
 
 static void foreignPackets(int step) {
   uint8_t bytes[CPX_MAX_PAYLOAD_SIZE];
-  wanted.detector = APP_BEST_GAP8;
+  wantedParams.detector = APP_BEST_GAP8;
   for (int i = 0; handler != NULL && step < 400 && i < 6; i++) {  // more than the inbox holds
     for (unsigned k = 0; k < sizeof bytes; k++) {
       bytes[k] = (uint8_t)(step * 31 + i * 7 + (int)k);
@@ -77,33 +77,34 @@ static void missingVariable(void) {
 
 static void badParameter(int step) {
   if (step == 50) {
-    wanted.pFa = NAN;
-    wanted.detector = 200;
+    wantedParams.pFa = NAN;
+    wantedParams.detector = 200;
   }
 }
 
 static void parameters(void) {
-  const float usual = wanted.pFa;
+  const float usual = wantedParams.pFa;
   appParams_t most = APP_PARAMS_DEFAULTS;
   most.detector = 200;
   check(appParamsClamp(&most) == 1 && most.detector >= APP_PAPER_GAP8, "no detector has that number");
-  wanted.scoreIn = 4.5f;  // before the app starts
+  wantedParams.scoreIn = 4.5f;  // before the app starts
   between = badParameter;
   fly(200);
-  check(wanted.scoreIn == 4.5f && core.params.scoreIn == 4.5f, "a parameter set before the start is kept");
-  check(wanted.pFa == usual && wanted.detector == most.detector, "what is out of range is put right");
+  check(wantedParams.scoreIn == 4.5f && core.params.scoreIn == 4.5f, "a parameter set before the start is kept");
+  check(wantedParams.pFa == usual && wantedParams.detector == most.detector, "what is out of range is put right");
   check(core.log.paramErrors == 2, "and counted once");
 }
 
-static void setAnother(void) { wanted.scoreOut = 3.25f; }
+static void setAnother(void) { wantedParams.scoreOut = 3.25f; }
 
 static void writeBetween(void) {
-  wanted.pFa = -1.0f;
+  wantedParams.pFa = -1.0f;
   beforeCritical = setAnother;
   fly(1);
-  check(wanted.scoreOut == 3.25f, "a parameter written while another is put right is not lost");
+  check(wantedParams.scoreOut == 3.25f, "a parameter written while another is put right is not lost");
   fly(1);
-  check(wanted.scoreOut == 3.25f && wanted.pFa == 1e-12f && core.params.scoreOut == 3.25f, "and is in force next");
+  check(wantedParams.scoreOut == 3.25f && wantedParams.pFa == 1e-12f && core.params.scoreOut == 3.25f,
+        "and is in force next");
 }
 
 static void finishStep(void) { lastStep = ++tick; }

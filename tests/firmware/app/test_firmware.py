@@ -153,7 +153,7 @@ def test_log_and_parameter_names_are_those_of_the_virtual_drone():
     for kind, field, at in declared.values():
         inner = fields[field].type
         assert (inner.item if at >= 0 else inner).cname == kind
-    params = {name: field for _, name, field in re.findall(r"PARAM_ADD\((\w+), (\w+), &wanted\.(\w+)\)", GLUE)}
+    params = {name: field for _, name, field in re.findall(r"PARAM_ADD\((\w+), (\w+), &wantedParams\.(\w+)\)", GLUE)}
     assert params == sitl.PARAMS
     assert {field for _, field, _ in declared.values()} == set(fields)
     assert set(params.values()) == {name for name, _ in ffi.typeof("appParams_t").fields}
@@ -181,7 +181,7 @@ def test_the_image_links_with_the_firmware(config, platform):
     assert flash.inspect(ROOT / path).target == "stm32"
     image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
     assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
-    assert firmwares_default(image, "wanted") == defaults()
+    assert firmwares_default(image, "wantedParams") == defaults()
     size, _, _ = stack.deepest(ROOT / "build" / "firmware", "appMain")
     assert size <= STACK_BUDGET
 
@@ -203,7 +203,7 @@ def test_the_image_holds_the_defaults_of_the_parameters(tmp_path):
                               *(f"-I{i}" for i in INCLUDES), "-c", APP / "airtouch_app.c", "-o", tmp_path / "app.o"],
                              capture_output=True, text=True)
     assert process.returncode == 0, process.stderr[:3000]
-    section, = (s for s in Elf(tmp_path / "app.o").sections if s.name == ".data.wanted")
+    section, = (s for s in Elf(tmp_path / "app.o").sections if s.name == ".data.wantedParams")
     assert fields(section.data) == defaults()
 
 

@@ -201,7 +201,7 @@ static void runScript(const uint8_t *data, size_t length, int *slowest) {
   for (int i = 0; i < AFTER_STEPS; i++) {
     accepted += stepLink(world, step++, &none, &packets, &wasReset);
     // The last samples of a long silence may be lost after its end: until the next packet is due.
-    const bool anew = wasReset || sender.counters.lost > 0 || sender.counters.resets > 0;
+    const bool anew = wasReset || sender.counters.samplesLost > 0 || sender.counters.resets > 0;
     const int allowed = anew ? 10 + (window + EDGE_LINK_SAMPLES) / EDGE_LINK_SAMPLES : 10;
     check(accepted > 0 || packets < allowed, anew ? "answers come back after a reset" : "answers within ten packets");
     if (accepted == 0 && !anew && packets + 1 > *slowest) {

@@ -70,7 +70,7 @@ static bool paperStreamSays(uint32_t sequence, int8_t *output) {
   rollingInt8_t rolling;
   rollingInt8Init(&rolling, &airtouchRolling, AIRTOUCH_ROLLING_STRIDE, arena);
   const uint32_t span =
-      (uint32_t)(rolling.receptive + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
+      (uint32_t)(rolling.receptiveSamples + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
   for (uint32_t i = 0; i < span; i++) {
     uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
     float x[AIRTOUCH_ROLLING_COLUMNS];
@@ -111,11 +111,11 @@ static void checkNewest(void) {
 static void deliver(const uint8_t *packet, uint16_t length) {
   uint8_t *exact = exactCopy(packet, length);
   uint8_t *reply = rubbish(EDGE_LINK_MAX_BYTES, 0x5a);
-  const uint32_t refused = core->receiver.refused, taken = core->receiver.taken;
+  const uint32_t refused = core->receiver.packetsRefused, taken = core->receiver.samplesTaken;
   const uint16_t size = gap8CoreTake(core, exact, length, reply);
-  CHECK(size == 0 ? core->receiver.refused == refused + 1 : inTable(reply, size),
+  CHECK(size == 0 ? core->receiver.packetsRefused == refused + 1 : inTable(reply, size),
         "a packet is refused, or answered by one");
-  CHECK(core->receiver.taken - taken <= EDGE_LINK_SAMPLES, "a packet costs seven runs of a network at most");
+  CHECK(core->receiver.samplesTaken - taken <= EDGE_LINK_SAMPLES, "a packet costs seven runs of a network at most");
   free(reply);
   free(exact);
 }
@@ -146,7 +146,7 @@ static void doOne(bytes_t *bytes) {
       deliver(packed, length);
       break;
     default:  // a run of samples as the sender would send them
-      for (int i = what / 8; i >= 0 && core->receiver.taken < most; i--) {
+      for (int i = what / 8; i >= 0 && core->receiver.samplesTaken < most; i--) {
         deliver(packed, packSamples(receiver->session, receiver->expected, 7,
                                     receiver->empty ? 0 : takeByte(bytes) / 128, sampleOf, packed));
       }
@@ -167,7 +167,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   deliver(packed, packReset(1, 1, core->networks[which].algorithm, digests[which], packed));
   static const uint32_t whole[GAP8_NETWORKS] = {BEST_SAMPLES, PAPER_SAMPLES, STREAM_SAMPLES};
   most = oneIn(12, data, size) ? whole[which] : FEW_SAMPLES;
-  while (bytes.left > 0 && core->receiver.taken < most) {
+  while (bytes.left > 0 && core->receiver.samplesTaken < most) {
     doOne(&bytes);
   }
   checkNewest();

@@ -78,8 +78,8 @@ static void step(motionChannels_t *motion, truth_t *truth, const motionConfig_t 
   motionChannelsStep(motion, sample, sample + 3, sample + 6, channels);
   const double margin = fabs(motors[3] - config->armPwm);
   truth->airborne = motors[3] > config->armPwm ? truth->airborne + 1 : 0;
-  CHECK(margin < 0.1 || motion->airborne == truth->airborne, "airborne while the mean PWM is above the setting");
-  truth->airborne = motion->airborne;
+  CHECK(margin < 0.1 || motion->airborneSteps == truth->airborne, "airborne while the mean PWM is above the setting");
+  truth->airborne = motion->airborneSteps;
   follow(truth, config, motors, thrustOf(&config->vehicle, m));
   checkChannels(truth, config, motors, channels);
 }

@@ -197,7 +197,8 @@ static void arriveNow(pipe_t *pipe) {
 /** After faults of the pipe: an answer within the packets that host/docs/link.md allows. */
 static void answerAgain(void) {
   bytes_t none = {NULL, 0};
-  const bool anew = reset || sender.counters.lost > 0 || sender.counters.resets > 0 || receiver.filled < toy.window;
+  const bool anew =
+      reset || sender.counters.samplesLost > 0 || sender.counters.resets > 0 || receiver.filled < toy.window;
   const int window = (toy.window + toy.stride + EDGE_LINK_SAMPLES) / EDGE_LINK_SAMPLES;
   const int young = step < toy.window + toy.stride ? toy.window + toy.stride : 0;  // no window of samples yet
   // Where a packet from before a reset comes after it, the STM32 cannot know, and a window of new samples is needed.

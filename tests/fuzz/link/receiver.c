@@ -96,11 +96,13 @@ static void deliver(const uint8_t *packet, uint16_t length) {
   edgeLinkPacket_t asked;
   const bool known =
       edgeLinkParse(exact, length, &asked) && (asked.type == EDGE_LINK_RESET || asked.type == EDGE_LINK_FEATURES);
-  CHECK((size > 0) == known && receiver->refused - before.refused == !known, "every packet is answered or refused");
-  CHECK(receiver->taken >= before.taken && receiver->lost >= before.lost && receiver->repeated >= before.repeated,
+  CHECK((size > 0) == known && receiver->packetsRefused - before.packetsRefused == !known,
+        "every packet is answered or refused");
+  CHECK(receiver->samplesTaken >= before.samplesTaken && receiver->samplesLost >= before.samplesLost &&
+            receiver->samplesRepeated >= before.samplesRepeated,
         "counters only grow");
-  CHECK(receiver->taken - before.taken <= EDGE_LINK_SAMPLES, "a packet holds seven samples at most");
-  CHECK(watched[0].toy.steps + watched[1].toy.steps - steps <= receiver->taken - before.taken,
+  CHECK(receiver->samplesTaken - before.samplesTaken <= EDGE_LINK_SAMPLES, "a packet holds seven samples at most");
+  CHECK(watched[0].toy.steps + watched[1].toy.steps - steps <= receiver->samplesTaken - before.samplesTaken,
         "no sample is used twice");
   if (known) {
     checkReply(&asked, reply, size, before.expected);

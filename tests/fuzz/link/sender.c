@@ -54,9 +54,10 @@ static uint16_t poll(uint8_t *packed) {
 
 static void checkCounters(const linkCounters_t *before) {
   const linkCounters_t *now = &sender->counters;
-  CHECK(now->sent >= before->sent && now->dropped >= before->dropped && now->received >= before->received &&
-            now->refused >= before->refused && now->timeouts >= before->timeouts && now->goneBack >= before->goneBack &&
-            now->lost >= before->lost && now->resets >= before->resets,
+  CHECK(now->sent >= before->sent && now->packetsDropped >= before->packetsDropped &&
+            now->received >= before->received && now->packetsRefused >= before->packetsRefused &&
+            now->timeouts >= before->timeouts && now->rewinds >= before->rewinds &&
+            now->samplesLost >= before->samplesLost && now->resets >= before->resets,
         "counters only grow");
   CHECK(linkSenderBacklog(sender) <= LINK_HISTORY && sender->state <= LINK_REFUSED && sender->samples == pushed,
         "a state that there is");
@@ -71,7 +72,8 @@ static int take(const uint8_t *packet, uint16_t length) {
   edgeLinkPacket_t read;
   const bool known =
       edgeLinkParse(exact, length, &read) && (read.type == EDGE_LINK_RESULT || read.type == EDGE_LINK_HEARTBEAT);
-  CHECK(sender->counters.refused - before.refused == !known && sender->counters.received - before.received == known,
+  CHECK(sender->counters.packetsRefused - before.packetsRefused == !known &&
+            sender->counters.received - before.received == known,
         "a packet is taken or refused, and counted");
   CHECK(count >= 0 && count <= EDGE_LINK_ANSWERS, "answers fit their room");
   for (int i = 0; i < count; i++) {

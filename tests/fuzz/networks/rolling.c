@@ -38,7 +38,7 @@ static void run(bytes_t *bytes, const networkInt8_t *network, rollingInt8_t *rol
     int8_t *exact = exactCopy(samples[i], (size_t)values);
     const int8_t *said = rollingInt8Step(rolling, exact);
     free(exact);
-    const bool due = i + 1 >= rolling->receptive && (i + 1) % rolling->stride == 0;
+    const bool due = i + 1 >= rolling->receptiveSamples && (i + 1) % rolling->stride == 0;
     CHECK(said == NULL || due, "outputs come on every stride-th sample, once enough has been seen");
     const int32_t newest = i + rolling->ahead;  // the window that the output is of ends here
     CHECK(said != NULL || !due || (i + 1) / rolling->stride * rolling->stride != i + 1, "no output is left out");
@@ -68,7 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   const int32_t room = network.layerCount > 0 ? rollingInt8ArenaBytes(&network, stride) : 0;
   if (room > 0) {
     int8_t *arena = rubbish((size_t)room, 0x55);
-    CHECK(rollingInt8Init(&rolling, &network, stride, arena) == 1, "what has an arena can roll");
+    CHECK(rollingInt8Init(&rolling, &network, stride, arena), "what has an arena can roll");
     run(&bytes, &network, &rolling, &seed);
     rollingInt8Reset(&rolling);
     run(&bytes, &network, &rolling, &seed);

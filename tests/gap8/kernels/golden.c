@@ -1,5 +1,5 @@
 // The golden vectors of the three shipped networks through the kernels of one build: for
-// tests/gap8/test_extensions.py. Prints how many outputs were compared, "different" where one is another.
+// tests/gap8/kernels/test_extensions.py. Prints how many outputs were compared, "different" where one is another.
 #include <stdio.h>
 #include <string.h>
 

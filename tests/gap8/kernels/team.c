@@ -1,4 +1,4 @@
-// Golden windows through the shipped network on several threads, one a core: for tests/gap8/test_team.py.
+// Golden windows through the shipped network on several threads, one a core: for tests/gap8/kernels/test_team.py.
 // Usage: team CORES REPEATS. Prints "same" where every core got the golden outputs each time.
 #include <pthread.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from airtouch import kernels, logs
@@ -51,8 +51,7 @@ class TestBothPaths:
            channels=st.sampled_from([1, 2, 3, 4, 8]), stages=STAGES,
            dense=st.lists(st.integers(1, 9), min_size=1, max_size=2), sparsity=st.sampled_from([0.0, 0.6, 0.95, 1.0]))
     def test_any_network_has_the_bits_of_numpy(self, seed, rows, columns, channels, stages, dense, sparsity):
-        if not fits(rows, columns, channels, stages):
-            return
+        assume(fits(rows, columns, channels, stages))
         net = made(seed, rows, columns, channels, stages, dense, sparsity)
         x = samples((7, rows * columns * channels), seed)
         np.testing.assert_array_equal(c_network.run_int8(net, x), int8_network.run(net, x))
@@ -78,8 +77,7 @@ class TestBothPaths:
            rows=st.integers(22, 33), sparsity=st.sampled_from([0.0, 0.8]), fully=st.booleans())
     def test_rolling_is_every_window(self, seed, columns, channels, first, second, rows, sparsity, fully):
         stages = [(3, 1, 4, first), (2, 1, 5, second)]
-        if not fits(rows, columns, channels, stages):
-            return
+        assume(fits(rows, columns, channels, stages))
         net = made(seed, rows, columns, channels, stages, [4, 2], sparsity)
         stride = (first or (1, 1))[0] * (second or (1, 1))[0] if fully else 1
         self.check_rolling(net, samples((rows + 30, columns * channels), seed), stride)

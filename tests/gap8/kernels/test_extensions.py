@@ -19,11 +19,12 @@ ZIG = [sys.executable, "-m", "ziglang", "cc"]
 HEADERS = {
     "stdint.h": "typedef signed char int8_t; typedef unsigned char uint8_t; typedef short int16_t;"
                 "typedef unsigned short uint16_t; typedef int int32_t; typedef unsigned int uint32_t;"
-                "typedef long long int64_t; typedef unsigned long long uint64_t;",
+                "typedef long long int64_t; typedef unsigned long long uint64_t;\n"
+                "#define INT8_MIN (-128)\n#define INT8_MAX 127\n",
+    "stdbool.h": "#define bool _Bool\n#define true 1\n#define false 0\n",
     "stddef.h": "typedef unsigned long size_t;\n#define NULL ((void *)0)\n",
     "string.h": '#include "stddef.h"\nvoid *memcpy(void *, const void *, size_t);'
                 "void *memset(void *, int, size_t); int memcmp(const void *, const void *, size_t);",
-    "math.h": "float floorf(float); float fmaxf(float, float);",
 }
 
 

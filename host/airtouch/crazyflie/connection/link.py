@@ -11,7 +11,6 @@ from typing import Any
 
 from airtouch.errors import AirTouchError
 
-#: s without a packet after which an attempt has failed: before the first packets, which cflib requests once, and later
 #: s of silence that end an attempt to connect: before the third packet, and after it
 FIRST_S, NEXT_S, FIRST_PACKETS = 1.5, 4.0, 3
 

@@ -23,7 +23,7 @@ int32_t rollingInt8BatchArena(const flatNetworkInt8_t *flat, int32_t stride, int
     return 0;
   }
   *ahead = rolling.ahead;
-  *receptive = rolling.receptive;
+  *receptive = rolling.receptiveSamples;
   return rollingInt8ArenaBytes(&network, stride);
 }
 

@@ -11,7 +11,7 @@ void motionChannelsBatch(const float *acc, const float *gyro, const float *pwm, 
   motionChannelsInit(&motion, config);
   for (int64_t i = 0; i < samples; i++) {
     motionChannelsStep(&motion, acc + 3 * i, gyro + 3 * i, pwm + 4 * i, channels + MOTION_CHANNELS * i);
-    airborne[i] = motion.airborne > 0;
+    airborne[i] = motion.airborneSteps > 0;
   }
 }
 
