@@ -65,13 +65,14 @@ class Vehicle:
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
 
 
+DEFAULT_VEHICLE = "crazyflie-2.1-flow"  #: the authors' drone, flown where nothing names another
 TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are texts
 #: field -> length, of fields that are lists of numbers
 LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
-def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
+def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
     """A built-in vehicle by name, or the vehicle in a TOML file.
 
     Raises AirTouchError with the file and the missing or unknown key.
@@ -89,6 +90,16 @@ def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
             raise unknown("vehicle", str(name_or_path), known, ", or a .toml file")
         text = file.read_text(encoding="utf-8")
     return parse(text, str(name_or_path))
+
+
+def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
+    """The vehicle that a log's metadata name, else the default; and a warning if no file is known of the one named."""
+    name = str(meta.get("vehicle") or "")
+    try:
+        return load(name or DEFAULT_VEHICLE), None
+    except AirTouchError:
+        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, of which no file is known; {DEFAULT_VEHICLE} "
+                                       "is used, --vehicle names another")
 
 
 def parse(text: str, source: str) -> Vehicle:
