@@ -193,7 +193,7 @@ def flights(air: Sequence[FreeAir], responses: Sequence[Response],
             rows = slice(place - entry, min(place - entry + len(response.values), len(values)))
             values[rows] += response.values[:rows.stop - rows.start]
         values[:, -len(PWM):] = np.clip(values[:, -len(PWM):], 0.0, PWM_MAX)
-        columns = dict(zip(COLUMNS, values.T, strict=True)) | {"time_s": np.arange(len(values)) / RATE_HZ}
+        columns = dict(zip(COLUMNS, values.T, strict=True)) | {"t_s": np.arange(len(values)) / RATE_HZ}
         out.append(FlightLog(columns, {"source": f"overlay_{seed}_{number:06d}", "sample_period_s": 1.0 / RATE_HZ}))
         labels.append([replace(e, sample=place - entry + e.sample) for e in response.edges] if has_platform else [])
     return out, labels
