@@ -11,7 +11,7 @@ POWER_LIMIT = float(np.float32(1e30))  #: cells are clamped to this, the square 
 
 
 def threshold_factor(leading_window: int, p_fa: float) -> float:
-    """alpha = N (P_FA^(-1/N) - 1), equation (7): exact for exponentially distributed noise."""
+    """alpha = N (P_FA^(-1/N) - 1), equation (8): exact for exponentially distributed noise."""
     return float(leading_window * np.expm1(-np.log(p_fa) / leading_window))
 
 
