@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError, unknown
+from airtouch.parameters import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Vehicle:
     flow_noise_time_s: float = 0.05  #: its correlation time
     acc_lowpass_hz: float = 0.0  #: corner of the logged accelerometer's low-pass; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
-    arm_pwm: float = 15000.0  #: mean PWM above which the app takes the vehicle to be in the air
+    arm_pwm: float = DEFAULT.arm_pwm  #: mean PWM above which the app takes the vehicle to be in the air
     firmware: str = "2026.08"  #: release that flies: a file of simulation/firmwares, or a path to one
     range_module: str = "map"  #: platform, map, none, or firmware: what the release has
     platform: str = ""  #: platform of crazyflie-firmware that flies it (cf2, cf21bl, bolt); "" where unknown

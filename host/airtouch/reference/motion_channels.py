@@ -6,6 +6,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
+from airtouch.parameters import DEFAULT
 from airtouch.reference.finite import ACC_CLAMP, PWM_MAX, RATE_CLAMP, hold_finite
 from airtouch.vehicle import Vehicle
 
@@ -55,7 +56,7 @@ class MotionConfig:
 
     scale: tuple[float, ...] = tuple(channel.swing for channel in CHANNEL_TABLE)
     limit: float = 4.0
-    arm_pwm: float = 15000.0
+    arm_pwm: float = DEFAULT.arm_pwm
     slow_samples: float = 300.0
     lag_samples: float = 6.0
     settle_samples: int = 100

@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.evaluation.score_report import HitCurve, Reliability
 from airtouch.detector.shared.channels import NAMES
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
 #: detector -> its colour in every plot

@@ -3,10 +3,11 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.report.figures import FOUND, MUTED, TRUE, png, style
 from airtouch.twin.comparison.curves import AFTER, BEFORE, AroundEdges, Signals
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import NAMES, RATE_HZ, UNITS
+from airtouch.twin.recorded.channels import NAMES, UNITS
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES
 
 REAL, TWIN = TRUE, FOUND
@@ -33,7 +34,7 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
 
     Lines are medians over flights, bands reach from the first to the third quartile.
     """
-    time = (np.arange(BEFORE + AFTER) - BEFORE) / RATE_HZ
+    time = (np.arange(BEFORE + AFTER) - BEFORE) / SAMPLE_RATE_HZ
     with style():
         figure = Figure(figsize=(7.2, 15.0), layout="constrained")
         axes = figure.subplots(12, 2, sharex=True, sharey="row")

@@ -13,6 +13,7 @@ from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 MORE = 5  #: further flights whose benefit is estimated
 
@@ -24,7 +25,7 @@ MORE = 5  #: further flights whose benefit is estimated
 @click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
               help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
 @click.option("--vehicle", metavar="NAME", help="Vehicle that this fit starts from, a name or a .toml file; default "
-              "crazyflie-2.1-flow.")
+              f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from airtouch import logs
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.files import in_folder
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 
 def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) -> list[FlightLog]:

@@ -21,10 +21,10 @@ from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
 TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
-PERIOD_S = 0.01  #: s, default sample time
 MIN_SPEED_MPS = 0.05  #: m/s, least speed by which a timing error is multiplied
 
 
@@ -133,7 +133,7 @@ def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0
 
 
 def edge_points(
-    xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = PERIOD_S,
+    xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = SAMPLE_PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
     """Detections as points of the track.

@@ -69,7 +69,7 @@ def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np
 def sensing_range(job: Job) -> Figure:
     """Section 8.1: heights at which the lift is THRESHOLD of the weight, and the lift at the paper's 3 m."""
     mass, span, propeller, claimed = CLAIMS["range"].values
-    small = vehicles.load("crazyflie-2.1-flow")
+    small = vehicles.load()
     craft = [Craft("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
              Craft("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
              Craft("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
