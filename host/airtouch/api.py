@@ -208,12 +208,12 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.logs.files import check_free
     from airtouch.simulation import scenario
     from airtouch.twin import adapt as module
-    from airtouch.twin import files
+    from airtouch.twin import adapt_report, files
 
     need("train", "training")
     out = Path(out)
     check_free(out, force)
-    usable, left_out = module.readable(dataset.collect(_several(flights), speed_mps))
+    usable, left_out = adapt_report.readable(dataset.collect(_several(flights), speed_mps))
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")

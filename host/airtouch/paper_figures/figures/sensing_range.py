@@ -133,7 +133,7 @@ def _draw(canvas: Any, craft: list[Craft], claimed_m: float) -> None:
         for (source, curve), style in zip(curves(one.radius_m, one.arm_m).items(), (":", "--", "-"), strict=True):
             axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
                         label=f"rotor {1000 * one.radius_m:.4g} mm, {source}")
-    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
+    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.GREY,
                 label="67 g frame, measured")
     axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
     axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")
