@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -113,9 +113,7 @@ def parse(text: str, source: str) -> Vehicle:
     try:
         vehicle = Vehicle(**values)
     except TypeError:
-        required = [n for n in ("name", "mass_kg", "arm_m", "inertia_kg_m2", "thrust_of_pwm_n",
-                                "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
-                    if n not in values]
+        required = [f.name for f in fields(Vehicle) if f.default is MISSING and f.name not in values]
         raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
     check_firmware(vehicle.firmware, vehicle.range_module, source)
     return vehicle
@@ -126,10 +124,10 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
 
     Raises AirTouchError for an unknown name and a wrong value.
     """
-    fields = Vehicle.__dataclass_fields__
-    unknown = sorted(set(table) - set(fields))
-    if unknown:
-        raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
+    known = [f.name for f in fields(Vehicle)]
+    unknown_keys = sorted(set(table) - set(known))
+    if unknown_keys:
+        raise AirTouchError(f"{source}: unknown key {', '.join(unknown_keys)}; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, value in table.items():
         if name in LISTS:
