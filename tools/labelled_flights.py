@@ -196,7 +196,7 @@ def arguments() -> argparse.Namespace:
                         help="folder of `airtouch twin`, as many as --start: a new network learns its edges, laid over "
                              "the free air of the other groups, with the labelled flights")
     parser.add_argument("--beside", type=Path, action="append", default=[],
-                        help="folder of labelled flights to learn beside the K, half of the crops each; none of them may "
+                        help="folder of labelled flights to learn beside the K, half of the crops each; none may "
                              "be scored")
     parser.add_argument("--unlabelled", action="store_true",
                         help="with --twin or --beside: a row more, with the other flights learnt without their down "
