@@ -1,7 +1,10 @@
 """`import airtouch as at` from the outside: quick to import, and each function on a file, a log and a pandas table."""
 
+import operator
+import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,7 @@ import pytest
 
 import airtouch as at
 import short_flights
+from airtouch import api
 
 NEVER = ("numba", "scipy", "pandas", "matplotlib", "tensorflow", "keras", "sklearn", "jinja2", "numpy", "cffi", "click")
 
@@ -34,7 +38,13 @@ def test_the_import_itself_brings_nothing_heavy():
 
 def test_everything_promised_is_there():
     for name in at.__all__:
-        assert getattr(at, name) is not None
+        value = getattr(at, name)
+        assert value is not None and (callable(value) or name in ("__version__", "gap", "logs"))
+    promised = re.findall(r"`at\.([\w.]+)`", api.__doc__)
+    assert set(promised) >= {name for name in at.__all__ if name.islower() and name not in ("gap", "logs")} - {
+        "__version__"}
+    for name in promised:
+        assert callable(operator.attrgetter(name)(at)), name
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = at.nonsense
 
@@ -93,6 +103,18 @@ def test_gap_is_called_by_name_and_stays_a_module(log, path, tmp_path):
     assert callable(diagnose) and callable(at.gap.diagnose)
     with pytest.raises(at.AirTouchError, match="no flight to diagnose|too short|no flight in it"):
         at.gap.diagnose(log.slice(0, 150))
+
+
+def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
+    of_unknown = log.with_columns({}, vehicle="my-drone")
+    with pytest.warns(UserWarning, match="'my-drone', of which no file is known; crazyflie-2.1-flow is used, vehicle "
+                                         "names another") as warned:
+        at.gap.measure(of_unknown)
+    assert warned[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        at.gap.measure(of_unknown, "crazyflie-2.1-flow")
+        at.gap.measure(log.with_columns({}, vehicle=""))
 
 
 def test_types_are_marked():

@@ -21,10 +21,11 @@ from airtouch.detector import best
 from airtouch.detector.best.recipe import STRIDE
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
+from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
 
 MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: round number, 1 s at 0.3 m/s

@@ -19,6 +19,7 @@ import numpy as np
 
 from airtouch import vehicle
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.simulation.firmware import range_module, settings
 from airtouch.simulation.flight import Diverged, fly
 from airtouch.twin import files
@@ -82,7 +83,7 @@ def height_loop(down: np.ndarray, az: np.ndarray, set_height: float) -> tuple[np
     outer, inner = (firmware.loops[k] for k in (settings.POSITION_Z, settings.VELOCITY_Z))
     module = np.zeros(1, range_module.STATE).view(np.recarray)[0]
     module.held = module.reference = last = down[0]
-    z, p, dt = np.array([down[0], 0.0]), np.diag([1e-4, 1e-3]), 1.0 / ch.RATE_HZ
+    z, p, dt = np.array([down[0], 0.0]), np.diag([1e-4, 1e-3]), 1.0 / SAMPLE_RATE_HZ
     turn = np.array([[1.0, dt], [0.0, 1.0]])
     outer_sum = inner_sum = 0.0
     command, passed = np.empty(len(down)), np.empty(len(down))

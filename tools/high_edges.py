@@ -31,7 +31,7 @@ from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import NAMES
 from airtouch.simulation import scenario
-from airtouch.twin import adapt, files, overlay
+from airtouch.twin import adapt_report, files, overlay
 from airtouch.twin.overlay import RATE_HZ
 from airtouch.twin.recorded.course import Course, course
 from airtouch.twin.recorded.features import CLASSES, height_class
@@ -147,7 +147,7 @@ def main() -> None:
 
 def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
     """Logs and courses by class of height. Ends the program where a flight is not usable."""
-    usable, left_out = adapt.readable(listed)
+    usable, left_out = adapt_report.readable(listed)
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
     groups: Groups = {name: [] for name in CLASSES}

@@ -4,20 +4,9 @@
         [--twin FOLDER | --beside FOLDER] [--unlabelled]
         [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
-Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
-that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained
-on the same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of
-learning.
---start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the
-second the other: a twin's detector, whose twin was fitted to the other half. With --twin, as often as --start, training
-does not go on from --start: a new network learns the K flights together with edges of that twin, laid over the free air
-of all flights of the other groups, as `airtouch adapt --from scratch` does. With --unlabelled there is a row more: the
-other flights of those groups are learnt too, without their down range, with the edges that the detector of the row
-before reports. With --beside, training goes on from --start with the K flights and those of that folder, half of the
-crops each, as `airtouch adapt` does with simulated ones: so that it does not forget what the K lack. What is in --out
-already is not done again, so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 %
-interval by bootstrap over the flights scored, each with all its draws; last, the missed edges of each height in the
-manifest, and the false edges before, over and behind the platform.
+Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
+other groups, and a network trained on the same K alone. Prints a Markdown table: means over all
+draws and seeds, 95 % intervals by bootstrap over flights, and missed edges by height. --help explains the options.
 """
 
 import argparse
@@ -201,17 +190,21 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--start", type=Path, action="append", default=[],
-                        help="model to go on from, one for all groups or one for each in their order; the rows without "
-                             "it if left out")
+                        help="model to go on from, one for all groups or one for each in their order, which knows no "
+                             "flight of its group; the rows without it if left out")
     parser.add_argument("--twin", type=Path, action="append", default=[],
-                        help="folder of `airtouch twin` whose edges are learnt with the labelled flights; as many as "
-                             "--start")
+                        help="folder of `airtouch twin`, as many as --start: a new network learns its edges, laid over "
+                             "the free air of the other groups, with the labelled flights")
     parser.add_argument("--beside", type=Path, action="append", default=[],
-                        help="folder of labelled flights to learn beside the K; none of them may be scored")
+                        help="folder of labelled flights to learn beside the K, half of the crops each; none may "
+                             "be scored")
     parser.add_argument("--unlabelled", action="store_true",
-                        help="with --twin or --beside: a row more, with the other flights learnt without their labels")
-    parser.add_argument("--by", choices=("halves", "day"), default="halves")
-    parser.add_argument("--out", type=Path, default=Path("out/labelled"))
+                        help="with --twin or --beside: a row more, with the other flights learnt without their down "
+                             "range, with the edges that the detector of the row before reports")
+    parser.add_argument("--by", choices=("halves", "day"), default="halves",
+                        help="groups: the manifest's folds 0 to 2, and 3 and up; or each day")
+    parser.add_argument("--out", type=Path, default=Path("out/labelled"),
+                        help="what is in it already is not done again")
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
     parser.add_argument("--draws", type=int, default=5)
     parser.add_argument("--seeds", type=int, default=2)

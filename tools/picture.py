@@ -21,7 +21,8 @@ from airtouch.detector.evaluation.score_report import reliability_of
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
-from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
+from airtouch.report.figures import reliability
+from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
 
 CHANNELS = ("motor mean", "gyro x", "ax")  #: that are drawn
 OFFSET = 5  #: usual swings between two channels
@@ -57,23 +58,23 @@ def draw(log, model, name: str) -> bytes:
         figure = Figure(figsize=(8.0, 4.6), layout="constrained")
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.3, 1, 0.7))
         for i, channel in enumerate(CHANNELS):
-            axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=MUTED)
+            axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=GREY)
         axes[0].set_yticks([OFFSET * (len(CHANNELS) - 1 - i) for i in range(len(CHANNELS))], CHANNELS)
         axes[0].set_title(f"{name}: what the drone feels, in units of its usual swing", loc="left")
-        axes[1].plot(t, trace.probability, color=FOUND, lw=1)
+        axes[1].plot(t, trace.probability, color=BLUE, lw=1)
         axes[1].set(ylim=(-0.05, 1.25), yticks=(0, 1), ylabel="P(over)")
         lag = best.lag_s(model)
         for edge in trace.edges:
             at = edge.sample * 0.01 - lag
-            axes[1].plot(at, 1.12, "v" if edge.kind == "entry" else "^", color=OTHER, ms=7)
+            axes[1].plot(at, 1.12, "v" if edge.kind == "entry" else "^", color=RED, ms=7)
         axes[1].set_title(f"felt edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)",
                           loc="left")
-        axes[2].plot(t, log["zrange_m"], color=TRUE, lw=1)
+        axes[2].plot(t, log["zrange_m"], color=GREEN, lw=1)
         axes[2].set(xlabel="time, s", ylabel="m", xlim=(first, last))
         axes[2].set_title("down range: the truth, never an input", loc="left")
         for ax in axes:
             for crossed in truth:
-                ax.axvline(crossed.sample * 0.01, color=TRUE, ls="--", lw=1)
+                ax.axvline(crossed.sample * 0.01, color=GREEN, ls="--", lw=1)
         return png(figure)
 
 

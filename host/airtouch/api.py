@@ -1,9 +1,11 @@
-"""The functions of `import airtouch as at`: read, write, detect, evaluate, simulate, diagnose, measure and adapt.
+"""The functions of `import airtouch as at`.
 
-A flight is a file name, a `FlightLog` or a pandas table with the log's column names. Heavy modules are imported at
-their first use, so `import airtouch` is fast.
+`at.read`, `at.write`, `at.to_pandas`, `at.from_pandas`, `at.detect`, `at.evaluate`, `at.simulate`, `at.adapt`,
+`at.gap.diagnose` and `at.gap.measure`. A flight is a file name, a `FlightLog` or a pandas table with the log's column
+names. Heavy modules are imported at their first use, so `import airtouch` is fast.
 """
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "read", "simulate", "to_pandas",
            "write"]
-DEFAULT_VEHICLE = "crazyflie-2.1-flow"
 
 
 @in_python
@@ -163,8 +164,9 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
              report: str | Path | None = None, force: bool = False) -> "Diagnosis":
     """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
-    vehicle: a built-in name or .toml file; that of the first log if left out. baseline: nominal flights. without:
-    effects to exclude. report: HTML file to write. The result's `plain()` is the JSON of `airtouch gap diagnose`.
+    vehicle: a built-in name or .toml file; that of the first log if left out, and crazyflie-2.1-flow, with a warning,
+    where no file is known of that. baseline: nominal flights. without: effects to exclude. report: HTML file to write.
+    The result's `plain()` is the JSON of `airtouch gap diagnose`.
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
     import airtouch.gap.diagnose as module
@@ -206,16 +208,16 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.logs.files import check_free
     from airtouch.simulation import scenario
     from airtouch.twin import adapt as module
-    from airtouch.twin import files
+    from airtouch.twin import adapt_report, files
 
     need("train", "training")
     out = Path(out)
     check_free(out, force)
-    usable, left_out = module.readable(dataset.collect(_several(flights), speed_mps))
+    usable, left_out = adapt_report.readable(dataset.collect(_several(flights), speed_mps))
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
-    craft = vehicles.load(Path(twin) / files.VEHICLE if twin else DEFAULT_VEHICLE)
+    craft = vehicles.load(Path(twin) / files.VEHICLE if twin else vehicles.DEFAULT_VEHICLE)
     adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
@@ -253,11 +255,10 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
     from airtouch import vehicle as vehicles
 
     if named is None:
-        logged = str(logs[0].meta.get("vehicle") or "") if logs else ""
-        try:
-            return vehicles.load(logged or DEFAULT_VEHICLE)
-        except AirTouchError:
-            return vehicles.load(DEFAULT_VEHICLE)
+        craft, warning = vehicles.of_log(logs[0].meta if logs else {})
+        if warning:
+            warnings.warn(python_words(warning), stacklevel=5)  # the caller of at.gap.diagnose
+        return craft
     return vehicles.load(named) if isinstance(named, (str, Path)) else named
 
 

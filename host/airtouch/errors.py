@@ -12,7 +12,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 #: option of the command line, as messages have it -> argument of the Python functions
 _ARGUMENTS = ((r"--force\b", "force=True"), (r"--speed\b", "speed_mps"), (r"--detector (\S+)", r'detector="\1"'),
-              (r"--model\b", "model"))
+              (r"--model\b", "model"), (r"--vehicle\b", "vehicle"))
 
 
 class AirTouchError(ValueError):

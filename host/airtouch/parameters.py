@@ -7,6 +7,9 @@ The C header `firmware/kernels/airtouch_parameters.h` is generated from here
 import argparse
 from dataclasses import asdict, dataclass, fields
 
+SAMPLE_RATE_HZ = 100.0  #: Hz, rate of the logs that detectors take, of the simulator's and of the steps on the drone
+SAMPLE_PERIOD_S = 1.0 / SAMPLE_RATE_HZ  #: s, the same as time from sample to sample
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -16,7 +19,7 @@ class Parameters:
     where marked. "(kernels.md)" names the part of that page that describes a choice.
     """
 
-    sample_rate_hz: float = 100.0  #: rate of all nine channels
+    sample_rate_hz: float = SAMPLE_RATE_HZ  #: rate of all nine channels
     band_window: int = 200  #: FC-FE: STFT window, samples
     band_hop: int = 1  #: FC-FE: samples between two windows
     band_low_hz: float = 6.0  #: FC-FE: lower edge of the band, included

@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError, unknown
+from airtouch.parameters import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Vehicle:
     flow_noise_time_s: float = 0.05  #: its correlation time
     acc_lowpass_hz: float = 0.0  #: corner of the logged accelerometer's low-pass; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
-    arm_pwm: float = 15000.0  #: mean PWM above which the app takes the vehicle to be in the air
+    arm_pwm: float = DEFAULT.arm_pwm  #: mean PWM above which the app takes the vehicle to be in the air
     firmware: str = "2026.08"  #: release that flies: a file of simulation/firmwares, or a path to one
     range_module: str = "map"  #: platform, map, none, or firmware: what the release has
     platform: str = ""  #: platform of crazyflie-firmware that flies it (cf2, cf21bl, bolt); "" where unknown
@@ -65,13 +66,14 @@ class Vehicle:
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
 
 
+DEFAULT_VEHICLE = "crazyflie-2.1-flow"  #: the authors' drone, flown where nothing names another
 TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are texts
 #: field -> length, of fields that are lists of numbers
 LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
-def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
+def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
     """A built-in vehicle by name, or the vehicle in a TOML file.
 
     Raises AirTouchError with the file and the missing or unknown key.
@@ -91,6 +93,16 @@ def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
     return parse(text, str(name_or_path))
 
 
+def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
+    """The vehicle that a log's metadata name, else the default; and a warning if no file is known of the one named."""
+    name = str(meta.get("vehicle") or "")
+    try:
+        return load(name or DEFAULT_VEHICLE), None
+    except AirTouchError:
+        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, of which no file is known; {DEFAULT_VEHICLE} "
+                                       "is used, --vehicle names another")
+
+
 def parse(text: str, source: str) -> Vehicle:
     """The vehicle in a TOML text. `source` is its name in messages. Raises AirTouchError as `load` does."""
     try:
@@ -101,9 +113,7 @@ def parse(text: str, source: str) -> Vehicle:
     try:
         vehicle = Vehicle(**values)
     except TypeError:
-        required = [n for n in ("name", "mass_kg", "arm_m", "inertia_kg_m2", "thrust_of_pwm_n",
-                                "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
-                    if n not in values]
+        required = [f.name for f in fields(Vehicle) if f.default is MISSING and f.name not in values]
         raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
     check_firmware(vehicle.firmware, vehicle.range_module, source)
     return vehicle
@@ -114,10 +124,10 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
 
     Raises AirTouchError for an unknown name and a wrong value.
     """
-    fields = Vehicle.__dataclass_fields__
-    unknown = sorted(set(table) - set(fields))
-    if unknown:
-        raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
+    known = [f.name for f in fields(Vehicle)]
+    unknown_keys = sorted(set(table) - set(known))
+    if unknown_keys:
+        raise AirTouchError(f"{source}: unknown key {', '.join(unknown_keys)}; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, value in table.items():
         if name in LISTS:

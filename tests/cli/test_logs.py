@@ -7,8 +7,11 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
+from airtouch.cli.gap import files as gap_files
 from airtouch.cli.logs import command
+from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
+from airtouch.logs import files
 from airtouch.logs.flight_log import PWM, FlightLog
 
 
@@ -52,6 +55,20 @@ def test_a_check_as_json_holds_rate_edges_and_files_left_out(folder):
     assert report["left_out"][0]["file"].endswith("empty.csv.gz")
     text = call("check", folder / "good.csv").stdout
     assert "entry at 300 (0.80 to 0.05 m)" in text
+
+
+def test_every_command_takes_the_same_files_of_a_folder_for_flights(tmp_path):
+    """`evaluate` once saw no flight in a folder of ULog files, and `logs info` passed over uSD logs."""
+    taken = ["a.ulg", "b.usd", "c.bin", "d.csv", "e.csv.gz", "f.parquet"]
+    for name in (*taken, "manifest.csv", "notes.txt", "map.geojson"):
+        (tmp_path / name).write_text("file\n")
+    (tmp_path / "g.csv").mkdir()
+    expected = [tmp_path / name for name in taken]
+    assert files.in_folder(tmp_path) == expected
+    assert [f.path for f in dataset.collect([tmp_path])] == expected
+    assert gap_files.files_of([str(tmp_path)]) == expected
+    failed = json.loads(call("info", tmp_path, "--json").stdout)["left_out"]
+    assert [f["file"] for f in failed] == [str(p) for p in expected]
 
 
 def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):

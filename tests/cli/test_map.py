@@ -73,7 +73,7 @@ def test_the_picture_is_a_map_platform_scale_start_and_end():
     from airtouch.report import map_figure
 
     xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.zeros(500)])
-    points = [EdgePoint(200, "entry", 0.0, 0.0, 0.02), EdgePoint(300, "exit", 1.0, 0.0, 0.02)]
+    points = [EdgePoint(200, 2.0, "entry", 0.0, 0.0, 0.02), EdgePoint(300, 3.0, "exit", 1.0, 0.0, 0.02)]
     one_pass = Platform(Point(0.0, 0.0), Point(1.0, 0.0), None, None, 0.02)
     figure = map_figure.figure_of(EdgeMap(xy, points, [one_pass], "logged", 0.0, 0.1), "a flight")
     (ax,) = figure.axes

@@ -1,12 +1,14 @@
 """The struct that flies: its size, its speed, its recovery, and that it joins the kernels and nothing else."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import airtouch.kernels as kernels
 from airtouch.errors import AirTouchError
+from airtouch.kernels.edge_pipeline import MOST_BINS
 from airtouch.kernels.library import ffi
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference import EdgePipelineConfig
@@ -70,3 +72,10 @@ def test_recovers_from_any_value_within_two_windows(poison):
 def test_settings_beyond_the_build_are_refused(parameters):
     with pytest.raises(AirTouchError):
         kernels.edge_pipeline(*hover(10), VEHICLE, config=EdgePipelineConfig(parameters))
+
+
+def test_a_refusal_names_the_rooms_of_the_header():
+    header = (Path(__file__).parents[2] / "firmware/kernels/edge_pipeline.h").read_text()
+    assert f"#define EDGE_PIPELINE_MAX_BINS {MOST_BINS}\n" in header
+    assert "EDGE_PIPELINE_MAX_WINDOW AIRTOUCH_BAND_WINDOW\n" in header
+    assert "EDGE_PIPELINE_MAX_CELLS (AIRTOUCH_LEADING_WINDOW + AIRTOUCH_GUARD_CELLS)\n" in header

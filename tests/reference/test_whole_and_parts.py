@@ -12,7 +12,7 @@ from airtouch.reference.band_power import band_bins
 from airtouch.reference.cross_spectrum import cascaded_cross_spectrum
 from airtouch.reference.edge_pipeline import NONE, EdgePipelineConfig, cfar_input, edge_pipeline
 from airtouch.reference.feature_window import deviation_from_mean
-from airtouch.reference.finite import ACC_LIMIT, RATE_LIMIT
+from airtouch.reference.finite import ACC_CLAMP, RATE_CLAMP
 from airtouch.reference.fr_cfar import POWER_LIMIT, fr_cfar, hold_power
 from airtouch.reference.motion_channels import MotionConfig, motion_channels
 from airtouch.vehicle import load
@@ -64,10 +64,10 @@ def test_values_beyond_what_is_possible_are_those_at_the_limit(signals):
         np.testing.assert_array_equal(beyond.band_power, at_limit.band_power)
         np.testing.assert_array_equal(beyond.force, at_limit.force)
     wild, limited = acc.copy(), acc.copy()
-    wild[300, 0], limited[300, 0] = 50.0 * ACC_LIMIT, ACC_LIMIT
+    wild[300, 0], limited[300, 0] = 50.0 * ACC_CLAMP, ACC_CLAMP
     np.testing.assert_array_equal(disturbance_force(wild, pwm, VEHICLE), disturbance_force(limited, pwm, VEHICLE))
     spun, slow = gyro.copy(), gyro.copy()
-    spun[300, 1], slow[300, 1] = -50.0 * RATE_LIMIT, -RATE_LIMIT
+    spun[300, 1], slow[300, 1] = -50.0 * RATE_CLAMP, -RATE_CLAMP
     wide = MotionConfig(limit=1e12)
     np.testing.assert_array_equal(motion_channels(acc, spun, pwm, wide)[0], motion_channels(acc, slow, pwm, wide)[0])
     np.testing.assert_array_equal(edge_pipeline(acc, spun, pwm, VEHICLE).band_power,

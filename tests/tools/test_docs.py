@@ -113,6 +113,22 @@ def test_files_and_names_that_a_page_sends_to_are_there(name):
             assert re.search(rf"^(def |class |)?{symbol}\b|^[A-Z_, ]*\b{symbol}\b.* = ", source, re.M), (path, symbol)
 
 
+#: sections of the paper that hold an algorithm, an implementation or an experiment
+SECTIONS = ("2.1", "2.2", "3", "4.1", "4.2", "4.3", "5.1", "5.2", "5.3", "6", "7.1", "7.2", "7.3", "7.4", "7.5", "7.6",
+            "7.7", "7.8", "8.1", "8.2", "8.3")
+
+
+def test_every_section_of_the_paper_has_a_row_and_every_path_of_it_is_there():
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    table = text.split("## Where each section of the paper stands")[1].split("\n## ")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| ")][1:]
+    numbers = re.findall(r"\b\d(?:\.\d)?\b", " ".join(row.split("|")[1] for row in rows))
+    assert [section for section in SECTIONS if section not in numbers] == []
+    for path in re.findall(r"`((?:[\w-]+/)+[\w.-]+)`", table.split("|", 1)[1]):
+        root = ROOT if path.startswith(("firmware/", "gap8/", "tools/")) else ROOT / "host/airtouch"
+        assert (root / path).is_file(), path
+
+
 def test_every_file_of_the_diagnosis_is_named_by_a_decision():
     text = (DOCS / "architecture.md").read_text("utf-8")
     room = ROOT / "host/airtouch/gap"

@@ -20,7 +20,7 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from airtouch.twin import adapt, overlay
+from airtouch.twin import adapt, adapt_report, overlay
 from skips import needs
 from twin_courses import PLAIN
 
@@ -251,19 +251,20 @@ def score(error_m):
 
 def test_outlook_is_a_power_law_that_never_promises_worse_or_a_miracle():
     def of(now, before):
-        return adapt.outlook(adapt.Adapted(None, [score(now)] * 4, [score(before)] * 4, []), 10, 5)
+        return adapt_report.outlook(adapt.Adapted(None, [score(now)] * 4, [score(before)] * 4, []), 10, 5)
     assert of(0.02, 0.04)["then_m"] == pytest.approx(0.02 * 10 / 15)  # halved by twice the flights: exponent 1
     assert of(0.02, 0.02 * 2**0.5)["then_m"] == pytest.approx(0.02 * (10 / 15) ** 0.5)
     assert of(0.02, 0.01)["then_m"] == pytest.approx(0.02)
     assert of(0.02, 0.2)["exponent"] == 1.0
-    assert adapt.outlook(adapt.Adapted(None, [], [], []), 10) is None
+    assert adapt_report.outlook(adapt.Adapted(None, [], [], []), 10) is None
 
 
 def test_readable_takes_the_speed_from_the_log(sweeps, tmp_path):
     _, log, _ = sweeps[0]
     logs.write(log, tmp_path / "good.csv.gz")
     logs.write(replace(log, columns={k: v[:50] for k, v in log.columns.items()}), tmp_path / "short.csv.gz")
-    usable, left_out = adapt.readable([FlightFile(tmp_path / n, Condition()) for n in ("good.csv.gz", "short.csv.gz")])
+    files = [FlightFile(tmp_path / n, Condition()) for n in ("good.csv.gz", "short.csv.gz")]
+    usable, left_out = adapt_report.readable(files)
     assert len(usable) == 1 and len(left_out) == 1
     assert usable[0].file.condition.speed_mps == pytest.approx(np.hypot(log["vx_mps"], log["vy_mps"])[-800:].max(),
                                                                abs=0.3)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS
 from airtouch.simulation import scenario
 from airtouch.twin import overlay
 from airtouch.twin.recorded import missions
@@ -133,6 +134,6 @@ def test_logs_of_overlay_flights_train(sweeps, responses):
     """They have what the detector needs and no down range of their own."""
     from airtouch.detector.best.batches import channels_of
     (log, *_), _ = overlay.flights(overlay.free_air([sweeps[0][1]]), responses[:1], seed=1)
-    assert not log.has("zrange_m")
+    assert not log.has("zrange_m") and set(log.columns) <= set(COLUMNS) and np.isfinite(log["t_s"]).all()
     x, airborne = channels_of(log)
     assert x.shape == (len(log), 12) and airborne.mean() > 0.5

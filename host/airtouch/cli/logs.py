@@ -13,12 +13,11 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write
+from airtouch.logs.files import in_folder, write
 from airtouch.logs.formats.rosbag import is_bag
 
-ENDINGS = (".csv", ".csv.gz", ".parquet")
-RERUN = ".rrd"  #: ending of Rerun files, which are only written
-FOREIGN = (".ulg",)  #: endings of other programs' logs that are read from folders too
+RERUN = "rrd"  #: ending of Rerun files, which are only written
+WRITTEN = ("csv", "csv.gz", "parquet", RERUN)
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
 
 
@@ -80,7 +79,7 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
 @FILES
 @click.option("--out", required=True, type=click.Path(),
               help="Folder for the converted files; made when missing.")
-@click.option("--format", "ending", type=click.Choice([e[1:] for e in (*ENDINGS, RERUN)]), default="csv.gz",
+@click.option("--format", "ending", type=click.Choice(WRITTEN), default="csv.gz",
               show_default=True, help="Kind of file to write.")
 @click.option("--columns", "mapping", type=click.Path(), metavar="MAP.toml",
               help="TOML file that maps the columns of other programs' CSV files to the schema.")
@@ -105,7 +104,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
 
     if plain and ending != "csv":
         raise AirTouchError("--plain is for --format csv")
-    if ending == RERUN[1:]:
+    if ending == RERUN:
         need("rerun", "writing Rerun recordings")
     if mapping:
         mapped.load(mapping)
@@ -123,7 +122,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         log = log if rate is None else logs.resample(log, rate)
         if plain:
             write_bytes(canonical.plain_csv(log), target, force)
-        elif ending == RERUN[1:]:
+        elif ending == RERUN:
             write_bytes(rerun_file.recording(log), target, force)
         else:
             write(log, target, force)
@@ -151,11 +150,7 @@ def _expand(files: Iterable[str]) -> Iterator[Path]:
         if not os.path.isdir(name) or is_bag(name):
             yield Path(name)
             continue
-        try:
-            inside = sorted(Path(name).iterdir())
-        except OSError as error:
-            raise AirTouchError(f"{name}: cannot be listed: {error.strerror}; check its rights") from None
-        yield from (p for p in inside if p.name.endswith((*ENDINGS, *FOREIGN)) and p.name != "manifest.csv")
+        yield from in_folder(Path(name))
 
 
 def _progress(paths: list[Path]) -> Iterable[Path]:

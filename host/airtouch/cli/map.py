@@ -63,7 +63,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
     write_bytes(draw(plane, f"{flight.name}: {len(plane.points)} edges ({plane.position})"), picture, force)
     for point in plane.points:
-        click.echo(f"{point.kind:5} at {point.sample * 0.01:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
+        click.echo(f"{point.kind:5} at {point.time_s:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")
     for number, platform in enumerate(plane.platforms):
         if platform.outline is not None:

@@ -8,6 +8,7 @@ import click
 
 from airtouch.cli.shared.help import examples
 from airtouch.errors import AirTouchError
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
     from airtouch.logs.flight_log import FlightLog
@@ -54,7 +55,7 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
 @click.option("--flights", "-n", default=1, show_default=True, help="How many flights.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True,
               help="Folder for the logs.")
-@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Name or .toml file.")
+@click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Name or .toml file.")
 @click.option("--effect", "chosen", multiple=True, metavar="NAME[:P=V...]",
               help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")
 @click.option("--without", multiple=True, metavar="NAME", help="Switch an effect of the scenario off.")

@@ -27,6 +27,7 @@ from airtouch.crazyflie.readiness import Readiness, origin_of, settle
 from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder, flight_path
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 LEAST_DOWN_S = 2.0  #: s, shortest landing of the guard
 
@@ -38,7 +39,7 @@ class Plan:
     uri: str
     out: Path
     name: str
-    vehicle: str = "crazyflie-2.1-flow"
+    vehicle: str = DEFAULT_VEHICLE
     settings: Sequence[tuple[str, str]] = ()
     least_v: float = checks.LEAST_V
     link_timeout_s: float = LINK_TIMEOUT_S

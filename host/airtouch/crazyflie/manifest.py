@@ -8,10 +8,9 @@ from typing import Any
 from airtouch import logs
 from airtouch.crazyflie import recorder
 from airtouch.logs.edges import true_edges
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import MANIFEST, write_bytes
 from airtouch.logs.flight_log import FlightLog
 
-NAME = "manifest.csv"
 COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
 FOLDS = 5  #: folds of cross-validation, as in the authors' manifest
 CLEAN_LOSS = 0.01  #: largest fraction of lost samples of a "clean" flight; one of the authors' 87 lost any: 0.5 %
@@ -22,7 +21,7 @@ def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
 
     The mission's values come from the log's metadata.
     """
-    path = file.parent / NAME
+    path = file.parent / MANIFEST
     use = use_of(log, planned)
     rows = [row for row in _rows(path) if row.get("file") != file.name]
     rows.append(_row(file.name, use, log))

@@ -11,9 +11,9 @@ from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import FlightFile
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.logs import airborne
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 CHUNK = 5  #: rows per turn of the loop, 50 ms
 

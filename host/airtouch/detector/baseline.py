@@ -14,12 +14,11 @@ import numpy as np
 
 from airtouch import kernels, logs
 from airtouch.detector.evaluation import tuning
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.shared.channels import nine_channels
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
-from airtouch.parameters import DEFAULT, Parameters
+from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S, Parameters
 
 
 @dataclass(frozen=True)

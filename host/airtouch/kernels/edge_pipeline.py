@@ -7,10 +7,13 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import axes, column, float32, pointer, vehicle_struct
 from airtouch.kernels.library import ffi, lib
+from airtouch.parameters import DEFAULT
 from airtouch.reference.band_power import band_bins
 from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig, check_signals
 from airtouch.reference.fr_cfar import check_settings
 from airtouch.vehicle import Vehicle
+
+MOST_BINS = 7  #: EDGE_PIPELINE_MAX_BINS of firmware/kernels/edge_pipeline.h
 
 
 def _event_dtype() -> np.dtype:
@@ -49,7 +52,8 @@ def edge_pipeline(
         config_struct(config, vehicle), pointer(samples, "edgeSample_t *"), n, state, pointer(events, "edgeEvent_t *"))
     if result < 0:
         raise AirTouchError(
-            "pipeline: settings larger than the kernel's room (windows to 200 samples, 5 bins in the band, 65 cells)")
+            f"pipeline: settings larger than the kernel's room (windows to {DEFAULT.band_window} samples, {MOST_BINS} "
+            f"bins in the band, {DEFAULT.leading_window + DEFAULT.guard_cells} cells)")
     flag = {name: events[name].astype(bool)
             for name in ("ready", "alert", "alertRecent", "filtered", "armed")}
     return EdgeEvents(

@@ -82,7 +82,7 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
 
 def probability(model: Model, windows: np.ndarray) -> np.ndarray:
     """P(over a platform), (n,), of normalised windows (n, 100, 3): softmax of the int8 logits."""
-    return _softmax(model.int8, infer_int8(model, windows))
+    return softmax(model.int8, infer_int8(model, windows))
 
 
 def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
     lib.networkInt8Flight(flat, pointer(x), len(x), x.shape[1], rows, pointer(window), pointer(quantised), _arena(flat),
                           pointer(logits), pointer(valid))
-    return np.where(valid, _softmax(network, logits), np.nan)
+    return np.where(valid, softmax(network, logits), np.nan)
 
 
 def parameter_bytes(network: Int8Network | StreamNetwork) -> int:
@@ -184,7 +184,8 @@ def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:
     return windows.reshape(len(windows), size)
 
 
-def _softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
+def softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
+    """P(over a platform), (n,), of int8 logits (n, 2)."""
     difference = logits[:, 1].astype(np.float64) - logits[:, 0]
     return 1.0 / (1.0 + np.exp(-network.layers[-1].output_scale * difference))
 

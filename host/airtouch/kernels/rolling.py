@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
-from airtouch.kernels.network import Model, flat_layers
+from airtouch.kernels.network import Model, flat_layers, softmax
 from airtouch.reference.networks.int8_network import Int8Network, quantise
 
 
@@ -58,7 +58,7 @@ def run_rolling(network: Int8Network, quantised: np.ndarray, stride: int = 1,
 
 
 def fixed_scale(mean: np.ndarray, deviation: np.ndarray, features: np.ndarray) -> np.ndarray:
-    """float32 inputs (n, columns) of features on a fixed scale. Reference: `detector.normalisation.FixedScale`."""
+    """float32 inputs (n, columns) of features on a fixed scale. Reference: `paper.normalisation.FixedScale`."""
     x = np.ascontiguousarray(features, dtype=np.float32)
     if x.ndim != 2 or x.shape[1] != len(mean) or x.shape[1] > 8:
         raise AirTouchError(f"fixed scale: needs features (n, {len(mean)}), not {x.shape}")
@@ -78,8 +78,7 @@ def probability_of_samples(model: ScaledModel, features: np.ndarray, stride: int
     inputs = fixed_scale(model.scale.mean, model.scale.deviation, features)
     first = network.layers[0]
     outputs, valid = run_rolling(network, quantise(inputs, first.input_scale, first.input_zero_point), stride, usable)
-    difference = outputs[:, 1].astype(np.float64) - outputs[:, 0]
-    probability = 1.0 / (1.0 + np.exp(-network.layers[-1].output_scale * difference))
+    probability = softmax(network, outputs)
     latest = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), -1))
     broken = np.maximum.accumulate(np.where(usable, -1, np.arange(len(valid))))
     return np.where(latest > broken, probability[latest], np.nan)

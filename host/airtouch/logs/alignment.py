@@ -6,8 +6,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, GYRO, FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
-PERIOD_S = 0.01  #: s, sample time of the resulting log
 HOLD_S = 0.25  #: s for which the last value of a signal is repeated; after that the sample is NaN
 Signal = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)
 
@@ -26,10 +26,10 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> Fl
     begin, end = min(t[0] for t in imu_times), max(t[-1] for t in imu_times)
     if not 0.0 <= end - begin < 86400.0:
         raise AirTouchError(f"{meta['source']}: its clock spans {end - begin:.0f} s; this is no flight")
-    clock = np.arange(begin, end + 0.5 * PERIOD_S, PERIOD_S)
+    clock = np.arange(begin, end + 0.5 * SAMPLE_PERIOD_S, SAMPLE_PERIOD_S)
     columns = {"t_s": clock - begin}
     for name, (times, values) in signals.items():
-        fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * PERIOD_S if len(times) > 1 else False
+        fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * SAMPLE_PERIOD_S if len(times) > 1 else False
         columns[name] = _averaged(times, values, clock) if fast else _repeated(times, values, clock)
     return FlightLog(columns, {"condition": "", "warnings": [], **meta})
 
@@ -43,7 +43,7 @@ def _sorted(times: np.ndarray, values: np.ndarray) -> Signal:
 
 def _averaged(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """Mean of the values within half a period of each tick, (m,); the last value before it where there are none."""
-    tick = np.floor((times - clock[0]) / PERIOD_S + 0.5).astype(int)
+    tick = np.floor((times - clock[0]) / SAMPLE_PERIOD_S + 0.5).astype(int)
     usable = (tick >= 0) & (tick < len(clock)) & np.isfinite(values)
     count = np.bincount(tick[usable], minlength=len(clock))
     total = np.bincount(tick[usable], values[usable], minlength=len(clock))

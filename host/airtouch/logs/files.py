@@ -16,7 +16,7 @@ from airtouch.logs.table import Sheet, names_of, sheet
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the files in a folder that count as flights
-MANIFEST = "manifest.csv"
+MANIFEST = "manifest.csv"  #: of a folder: one row a flight, with the condition in which it was flown
 
 
 def read(path: str | Path) -> FlightLog:
@@ -56,9 +56,16 @@ def load_text(path: str | Path) -> bytes:
     return _text(load_bytes(path), str(path))
 
 
-def in_folder(folder: Path) -> list[Path]:
-    """The flight logs of a folder by the ending of their names, in order, without its manifest."""
-    return [p for p in sorted(folder.iterdir()) if p.name.endswith(ENDINGS) and p.name != MANIFEST]
+def in_folder(folder: Path, below: bool = False) -> list[Path]:
+    """The flight logs of a folder by the ending of their names, in order, without its manifest.
+
+    below: those of the folders in it too. Raises AirTouchError for a folder that cannot be listed.
+    """
+    try:
+        inside = sorted(folder.rglob("*") if below else folder.iterdir())
+    except OSError as error:
+        raise AirTouchError(f"{folder}: cannot be listed: {error.strerror}; check its rights") from None
+    return [p for p in inside if p.name.endswith(ENDINGS) and p.name != MANIFEST and p.is_file()]
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:

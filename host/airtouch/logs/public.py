@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import load_bytes, make_folder
+from airtouch.logs.files import MANIFEST, load_bytes, make_folder
 
 REPOSITORY = "ChenyuZhaoTHU/crazyflie_filter_constant"
 COMMIT = "b4c403e620fbce96d1539665b2fb342955ccf9ee"
@@ -46,7 +46,7 @@ def fetch(
         states[state].append(row["file"])
         if progress:
             progress(row["file"], state)
-    _write_manifest(out / "manifest.csv", set(states["present"] + states["new"]))
+    _write_manifest(out / MANIFEST, set(states["present"] + states["new"]))
     return states
 
 

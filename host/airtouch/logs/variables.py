@@ -22,8 +22,8 @@ from airtouch.logs.flight_log import (
     RPM,
     VELOCITY,
 )
-from airtouch.logs.formats.authors import GRAVITY, GYRO_LSB, range_m
 from airtouch.logs.quaternion import decompress, euler, rotation, to_body
+from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
 
 _DEGREE = np.pi / 180.0
 _MOTORS = (1, 2, 3, 4)

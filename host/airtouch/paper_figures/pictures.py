@@ -8,7 +8,8 @@ import numpy as np
 
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import hit_curve
-from airtouch.report.figures import COLOURS, MUTED, STYLE
+from airtouch.report.figures import COLOURS
+from airtouch.report.style import GREY, STYLE
 
 PAPER = "#444444"  #: colour of the paper's figures in every plot
 WIDTH_IN, HEIGHT_IN = 6.4, 3.8
@@ -33,7 +34,7 @@ def render(draw: Any) -> tuple[bytes, bytes]:
 
 def colour(name: str) -> str:
     """A detector's colour."""
-    return COLOURS.get(name.split(",")[0], MUTED)
+    return COLOURS.get(name.split(",")[0], GREY)
 
 
 def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper_m: float) -> None:
@@ -45,7 +46,7 @@ def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper
         axes.plot(edges, [np.nan if v is None else v for v in values], ".", ms=4, color=colour(name), alpha=0.8,
                   label=name)
         axes.plot(edges[missed], np.full(missed.sum(), -0.50 - 0.04 * row), "|", ms=5, color=colour(name))
-    axes.axhline(0.0, color=MUTED, lw=0.6)
+    axes.axhline(0.0, color=GREY, lw=0.6)
     axes.set(xlabel="edge (ticks below: missed)", ylabel="error, m (positive: early)", ylim=(-0.6, 0.55))
     axes.legend(fontsize=7, frameon=False, ncols=len(errors) + 1, loc="upper left")
 

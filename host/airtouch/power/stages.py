@@ -10,6 +10,7 @@ from pathlib import Path
 
 from airtouch.detector.best.recipe import STRIDE
 from airtouch.errors import AirTouchError
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.power.ina219 import Power, added
 
 #: stage -> the paper's figure, mW (Table 1), in the order in which stages are switched on
@@ -18,7 +19,6 @@ PAPER_TOTAL_MW = 121.0  #: mW, the total of Table 1
 NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Components Feature Extraction",
          "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
          "network": "Physical Knowledge-aided Network"}
-STEP_HZ = 100.0  #: steps of the detector a second
 #: folder of the instruction counts; only in a checkout
 BUDGETS = Path(__file__).resolve().parents[3] / "tests" / "emulation"
 
@@ -28,7 +28,7 @@ def table(stages: dict[str, Power]) -> str:
     lines = [f"{'':44} {'measured, mW':>22} {'a step, uJ':>11} {'paper, mW':>10} {'n, s':>14}"]
     for name, (mw, half) in added(stages).items():
         interval = f"{mw:8.1f} [{mw - half:.1f}, {mw + half:.1f}]" if math.isfinite(half) else f"{mw:8.1f}"
-        a_step = "" if name == "baseline" else f"{1e3 * mw / STEP_HZ:.0f}"
+        a_step = "" if name == "baseline" else f"{1e3 * mw / SAMPLE_RATE_HZ:.0f}"
         paper = f"{PAPER_MW[name]:.0f}" if name in PAPER_MW else ""
         s = stages[name]
         lines.append(f"{NAMES.get(name, name):44} {interval:>22} {a_step:>11} {paper:>10} "
@@ -68,7 +68,7 @@ class Estimate:
 
 def stm32_mw(instructions: float) -> tuple[float, float]:
     """Power at the battery, low and high in mW, of this many instructions per step at 100 steps a second."""
-    low, high = (1e3 * instructions * STEP_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
+    low, high = (1e3 * instructions * SAMPLE_RATE_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
                  for cpi, ma in zip(STM32_CPI, STM32_MA, strict=True))
     return low, high
 
@@ -95,7 +95,7 @@ def gap8_mw(network: dict) -> Estimate:
     except (KeyError, TypeError, ValueError):
         raise AirTouchError("the GAP8's budget has no instructions and cycles of a network; count again with "
                             "python tools/gap8_figures.py --counts") from None
-    low, high = sorted(1e3 * n * STEP_HZ * GAP8_J for n in (min(cycles, count), count))
+    low, high = sorted(1e3 * n * SAMPLE_RATE_HZ * GAP8_J for n in (min(cycles, count), count))
     return Estimate(low, high, count)
 
 

@@ -17,7 +17,7 @@ def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)
     Mantissas are multiplied and exponents added, so no intermediate overflows;
     results saturate at the largest float32. NaN where a power is NaN; negative
     powers count as zero. Raises AirTouchError when groups and columns disagree.
-    Source: equation (6), |P_ccs| = sqrt(|G_x1x1| ... |G_xnxn|).
+    Source: equation (7), |P_ccs| = sqrt(|G_x1x1| ... |G_xnxn|).
     """
     power = np.asarray(power, dtype=np.float64)
     groups = tuple(int(g) for g in groups)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.reference.finite import ACC_LIMIT, AXIS_LIMIT, PWM_MAX, hold_finite
+from airtouch.reference.finite import ACC_CLAMP, AXIS_LIMIT, PWM_MAX, hold_finite
 from airtouch.vehicle import Vehicle
 
 VOLTAGE_RANGE = np.float32(0.1), np.float32(1000.0)  #: what can be a battery's voltage, V
@@ -32,7 +32,7 @@ def disturbance_force(
     if acc_world.shape != (n, 3) or pwm.shape != (n, 4):
         raise AirTouchError(f"disturbance force: needs (n, 3) accelerations and (n, 4) PWM, "
                             f"not {acc_world.shape} and {pwm.shape}")
-    acc = hold_finite(acc_world, limit=ACC_LIMIT)[0]
+    acc = hold_finite(acc_world, limit=ACC_CLAMP)[0]
     thrust = total_thrust(pwm, vehicle, vbat_v)
     axis = np.array([0.0, 0.0, 1.0])
     if thrust_axis is not None:

@@ -11,7 +11,7 @@ from airtouch.reference.band_power import band_bins, band_power, window_ends
 from airtouch.reference.cross_spectrum import cascaded_cross_spectrum
 from airtouch.reference.disturbance_force import disturbance_force, force_norm
 from airtouch.reference.feature_window import deviation_from_mean
-from airtouch.reference.finite import ACC_LIMIT, FLOAT32_MAX, PWM_MAX, RATE_LIMIT, hold_finite
+from airtouch.reference.finite import ACC_CLAMP, FLOAT32_MAX, PWM_MAX, RATE_CLAMP, hold_finite
 from airtouch.reference.fr_cfar import fr_cfar
 from airtouch.vehicle import Vehicle
 
@@ -84,7 +84,7 @@ def edge_pipeline(
     """
     p = config.parameters
     raw = np.column_stack(check_signals(acc_world, gyro, pwm))
-    acc, rate = hold_finite(raw[:, :3], limit=ACC_LIMIT)[0], hold_finite(raw[:, 3:6], limit=RATE_LIMIT)[0]
+    acc, rate = hold_finite(raw[:, :3], limit=ACC_CLAMP)[0], hold_finite(raw[:, 3:6], limit=RATE_CLAMP)[0]
     motors = np.clip(hold_finite(raw[:, 6:])[0], 0.0, PWM_MAX)
     n = len(raw)
     channels = np.column_stack([acc, rate, motors[:, 1:] - motors[:, :1]])

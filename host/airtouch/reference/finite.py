@@ -4,9 +4,10 @@ import numpy as np
 
 #: Samples are clamped to this magnitude, so that no square or product of powers overflows float32.
 SAMPLE_LIMIT = float(np.float32(1e15))
-#: Channels of known unit are clamped to the sensor's full scale: the filters would remember a larger spike for 30 s.
-ACC_LIMIT = 240.0  #: m/s^2, full scale of the IMU: 24 g
-RATE_LIMIT = 40.0  #: rad/s, full scale of the IMU: 2000 degrees/s
+#: Channels of known unit are clamped just above the sensor's full scale: the filters would remember a larger spike for
+#: 30 s.
+ACC_CLAMP = 240.0  #: m/s^2; full scale of the IMU is 24 g, 235 m/s^2
+RATE_CLAMP = 40.0  #: rad/s; full scale of the IMU is 2000 degrees/s, 34.9 rad/s
 PWM_MAX = 65535.0
 AXIS_LIMIT = 1.0  #: of a unit vector's components
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)  #: FLT_MIN in C, the smallest normal float32

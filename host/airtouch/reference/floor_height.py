@@ -6,7 +6,8 @@ reading changed by beyond the vertical velocity is the floor's. See firmware/app
 
 import math
 
-#: floor_height.h says what each is and why.
+#: _M in metres, _MS in milliseconds, _MPS in m/s, shares and cosines without unit; floor_height.h says what each is
+#: and why.
 STEP_M, TILT_SHARE, TILT_COSINE, BEAM_COSINE = 0.06, 0.5, 0.87, 0.1
 GAP_MS, TRUST_M, HOME_M, FADE_MPS, MOST_M, FLOW_NEAREST_M = 150, 0.15, 0.08, 0.05, 2.5, 0.08
 

@@ -5,13 +5,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
-from airtouch.reference.finite import FLOAT32_MAX, FLOAT32_MIN
+from airtouch.reference.finite import FLOAT32_MIN, hold_finite
 
 POWER_LIMIT = float(np.float32(1e30))  #: cells are clamped to this, the square of SAMPLE_LIMIT
 
 
 def threshold_factor(leading_window: int, p_fa: float) -> float:
-    """alpha = N (P_FA^(-1/N) - 1), equation (7): exact for exponentially distributed noise."""
+    """alpha = N (P_FA^(-1/N) - 1), equation (8): exact for exponentially distributed noise."""
     return float(leading_window * np.expm1(-np.log(p_fa) / leading_window))
 
 
@@ -46,12 +46,7 @@ def fr_cfar(
 
 def hold_power(power: np.ndarray) -> np.ndarray:
     """Cells (n,) with gaps filled by the last finite cell (0 before the first), clamped to 0..POWER_LIMIT."""
-    power = np.asarray(power, dtype=np.float64)
-    finite = np.abs(power) <= FLOAT32_MAX
-    if finite.all():
-        return np.clip(power, 0.0, POWER_LIMIT)
-    last = np.maximum.accumulate(np.where(finite, np.arange(len(power)), -1))
-    return np.where(last >= 0, np.clip(power[np.maximum(last, 0)], 0.0, POWER_LIMIT), 0.0)
+    return np.clip(hold_finite(power, limit=POWER_LIMIT)[0], 0.0, POWER_LIMIT)
 
 
 def check_settings(guard_cells: int, leading_window: int, p_fa: float) -> None:

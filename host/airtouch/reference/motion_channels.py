@@ -6,7 +6,8 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
-from airtouch.reference.finite import ACC_LIMIT, PWM_MAX, RATE_LIMIT, hold_finite
+from airtouch.parameters import DEFAULT
+from airtouch.reference.finite import ACC_CLAMP, PWM_MAX, RATE_CLAMP, hold_finite
 from airtouch.vehicle import Vehicle
 
 ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"  #: the sensors
@@ -55,7 +56,7 @@ class MotionConfig:
 
     scale: tuple[float, ...] = tuple(channel.swing for channel in CHANNEL_TABLE)
     limit: float = 4.0
-    arm_pwm: float = 15000.0
+    arm_pwm: float = DEFAULT.arm_pwm
     slow_samples: float = 300.0
     lag_samples: float = 6.0
     settle_samples: int = 100
@@ -80,7 +81,7 @@ def motion_channels(
     if (acc.shape, rate.shape, motors.shape) != ((n, 3), (n, 3), (n, 4)):
         raise AirTouchError(f"motion channels: needs (n, 3), (n, 3) and (n, 4), "
                             f"not {acc.shape}, {rate.shape} and {motors.shape}")
-    acc, rate = hold_finite(acc, limit=ACC_LIMIT)[0], hold_finite(rate, limit=RATE_LIMIT)[0]
+    acc, rate = hold_finite(acc, limit=ACC_CLAMP)[0], hold_finite(rate, limit=RATE_CLAMP)[0]
     m1, m2, m3, m4 = np.clip(hold_finite(motors)[0], 0.0, PWM_MAX).T
     mixed = np.column_stack([m3 + m4 - m1 - m2, m1 + m4 - m2 - m3, m1 + m3 - m2 - m4, (m1 + m2 + m3 + m4) / 4])
     thrust = config.vehicle.thrust(np.column_stack([m1, m2, m3, m4])).sum(axis=1)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from airtouch.report.figures import FOUND, MUTED, png, style
+from airtouch.report.style import BLUE, GREY, png, style
 
 Rows = list[tuple[str, str, str, str]]
 
@@ -80,11 +80,11 @@ def picture(score: Mapping[str, Any]) -> bytes:
         points = score["reliability"]
         p, share = (np.array([b[k] for b in points], float) for k in ("probability", "value"))
         bars = np.maximum([share - [b["low"] for b in points], [b["high"] for b in points] - share], 0.0)
-        right.plot([0, 1], [0, 1], color=MUTED, lw=0.8)
-        right.errorbar(p, share, bars, fmt="o", color=FOUND, ms=4, lw=1)
+        right.plot([0, 1], [0, 1], color=GREY, lw=0.8)
+        right.errorbar(p, share, bars, fmt="o", color=BLUE, ms=4, lw=1)
         for b in points:
             right.annotate(f"{b['n']}", (b["probability"], b["value"]), xytext=(5, -9), textcoords="offset points",
-                           fontsize=7, color=MUTED)
+                           fontsize=7, color=GREY)
         right.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="probability of the first answer",
                   ylabel="share that was right, 95 % interval")
         right.set_title("reliability (numbers: flights)", loc="left")

@@ -1,37 +1,27 @@
 """Plots of flights and scores, each as the bytes of a PNG."""
 
-import io
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.evaluation.score_report import HitCurve, Reliability
 from airtouch.detector.shared.channels import NAMES
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
 
-TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
 #: detector -> its colour in every plot
-COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
+COLOURS = {"best": BLUE, "paper": RED, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
 KINDS = {"entry": "v", "exit": "^", "edge": "o"}
-STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
 
 
 def colour_of(name: str) -> str:
     """The colour of a detector; that of `best` for one that is not in COLOURS."""
-    return COLOURS.get(name, FOUND)
-
-
-def png(figure: Figure) -> bytes:
-    """The figure as a PNG with 120 dots per inch."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=120)
-    return buffer.getvalue()
+    return COLOURS.get(name, BLUE)
 
 
 def flight(
@@ -56,7 +46,7 @@ def flight(
         for ax, pane in zip(axes, panes, strict=True):
             pane(ax, t, log, trace, {name: trace, **others})
             for edge in edges or ():
-                ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=TRUE, lw=1.2, ls="--", alpha=0.8)
+                ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=GREEN, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
         axes[-1].set_xlabel("time, s (dashed green: true edges, from the down range)")
         return png(figure)
@@ -67,7 +57,7 @@ def reliability(curves: Mapping[str, Reliability]) -> bytes:
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
-        ax.plot([0, 1], [0, 1], color=MUTED, lw=1, ls="--", label="perfect")
+        ax.plot([0, 1], [0, 1], color=GREY, lw=1, ls="--", label="perfect")
         for name, curve in curves.items():
             if len(curve.stated):
                 ax.plot(curve.stated, curve.truly, color=colour_of(name), lw=1, alpha=0.6)
@@ -150,7 +140,7 @@ def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> N
     power = np.maximum(trace.signals["cfar_power"].astype(float), 1e-12)
     ax.semilogy(t, power, lw=0.6, label="tested")
     threshold = np.maximum(trace.signals["threshold"].astype(float), 1e-12)
-    ax.semilogy(t, threshold, lw=0.9, color=OTHER, label="threshold T")
+    ax.semilogy(t, threshold, lw=0.9, color=RED, label="threshold T")
     alert = trace.signals["alert"].astype(bool)
     ax.plot(t[alert], power[alert], ".", ms=5, color="black", label="alert")
     ax.set_ylim(max(float(np.nanpercentile(power, 5)), 1e-10), None)
@@ -159,21 +149,13 @@ def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> N
 
 
 def _range(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    ax.plot(t, log["zrange_m"], color=TRUE, lw=0.9)
+    ax.plot(t, log["zrange_m"], color=GREEN, lw=0.9)
     ax.set_ylabel("down range\nm (truth)", fontsize=8)
 
 
 def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
-    """Set the label, and limits from the middle 99 % of the values, so that a hard landing does not set the scale."""
-    low, high = np.nanpercentile(values, [0.5, 99.5])
-    pad = 0.15 * max(high - low, 1e-9)
-    ax.set_ylim(low - pad, high + pad)
+    """Set the label and the limits."""
+    limit(ax, values)
     ax.set_ylabel(label, fontsize=8)
     if legend:
         ax.legend(loc="upper left", ncols=3, fontsize=6, frameon=False)
-
-
-def style():
-    import matplotlib
-
-    return matplotlib.rc_context(STYLE)

@@ -1,6 +1,5 @@
 """Plots of the gap without and with the named effects in the model, each as the bytes of a PNG."""
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,11 +11,13 @@ from matplotlib.ticker import NullFormatter
 from airtouch.gap.answer.pictures import Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
-from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE
+from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
 
-BEFORE, AFTER, FLOOR = OTHER, TRUE, MUTED
-STYLE = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10,
-         "legend.frameon": False, "legend.fontsize": 9}
+BEFORE, AFTER, FLOOR = RED, GREEN, GREY
+#: changes of the style of plots that are read on a phone
+PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
+PHONE_DPI = 170  #: dots per inch, sharp there
+SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: of the axis of a signal: `style.limit`
 WIDTH_IN = 4.4  #: inch, width of a plot; readable on a phone
 BELOW_IN, RIGHT_IN = 0.5, 0.15  #: inch, room below the lowest pane and to the right of all
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
@@ -25,7 +26,7 @@ PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "
 def signals(signal: Signal) -> bytes:
     """PNG of one channel of one flight up to the band's upper end: measured, modelled, and below their difference."""
     rows = 1 if signal.measured is None else 2
-    with style():
+    with style(PHONE):
         figure, axes = _panes(rows, 1.6, left_in=0.85, above_in=0.35)
         if signal.measured is not None:
             axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
@@ -34,24 +35,24 @@ def signals(signal: Signal) -> bytes:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
                              label="model with effect")
             axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{signal.unit}")
-            _robust(axes[0], signal.measured, signal.measured - signal.before)
+            limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
         axes[-1].axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
         axes[-1].plot(signal.time_s, signal.before, color=BEFORE, lw=1.0, label="gap before")
         if signal.after is not None:
             axes[-1].plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
         axes[-1].set(ylabel=f"measured - model\n{signal.unit}", xlabel="time, s")
-        _robust(axes[-1], signal.before, np.array([-signal.floor, signal.floor]))
+        limit(axes[-1], signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.5)
-        return _png(figure)
+        return png(figure, PHONE_DPI)
 
 
 def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     """PNG of the gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
     rows = len(shown)
-    with style():
+    with style(PHONE):
         figure, axes = _panes(rows, 1.35, legend_in=0.25)
         for ax, some in zip(axes, shown, strict=True):
             for key, colour, width in (("floor", FLOOR, 1.6), ("before", BEFORE, 1.3), ("after", AFTER, 1.3)):
@@ -63,7 +64,7 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
-        return _png(figure)
+        return png(figure, PHONE_DPI)
 
 
 def commands(curves: Mapping[str, Any]) -> bytes:
@@ -73,18 +74,18 @@ def commands(curves: Mapping[str, Any]) -> bytes:
     """
     f = np.array(curves["frequency_hz"])
     axes_named = [k for k in curves if isinstance(curves[k], Mapping)]
-    with style():
+    with style(PHONE):
         figure, axes = _panes(len(axes_named), 1.2, legend_in=0.25)
         for ax, name in zip(axes, axes_named, strict=True):
             if "nominal" in curves[name]:
                 ax.loglog(f, curves[name]["nominal"], color=FLOOR, lw=1.6, label="baseline flights")
-            ax.loglog(f, curves[name]["flown"], color=FOUND, lw=1.2, label="these flights")
+            ax.loglog(f, curves[name]["flown"], color=BLUE, lw=1.2, label="these flights")
             ax.set_title(f"{name} command", loc="left")
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
         _frequency_axis(axes, (2, 5, 10, 20, 40))
-        return _png(figure)
+        return png(figure, PHONE_DPI)
 
 
 def _panes(rows: int, pane_in: float, *, left_in: float = 0.75, above_in: float = 0.3, legend_in: float = 0.0,
@@ -98,13 +99,6 @@ def _panes(rows: int, pane_in: float, *, left_in: float = 0.75, above_in: float 
     grid = {"left": left_in / WIDTH_IN, "right": 1.0 - RIGHT_IN / WIDTH_IN, "bottom": BELOW_IN / height_in,
             "top": 1.0 - (above_in + legend_in) / height_in, "hspace": above_in / pane_in}
     return figure, figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
-
-
-def _png(figure: Figure) -> bytes:
-    """The figure as a PNG with 170 dots per inch, sharp on a phone."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=170)
-    return buffer.getvalue()
 
 
 def _legend(figure: Figure, ax: Axes) -> None:
@@ -130,20 +124,4 @@ def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
             ax.axvspan(time_s[a], time_s[b], color=PHASE_COLOURS[kind], lw=0, zorder=0)
             if b - a > 0.15 * len(phase):
                 ax.text((time_s[a] + time_s[b]) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
-                        va="top", fontsize=8, color=MUTED)
-
-
-def _robust(ax: Axes, *values: np.ndarray) -> None:
-    """Set limits from the middle 99 % of the values, so that take-off and landing do not set the scale."""
-    joined = np.concatenate([np.ravel(v) for v in values])
-    joined = joined[np.isfinite(joined)]
-    if len(joined):
-        low, high = np.percentile(joined, [0.5, 99.5])
-        pad = 0.2 * max(high - low, 1e-6)
-        ax.set_ylim(low - pad, high + pad)
-
-
-def style():
-    import matplotlib
-
-    return matplotlib.rc_context(STYLE)
+                        va="top", fontsize=8, color=GREY)

@@ -8,10 +8,10 @@ from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
 from airtouch.detector.evaluation.edge_map import EdgeMap
-from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
 
 STRIP_M = 0.3  #: m, drawn width of a platform that was crossed once; its true width is unknown
-COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
+COLOURS = {"entry": BLUE, "exit": RED, "edge": GREEN}
 
 
 def edge_map(plane: EdgeMap, title: str) -> bytes:
@@ -27,24 +27,24 @@ def figure_of(plane: EdgeMap, title: str) -> Figure:
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
         ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
-        ax.plot(*xy.T, color=MUTED, lw=0.9, label="track")
+        ax.plot(*xy.T, color=GREY, lw=0.9, label="track")
         _ends(ax, xy)
         for platform in plane.platforms:
             ends = (platform.near_side, platform.far_side)
             if platform.outline is None and all(isinstance(end, Point) for end in ends):
                 strip = _strip(*(np.array(end.coords[0]) for end in ends))
-                ax.add_patch(PolygonPatch(strip, facecolor=TRUE, alpha=0.12, lw=0,
+                ax.add_patch(PolygonPatch(strip, facecolor=GREEN, alpha=0.12, lw=0,
                                           label="platform (its width is not known)"))
             elif platform.outline is not None:
-                ax.add_patch(patch_from_polygon(platform.outline, facecolor=TRUE, alpha=0.12, lw=0, label="platform"))
+                ax.add_patch(patch_from_polygon(platform.outline, facecolor=GREEN, alpha=0.12, lw=0, label="platform"))
             if platform.outline is not None:
                 ring = np.array(platform.outline.exterior.coords)
                 band = platform.outline.boundary.buffer(2 * platform.sigma_m)
-                ax.add_patch(patch_from_polygon(band, facecolor=TRUE, alpha=0.15, lw=0))
-                ax.plot(*ring.T, color=TRUE, lw=1.6, label="outline")
+                ax.add_patch(patch_from_polygon(band, facecolor=GREEN, alpha=0.15, lw=0))
+                ax.plot(*ring.T, color=GREEN, lw=1.6, label="outline")
             for line in (platform.near_side, platform.far_side):
                 if isinstance(line, LineString):
-                    ax.plot(*np.array(line.coords).T, color=TRUE, lw=0.8, ls=":")
+                    ax.plot(*np.array(line.coords).T, color=GREEN, lw=0.8, ls=":")
         for point in points:
             along = _direction(xy, point.sample) * 2 * point.sigma_m
             ends = np.array([[point.x_m, point.y_m]]) + np.outer([-1, 1], along)

@@ -3,13 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from airtouch.report.figures import FOUND, MUTED, TRUE, png, style
+from airtouch.parameters import SAMPLE_RATE_HZ
+from airtouch.report.style import BLUE, GREEN, GREY, png, style
 from airtouch.twin.comparison.curves import AFTER, BEFORE, AroundEdges, Signals
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import NAMES, RATE_HZ, UNITS
+from airtouch.twin.recorded.channels import NAMES, UNITS
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES
 
-REAL, TWIN = TRUE, FOUND
+REAL, TWIN = GREEN, BLUE
 
 
 def overlaid(pair: tuple[Signals, Signals]) -> bytes:
@@ -21,7 +22,7 @@ def overlaid(pair: tuple[Signals, Signals]) -> bytes:
             for one, colour, label in zip(pair, (REAL, TWIN), ("recorded", "simulated"), strict=True):
                 axis.plot(one.time_s, one.channels[:, k], color=colour, lw=0.7, label=label)
             axis.set_title(f"{NAMES[k]}, {UNITS[k]}", loc="left")
-            axis.axvline(0.0, color=MUTED, lw=0.6)
+            axis.axvline(0.0, color=GREY, lw=0.6)
         axes[0, 0].legend(frameon=False)
         for axis in axes[-1]:
             axis.set_xlabel("s after the entry")
@@ -33,7 +34,7 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
 
     Lines are medians over flights, bands reach from the first to the third quartile.
     """
-    time = (np.arange(BEFORE + AFTER) - BEFORE) / RATE_HZ
+    time = (np.arange(BEFORE + AFTER) - BEFORE) / SAMPLE_RATE_HZ
     with style():
         figure = Figure(figsize=(7.2, 15.0), layout="constrained")
         axes = figure.subplots(12, 2, sharex=True, sharey="row")
@@ -44,7 +45,7 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
                     axis = axes[k, column]
                     axis.plot(time, middle[:, k], color=colour, lw=1.0, label=f"{label}, {one.flights} flights")
                     axis.fill_between(time, low[:, k], high[:, k], color=colour, alpha=0.15, lw=0)
-                    axis.axvline(0.0, color=MUTED, lw=0.6)
+                    axis.axvline(0.0, color=GREY, lw=0.6)
                     axis.set_title(f"{kind}: {NAMES[k]}, {UNITS[k]}", loc="left")
         axes[0, 0].legend(frameon=False)
         for axis in axes[-1]:

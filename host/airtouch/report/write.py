@@ -12,6 +12,7 @@ from airtouch import __version__
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import ScoreReport
 from airtouch.logs.files import write_bytes
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.report.columns import COLUMNS, cell
 
 
@@ -70,11 +71,11 @@ def in_words(score: FlightScore) -> str:
     parts = []
     for edge in score.edges:
         if edge.error_s is None:
-            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s missed")
+            parts.append(f"{edge.kind} at {edge.true_sample / SAMPLE_RATE_HZ:.2f} s missed")
         else:
             metres = "" if edge.error_m is None else f" ({abs(edge.error_m):.3f} m)"
             side = "early" if edge.error_s > 0 else "late"
-            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s found "
+            parts.append(f"{edge.kind} at {edge.true_sample / SAMPLE_RATE_HZ:.2f} s found "
                          f"{abs(edge.error_s):.2f} s {side}{metres}")
     false = score.note if score.false is None else f"{len(score.false)} false edges"
     return "; ".join([*parts, false]) + "."

@@ -30,7 +30,7 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     Raises AirTouchError for bad input before the first flight.
     """
     scene = scenario if isinstance(scenario, Scenario) else scenarios.load(scenario)
-    craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or "crazyflie-2.1-flow")
+    craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
     numbers = range(count) if isinstance(count, int) else count
     workers = workers or available_cores()
     if workers < 1:

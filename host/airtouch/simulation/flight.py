@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.simulation import effects as registry
 from airtouch.simulation import loop
 from airtouch.simulation.effects import Active
@@ -80,10 +81,10 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     stepper.begin(plan.setpoints[0])
     ending, rows = stepper.fly(plan.setpoints, table)
     if ending != loop.OK:
-        return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
+        return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / SAMPLE_RATE_HZ)
     climb = plan.setpoints[:, setpoint.Z].max() - plan.setpoints[0, setpoint.Z]
     if np.ptp(table[:, log_row.POSITION + 2]) < 0.5 * climb:
-        return Diverged(name, seed, flight, "it did not take off", len(table) / 100.0)
+        return Diverged(name, seed, flight, "it did not take off", len(table) / SAMPLE_RATE_HZ)
     rng = np.random.default_rng([seed, flight, 7])
     table = received(table, *radio, rng)
     rounded(table, PER_UNIT)

@@ -80,9 +80,9 @@ def parse(text: str, source: str) -> Scenario:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise AirTouchError(f"{source}: not valid TOML: {error}") from None
-    unknown = sorted(set(table) - KEYS)
-    if unknown:
-        raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(sorted(KEYS))}")
+    unknown_keys = sorted(set(table) - KEYS)
+    if unknown_keys:
+        raise AirTouchError(f"{source}: unknown key {', '.join(unknown_keys)}; known: {', '.join(sorted(KEYS))}")
     for key in FIRMWARE_KEYS:
         if not isinstance(table.get(key, ""), str):
             raise AirTouchError(f"{source}: {key} must be a text in quotes")

@@ -1,8 +1,8 @@
 """Selection of the set-point: high-level planner, low-level packets, or watchdog.
 
 As in crazyflie-firmware 2026.08 (commander.c, crtp_commander_generic.c, crtp_commander_rpyt.c, supervisor.c).
-A set-point is a row of the simulator (simulation.setpoint): mode, position, velocity, yaw and motors. Rates in
-packets (yaw rate, climb rate) are integrated row by row.
+A set-point is a row of the simulator (`simulation.firmware.setpoint`): mode, position, velocity, yaw and motors. Rates
+in packets (yaw rate, climb rate) are integrated row by row.
 """
 
 import math

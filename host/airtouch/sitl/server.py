@@ -52,7 +52,7 @@ class Server:
         if not 0.0 < speed <= 100.0:
             raise AirTouchError("speed must be above 0 and at most 100")
         scene = scenario if isinstance(scenario, scenarios.Scenario) else scenarios.load(scenario)
-        craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or "crazyflie-2.1-flow")
+        craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
         self.faults = [fault if isinstance(fault, Fault) else parse(fault) for fault in faults]
         self.plan = scenarios.draw_flight(scene, seed, flight)
         active = choose(self.plan, effects, without)

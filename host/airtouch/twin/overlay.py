@@ -18,6 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.reference.finite import PWM_MAX, hold_finite
 from airtouch.simulation import flight, scenario
 from airtouch.simulation.flight import Diverged
@@ -28,7 +29,7 @@ from airtouch.vehicle import Vehicle
 
 #: columns of a response and of an added flight
 COLUMNS = (*ACC_WORLD, *GYRO, *PWM)
-RATE_HZ = 100  #: Hz, of the flights that go in and come out
+RATE_HZ = round(SAMPLE_RATE_HZ)  #: Hz, of the flights that go in and come out
 MAX_TRIES = 3  #: flights simulated for each one returned, at most; the others diverged. No source: round number
 #: s of a response: before the entry, after the exit, fade-out at its end; no source: round numbers, past the 0.1 s by
 #: which the down range sees an edge early and the swing of the height loop after it
@@ -193,7 +194,7 @@ def flights(air: Sequence[FreeAir], responses: Sequence[Response],
             rows = slice(place - entry, min(place - entry + len(response.values), len(values)))
             values[rows] += response.values[:rows.stop - rows.start]
         values[:, -len(PWM):] = np.clip(values[:, -len(PWM):], 0.0, PWM_MAX)
-        columns = dict(zip(COLUMNS, values.T, strict=True)) | {"time_s": np.arange(len(values)) / RATE_HZ}
+        columns = dict(zip(COLUMNS, values.T, strict=True)) | {"t_s": np.arange(len(values)) / RATE_HZ}
         out.append(FlightLog(columns, {"source": f"overlay_{seed}_{number:06d}", "sample_period_s": 1.0 / RATE_HZ}))
         labels.append([replace(e, sample=place - entry + e.sample) for e in response.edges] if has_platform else [])
     return out, labels

@@ -9,8 +9,9 @@ import numpy as np
 from airtouch.detector import registry
 from airtouch.detector.evaluation import tuning
 from airtouch.detector.evaluation.data.dataset import Condition
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
+from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.trace import Detection
+from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.vision import lines
 from airtouch.vision.camera import Camera
 from airtouch.vision.crossings import Film, Sight, detections, frames, sight

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.trace import Detection
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.quaternion import rotation
+from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.simulation import scenario
 from airtouch.vision import scene as scenes
 from airtouch.vision.camera import Camera, expose, exposure_s

@@ -87,3 +87,22 @@ def test_geojson_can_be_read_back():
     assert overlap(outline, SHAPES["L"]) > 0.85
     assert {f["properties"]["role"] for f in features} >= {"edge", "outline", "rectangle", "near side"}
     assert isinstance(shapes[0], Point) and any(isinstance(s, LineString) for s in shapes)
+
+
+@pytest.mark.parametrize("rate_hz", [50, 100, 200])
+@pytest.mark.parametrize("stated", [True, False], ids=["period stated", "period of the clock"])
+def test_uncertainty_and_times_hold_at_any_rate_of_the_log(rate_hz, stated):
+    """A log's own sample period counts: at 50 Hz the uncertainty was once twice and a time half of what they are."""
+    times = np.arange(0, 6, 1.0 / rate_hz)
+    over = (times >= 2.0) & (times < 4.0)
+    columns = {"t_s": times, "x_m": SPEED * times, "y_m": np.zeros(len(times)), "zrange_m": np.where(over, 0.05, 0.8)}
+    columns |= {f"m{i}_pwm": np.full(len(times), 47000.0) for i in range(1, 5)}
+    log = FlightLog(columns, {"sample_period_s": 1.0 / rate_hz} if stated else {})
+    edges = edge_map.true_edges_of(log).edges
+    plane = edge_map.edge_map(log, edges, lag_s=0.5, sigma_s=0.1)
+    assert [p.time_s for p in plane.points] == pytest.approx([2.0, 4.0])
+    assert [p.x_m for p in plane.points] == pytest.approx([SPEED * 1.5, SPEED * 3.5])
+    assert [p.sigma_m for p in plane.points] == pytest.approx([0.1 * SPEED] * 2)
+    log.columns.pop("x_m")
+    plane = edge_map.edge_map(log, edges, lag_s=0.5, speed_mps=SPEED)
+    assert [p.x_m for p in plane.points] == pytest.approx([0.0, 2.0 * SPEED])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
+from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM
 from airtouch.simulation import flight, scenario
@@ -139,6 +140,12 @@ def test_packet_loss_has_its_share_and_bursts():
     assert 1 - len(out) / 100_000 == pytest.approx(0.05, rel=0.1)
     gaps = np.round(np.diff(out) / 0.01).astype(int) - 1
     assert gaps[gaps > 0].mean() == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("loss", [1.0, -0.1, float("nan")])
+def test_a_share_of_lost_rows_that_is_none_is_refused(loss):
+    with pytest.raises(AirTouchError, match="share of lost rows"):
+        radio.received(np.zeros((10, 1)), 0.0, loss, 2.0, np.random.default_rng(0))
 
 
 def test_range_residual_shifts_the_height_over_the_platform(sweep):

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.comparison import curves
 from airtouch.twin.comparison.compare import SimulatedFlight
-from airtouch.twin.recorded.channels import RATE_HZ
 from airtouch.twin.recorded.features import names
 from airtouch.twin.recorded.flights import RecordedFlights
 
@@ -51,8 +51,8 @@ def test_the_overlaid_flight_has_the_median_time_over_the_platform():
     real, fake = curves_of([flight(10 * i, i + 1) for i in range(3)], simulated).overlaid
     at = np.searchsorted(fake.time_s, 0.0)
     assert fake.channels[at, 0] == 3 and real.channels[at, 0] == 3  # the third of each, less its level
-    assert fake.time_s[0] == -curves.MARGIN / RATE_HZ
-    assert fake.time_s[-1] == pytest.approx((EXIT + 20 - ENTRY + curves.MARGIN - 1) / RATE_HZ)
+    assert fake.time_s[0] == -curves.MARGIN / SAMPLE_RATE_HZ
+    assert fake.time_s[-1] == pytest.approx((EXIT + 20 - ENTRY + curves.MARGIN - 1) / SAMPLE_RATE_HZ)
 
 
 def test_spectra_are_quartiles_over_flights():

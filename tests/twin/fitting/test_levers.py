@@ -3,6 +3,7 @@
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
 from airtouch.simulation import effects
 from airtouch.twin.fitting import levers
@@ -22,4 +23,16 @@ def test_every_bound_is_one_that_the_simulator_takes(vehicle):
         elif lever.of == levers.VEHICLE:
             assert lever.key.partition(".")[0] in {f.name for f in fields(Vehicle)}
     for end in ("low", "high"):
-        assert levers.craft(vehicle, defaults, np.array([getattr(x, end) for x in defaults]))
+        values = [getattr(x, end) for x in defaults]
+        craft, mission = levers.craft(vehicle, defaults, np.array(values)), levers.mission(defaults, values)
+        effect_table = levers.table(defaults, values, spread=False)
+        for lever, value in zip(defaults, values, strict=True):
+            if lever.of == levers.VEHICLE:
+                field, _, axis = lever.key.partition(".")
+                assert (getattr(craft, field)[int(axis)] if axis else getattr(craft, field)) == value, lever.name
+            elif lever.of == levers.MISSION:
+                assert mission[lever.key] == value, lever.name
+            elif lever.of != "trim":
+                assert effect_table[lever.of][lever.key] == pytest.approx(value, abs=1e-6), lever.name
+        trims = np.sum([np.array(levers.ROTOR_SIGNS[x.key]) * getattr(x, end) for x in defaults if x.of == "trim"], 0)
+        assert [rotor["thrust_loss"] for rotor in effect_table["weak_motor"]] == pytest.approx(list(-trims), abs=1e-6)

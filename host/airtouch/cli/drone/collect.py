@@ -12,6 +12,7 @@ import click
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
     from airtouch.crazyflie import collect
@@ -39,7 +40,7 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
               help="Number of flights; they are numbered after those in the folder.")
 @click.option("--number", type=click.IntRange(min=1),
               help="Number of the first flight, instead of the next free one.")
-@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Written into the log.")
+@click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Written into the log.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
               help="Set a parameter of the drone first.")
 @click.option("--min-battery", default=3.7, show_default=True, metavar="V",

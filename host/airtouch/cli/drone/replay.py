@@ -8,6 +8,7 @@ import click
 
 from airtouch.cli.shared import scores as table_of
 from airtouch.errors import AirTouchError
+from airtouch.parameters import SAMPLE_RATE_HZ
 
 
 @click.command("replay")
@@ -47,24 +48,24 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
         fed = replay.run(log, board, detector, speed=speed, speed_mps=file.condition.speed_mps, stop=stop,
                          show=show, on_edge=lambda edge: say(boards.edge_line(edge)))
     if fed < len(log):
-        click.echo(f"stopped after {fed / 100:.1f} of {len(log) / 100:.1f} s; no score")
+        click.echo(f"stopped after {fed / SAMPLE_RATE_HZ:.1f} of {len(log) / SAMPLE_RATE_HZ:.1f} s; no score")
         sys.exit(1)
     result = replay.result(file, log, detector)
     for edge in result.score.edges:
         click.echo(_in_words(edge))
     if result.score.false:
-        click.echo("false: " + ", ".join(f"{s / 100:.2f} s" for s in result.score.false))
+        click.echo("false: " + ", ".join(f"{s / SAMPLE_RATE_HZ:.2f} s" for s in result.score.false))
     figures = evaluate.as_json("best", [result.score], [], detector.lag_s, {})
     title = f"best: lag of {detector.lag_s:.2f} s taken off"
     table_of.print_table(table_of.console(), {"best": figures}, title)
 
 
 def _in_words(edge) -> str:
-    true = f"{edge.kind:5} at {edge.true_sample / 100:6.2f} s (down range)"
+    true = f"{edge.kind:5} at {edge.true_sample / SAMPLE_RATE_HZ:6.2f} s (down range)"
     if edge.detected_sample is None:
         return f"{true}: missed"
     metres = "" if edge.error_m is None else f" = {edge.error_m:+.3f} m"
-    report = f"said at {edge.detected_sample / 100:.2f} s"
+    report = f"said at {edge.detected_sample / SAMPLE_RATE_HZ:.2f} s"
     return f"{true}: {report}, error {edge.error_s:+.2f} s{metres} (+ is early)"
 
 

@@ -13,8 +13,6 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.rosbag import is_bag
 from airtouch.vehicle import Vehicle
 
-DEFAULT = "crazyflie-2.1-flow"
-
 
 class Flights:
     """Log files that are read as they are needed, one at a time, any number of times.
@@ -74,12 +72,7 @@ def vehicle_of(named: str | None, flights: Flights) -> Vehicle:
     if named:
         return vehicle.load(named)
     first = next(iter(flights), None)
-    name = str(first.meta.get("vehicle") or "") if first is not None else ""
-    if not name:
-        return vehicle.load(DEFAULT)
-    try:
-        return vehicle.load(name)
-    except AirTouchError:
-        click.echo(f"airtouch: the log names vehicle {name!r}, of which no file is known; {DEFAULT} is used, "
-                   "--vehicle names another", err=True)
-        return vehicle.load(DEFAULT)
+    craft, warning = vehicle.of_log(first.meta if first is not None else {})
+    if warning:
+        click.echo(f"airtouch: {warning}", err=True)
+    return craft

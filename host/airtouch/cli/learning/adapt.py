@@ -13,6 +13,7 @@ from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 MORE = 5  #: further flights whose benefit is estimated
 
@@ -24,7 +25,7 @@ MORE = 5  #: further flights whose benefit is estimated
 @click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
               help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
 @click.option("--vehicle", metavar="NAME", help="Vehicle that this fit starts from, a name or a .toml file; default "
-              "crazyflie-2.1-flow.")
+              f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
@@ -54,7 +55,6 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
-    from airtouch.detector.evaluation import summary
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.shared import sensors
     from airtouch.twin import adapt
@@ -79,16 +79,16 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
         adapted = adapt.adapt(usable, twin.scenario, twin.vehicle, work, start=start, seed=seed, hold_out=hold_out,
                               withhold=withhold_range, progress=stages, command=typed)
     adapted.model.save(out, force)
-    _say(adapted, adapt, summary, len(labelled), hold_out)
+    _say(adapted, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
 
 
 def _read(files: Sequence[Any]) -> list[Any]:
     """The flights that can be trained on; says why the others cannot. Raises AirTouchError where none can."""
-    from airtouch.twin import adapt
+    from airtouch.twin import adapt_report
 
     with Bar("reading") as bar:
-        usable, left_out = adapt.readable(files, progress=bar)
+        usable, left_out = adapt_report.readable(files, progress=bar)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     if not usable:
@@ -97,8 +97,11 @@ def _read(files: Sequence[Any]) -> list[Any]:
     return usable
 
 
-def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
+def _say(adapted: Any, labelled: int, hold_out: bool) -> None:
     """Print what to expect of the detector."""
+    from airtouch.detector.evaluation import summary
+    from airtouch.twin import adapt, adapt_report
+
     rows = {"twin only": adapted.twin_only, "held out, half of the others": adapted.held_out_half,
             "held out, all others": adapted.held_out}
     for name, scores in rows.items():
@@ -114,7 +117,7 @@ def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) 
         click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.MIN_LABELLED} are needed to say "
                    "what to expect")
         return
-    ahead = adapt.outlook(adapted, labelled, MORE)
+    ahead = adapt_report.outlook(adapted, labelled, MORE)
     if ahead:
         click.echo(f"the next {MORE} flights: {ahead['now_m']:.3f} m would become about {ahead['then_m']:.3f} m "
                    f"(from {ahead['half_m']:.3f} m with half of the flights; a guess, see the intervals)")

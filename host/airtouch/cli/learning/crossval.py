@@ -84,7 +84,7 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     show.print_table(screen, {title: result, **result["by_height"]},
                      f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}")
     if random_windows:
-        from airtouch.detector.evaluation import variants
+        from airtouch.detector.paper import variants
 
         leak = variants.random_windows(list(crossval.readable_flights(files)[0].values()), seed=seed,
                                        epochs=random_epochs)

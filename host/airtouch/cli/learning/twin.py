@@ -14,6 +14,7 @@ import click
 from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import make_folder, write_bytes
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 SUMMARY, REPORT = "twin.json", "report.html"
 
@@ -22,7 +23,7 @@ SUMMARY, REPORT = "twin.json", "report.html"
 @click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("twin"), show_default=True,
               help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
-@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True,
+@click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True,
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
               help="Commanded speed over the platform; else the manifest's, else from the logs.")

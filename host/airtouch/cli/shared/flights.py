@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import MANIFEST
 
 
 def find_flights() -> Path | None:
@@ -36,4 +37,4 @@ def need_flights(folder: Path | None = None) -> Path:
 
 
 def _inner(folder: Path) -> Path:
-    return folder / "airtouch" if (folder / "airtouch" / "manifest.csv").is_file() else folder
+    return folder / "airtouch" if (folder / "airtouch" / MANIFEST).is_file() else folder

@@ -21,7 +21,6 @@ from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
 from airtouch.detector.best.recipe import STRIDE, Recipe
 from airtouch.detector.evaluation import evaluate, tuning
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.shared import sensors, training_set
 from airtouch.detector.shared.channels import nine_channels
 from airtouch.detector.trace import Detection, Trace
@@ -31,6 +30,7 @@ from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream_detector import StreamEvents
 from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S, SAMPLE_RATE_HZ
 from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 
 #: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
@@ -237,7 +237,7 @@ def lag_s(model: BestModel | None) -> float:
 def parameters(model: BestModel | None) -> dict[str, Any]:
     """Size, cost and settings, for reports."""
     model = model or load(None)
-    return {"width": model.recipe.width, "receptive_s": model.recipe.receptive_samples / 100,
+    return {"width": model.recipe.width, "receptive_s": model.recipe.receptive_samples / SAMPLE_RATE_HZ,
             "parameter_bytes": parameter_bytes(model.int8),
             "state_bytes": arena_bytes(model.int8),
             "mac_per_sample": model.int8.multiplications / STRIDE, **asdict(model.decoder),

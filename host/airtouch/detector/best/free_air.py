@@ -5,12 +5,12 @@ from pathlib import Path
 
 from airtouch import logs
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.data import dataset
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import sample_period
+from airtouch.logs.files import in_folder
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 
 def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) -> list[FlightLog]:
@@ -22,8 +22,7 @@ def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) 
     for folder in folders:
         if not folder.is_dir():
             raise AirTouchError(f"{folder}: no such folder of free-air flights")
-        for path in sorted(p for p in folder.rglob("*")
-                           if p.name.endswith(dataset.SUFFIXES) and p.name != dataset.MANIFEST):
+        for path in in_folder(folder, below=True):
             try:
                 log = _at_100_hz(logs.read(path))
                 sensors.signals(log)

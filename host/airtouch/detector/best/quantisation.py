@@ -43,7 +43,7 @@ def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tu
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
-    """The int8 network from the arrays of each layer (`reference.stream_int8.int8_layer`)."""
+    """The int8 network from the arrays of each layer (`reference.networks.stream_int8.int8_layer`)."""
     graph = recipe.graph
     return StreamNetwork(graph, tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
                                       for layer, part in zip(graph, arrays, strict=True)))

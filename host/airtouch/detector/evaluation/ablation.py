@@ -9,7 +9,7 @@ from typing import Any
 from airtouch.detector.evaluation import crossval, evaluate, summary
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.detector.evaluation.variants import Variant
+from airtouch.detector.paper.variants import Variant
 from airtouch.detector.registry import Detector, InFloat, get
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES

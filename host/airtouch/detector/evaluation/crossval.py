@@ -41,7 +41,7 @@ def crossval(
     """(scores of all flights, one entry a fold, flights left out).
 
     Finished folds are kept in `out` and not done again for the same flights, settings and version.
-    folds: which flights are held out together (`detector.folds`), the manifest's folds if left out. options go to the
+    folds: which flights are held out together (`data.folds`), the manifest's folds if left out. options go to the
     detector's `fit`. physical_filter False chooses the decoding again without it. silenced: sensors that are taken
     from the flights that are scored; silent_training: from those trained on too. free_air: flights without edges to
     train on too. detector: one that is not registered, under the name given.

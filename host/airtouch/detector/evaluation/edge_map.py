@@ -19,19 +19,24 @@ from airtouch.detector.evaluation import evaluate
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
+from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
 TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
-PERIOD_S = 0.01  #: s, default sample time
 MIN_SPEED_MPS = 0.05  #: m/s, least speed by which a timing error is multiplied
 
 
 @dataclass(frozen=True)
 class EdgePoint:
-    """A detected edge: position, kind ("entry", "exit", "edge") and 1-sigma along the track."""
+    """A detected edge: time, kind ("entry", "exit", "edge"), position and 1-sigma along the track.
+
+    time_s: of the detection from the log's first sample, with the detector's lag; x_m, y_m: without that lag.
+    """
 
     sample: int
+    time_s: float
     kind: str
     x_m: float
     y_m: float
@@ -102,9 +107,11 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
     distances from the first edge mean something then, and that is the origin. Raises as `track` does.
     """
     xy, measured = track(log, speed_mps, heading_deg)
+    period = sample_period(log)
     if not measured and edges:
-        xy = xy - xy[max(round(edges[0].sample - lag_s / PERIOD_S), 0)]
-    points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], sigma_s=sigma_s, lag_s=lag_s)
+        xy = xy - xy[max(round(edges[0].sample - lag_s / period), 0)]
+    points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], period_s=period, sigma_s=sigma_s,
+                         lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"
     return EdgeMap(xy, points, platforms(points), position, lag_s, sigma_s)
 
@@ -120,20 +127,19 @@ def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0
         return log.stack(("x_m", "y_m")), True
     if speed_mps is None:
         raise AirTouchError(f"{log.source}: no position (x_m, y_m) in this log; give the speed: --speed 0.2")
-    period = float(log.meta.get("sample_period_s", PERIOD_S))
-    along = np.arange(len(log)) * period * speed_mps
+    along = np.arange(len(log)) * sample_period(log) * speed_mps
     heading = np.radians(heading_deg)
     return np.column_stack((along * np.cos(heading), along * np.sin(heading))), False
 
 
 def edge_points(
-    xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = PERIOD_S,
+    xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = SAMPLE_PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
     """Detections as points of the track.
 
-    xy: track, (n, 2), metres. samples: index of each detection; lag_s, the constant lag of the detector, is
-    subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
+    xy: track, (n, 2), metres, a row each period_s. samples: index of each detection; lag_s, the constant lag of the
+    detector, is subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
     """
     points = []
     half = max(1, round(0.1 / period_s))
@@ -144,7 +150,7 @@ def edge_points(
             continue
         speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
         x, y = map(float, xy[at])
-        points.append(EdgePoint(int(sample), kind, x, y, sigma_s * max(speed, MIN_SPEED_MPS)))
+        points.append(EdgePoint(int(sample), sample * period_s, kind, x, y, sigma_s * max(speed, MIN_SPEED_MPS)))
     return points
 
 

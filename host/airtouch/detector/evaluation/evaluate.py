@@ -9,7 +9,7 @@ import numpy as np
 from airtouch import logs
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.data.dataset import FlightFile, with_flown_speed
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore, score_flight
+from airtouch.detector.evaluation.score import FlightScore, score_flight
 from airtouch.detector.registry import Detector
 from airtouch.detector.shared import sensors, training_set
 from airtouch.detector.shared.channels import ACCELERATIONS, RATES, logged_channels
@@ -18,6 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S
 
 SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
 MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value
@@ -74,7 +75,8 @@ def check(log: FlightLog, spare: int = 0) -> None:
                                 "log the flight again or leave it out")
     flying = logs.airborne(log)
     if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
-        raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above 15000 for less than 1 s)")
+        raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above {DEFAULT.arm_pwm:g} for less than "
+                            "1 s)")
     used = np.where(finite, channels, 0.0)[flying]
     for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
         if spread == 0.0:

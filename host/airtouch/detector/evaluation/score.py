@@ -10,10 +10,10 @@ from scipy.optimize import linear_sum_assignment
 from airtouch.detector.evaluation.calibration import BINS, reliability
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.trace import Detection
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 TOLERANCE_S = 1.5  #: a detection further than this from every true edge is false
 HIT_RADII_M = (0.05, 0.10, 0.25)  #: 0.05 m is that of the paper (its errors by height)
-SAMPLE_PERIOD_S = 0.01
 
 
 class TrueEdge(Protocol):

@@ -5,8 +5,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, TrueEdge, match
+from airtouch.detector.evaluation.score import TOLERANCE_S, TrueEdge, match
 from airtouch.detector.trace import Detection
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 Settings = TypeVar("Settings")
 Flight = tuple[Sequence[TrueEdge], Sequence[Detection]]

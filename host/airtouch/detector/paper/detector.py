@@ -85,7 +85,7 @@ def fit(
     """Train, prune and quantise the network, then choose decoding settings and lag on held-out training flights.
 
     The held-out flights are those of early stopping; without any, all flights are used.
-    options: arguments of `train.train_paper` (epochs, sparsity, df_lambda, progress, ...).
+    options: arguments of `training.train_paper` (epochs, sparsity, df_lambda, progress, ...).
     """
     from airtouch.detector.paper.training import train_paper
 

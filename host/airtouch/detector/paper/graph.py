@@ -1,6 +1,6 @@
 """The paper's network as a list of layers, and what each operation is in Keras and in TensorFlow over a window.
 
-C (`kernels.network`), NumPy (`reference.int8_network`), training, quantisation and export follow the list.
+C (`kernels.network`), NumPy (`reference.networks.int8_network`), training, quantisation and export follow the list.
 """
 
 from collections.abc import Callable, Sequence

@@ -38,7 +38,7 @@ Progress = Callable[[str, int, int, str], None]
 class Windows:
     """n training windows.
 
-    x: (n, 100, 3) float32, each column z-scored. over: (n,) 1.0 where the last sample is over a
+    x: (n, 100, 3) float32, each column normalised (`normalisation`). over: (n,) 1.0 where the last sample is over a
     platform. alert: (n,) 1.0 where the disturbance force reached its threshold there.
     flight: (n,) index of the flight.
     """
@@ -64,7 +64,7 @@ def train_paper(
     conv_sparsity: float = 0.0,
     fixed_scale: bool = False,
     progress: Progress | None = None,
-    command: str = "airtouch.detector.train.train_paper",
+    command: str = "airtouch.detector.paper.training.train_paper",
 ) -> Model:
     """Train, prune and quantise; the same arguments give the same bits on one machine.
 
@@ -126,10 +126,10 @@ def join(parts: Sequence[Windows]) -> Windows:
                      for name in ("x", "over", "alert", "flight")))
 
 
-def windows_of(log: FlightLog, features: Features, index: int = 0,
-               scale: normalisation.FixedScale | None = None) -> Windows:
-    """The training windows of one flight, z-scored by themselves or on a fixed scale."""
-    x, ends = feature_windows(features.fused, DEFAULT.feature_window, scale)
+def windows_of(log: FlightLog, features: Features, index: int = 0, scale: normalisation.FixedScale | None = None,
+               rows: int = DEFAULT.feature_window) -> Windows:
+    """The training windows of one flight, `rows` samples each, z-scored by themselves or on a fixed scale."""
+    x, ends = feature_windows(features.fused, rows, scale)
     flying = logs.airborne(log)[ends]
     x, ends = x[flying], ends[flying]
     over = over_platform(logs.true_edges(log), len(log))

@@ -8,7 +8,7 @@ from airtouch.robust import MAD_TO_SIGMA
 
 STUCK_S = 0.5  #: s; a sensor or motor value that does not change for longer in flight is stuck
 GYRO_LIMIT = np.deg2rad(2000.0)  #: rad/s, full scale of the BMI088's gyro as the firmware configures it
-ACC_LIMIT = 24 * 9.81  #: m/s^2, full scale of its accelerometer
+ACC_FULL_SCALE = 24 * 9.81  #: m/s^2, full scale of its accelerometer
 INT16_LIMIT = 32.767  #: m/s^2, largest acceleration that an int16 in mm/s^2 can hold
 PWM_LIMIT = 65535.0
 #: least height of a spike in the channel's unit: far above noise and manoeuvres
@@ -76,7 +76,7 @@ def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
 def saturated(log: FlightLog) -> dict[str, int]:
     """Number of samples at full scale or beyond, by channel; channels without any are absent."""
     limits = {**dict.fromkeys(PWM, PWM_LIMIT), **dict.fromkeys(GYRO, 0.999 * GYRO_LIMIT),
-              **dict.fromkeys(ACC, 0.999 * ACC_LIMIT)}
+              **dict.fromkeys(ACC, 0.999 * ACC_FULL_SCALE)}
     counts = {name: int((np.abs(log[name]) >= limit).sum())
               for name, limit in limits.items() if log.has(name)}
     for name in ACC_WORLD:

@@ -9,10 +9,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.logs.quaternion import decompress, euler, to_body
 from airtouch.logs.table import Sheet, parse_table
-
-GRAVITY = 9.81  #: m/s^2 in one g, as the Crazyflie firmware counts it
-GYRO_LSB = np.deg2rad(2000 * 2 / 65536)  #: rad/s in one LSB of `gyro.xRaw`
-INVALID_RANGE_MM = 32767
+from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
 
 #: columns in a row -> its channels; those of the world frame are in mm/s^2, gravity included
 LAYOUTS = {
@@ -68,18 +65,6 @@ def read(text: Sheet, source: str) -> FlightLog:
     if "zrange" in raw:
         columns["zrange_m"] = range_m(raw["zrange"][:, 0])
     return FlightLog(columns, meta)
-
-
-def range_m(millimetres: np.ndarray, zero_is_invalid: bool = False) -> np.ndarray:
-    """Ranges in metres, (n,), NaN where invalid: negative, or 32767 mm and more.
-
-    A down range of 0 is valid: the surface is too near to measure. A Multi-ranger
-    value of 0 is invalid (zero_is_invalid): the deck or the sensor did not answer.
-    """
-    invalid = (millimetres >= INVALID_RANGE_MM) | (millimetres < 0)
-    if zero_is_invalid:
-        invalid |= millimetres == 0
-    return np.where(invalid, np.nan, millimetres * 1e-3)
 
 
 def _body(world: np.ndarray, columns: dict[str, np.ndarray], meta: dict) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.detector.evaluation.variants import Variant, VariantModel
+from airtouch.detector.paper.variants import Variant, VariantModel
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE

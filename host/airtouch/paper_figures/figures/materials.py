@@ -94,7 +94,7 @@ def by_pair(job: Job) -> Figure:
             for place, scene in enumerate(PAIRS, start=1):
                 row = rows[name, scene]
                 axes.text(place, -0.03, f"{100 * row['missed']:.0f} %\nmissed", ha="center", va="top", fontsize=6,
-                          color=pictures.MUTED)
+                          color=pictures.GREY)
             axes.set(title=name, ylim=(-0.11, 0.5))
         median, greatest = CLAIMS["mat-cement"].values
         canvas.axes[1].plot([1, 1], [median, greatest], "k*", ms=7, label="paper: mat, cement: median, greatest")

@@ -105,7 +105,7 @@ def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
                                 ("multiply-accumulates", "bytes of parameters", "bits a frame or window"),
                                 strict=True):
         axes.bar(range(len(rows)), [r[key] for r in rows],
-                 color=[pictures.MUTED, paper_colour, paper_colour, best_colour])
+                 color=[pictures.GREY, paper_colour, paper_colour, best_colour])
         axes.set_yscale("log")
         axes.set_xticks(range(len(rows)), ["vision", "paper,\nno zeros", "paper", "best"], fontsize=7)
         axes.set_title(label)

@@ -69,7 +69,7 @@ def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np
 def sensing_range(job: Job) -> Figure:
     """Section 8.1: heights at which the lift is THRESHOLD of the weight, and the lift at the paper's 3 m."""
     mass, span, propeller, claimed = CLAIMS["range"].values
-    small = vehicles.load("crazyflie-2.1-flow")
+    small = vehicles.load()
     craft = [Craft("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
              Craft("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
              Craft("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
@@ -133,7 +133,7 @@ def _draw(canvas: Any, craft: list[Craft], claimed_m: float) -> None:
         for (source, curve), style in zip(curves(one.radius_m, one.arm_m).items(), (":", "--", "-"), strict=True):
             axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
                         label=f"rotor {1000 * one.radius_m:.4g} mm, {source}")
-    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
+    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.GREY,
                 label="67 g frame, measured")
     axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
     axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from airtouch.errors import AirTouchError
 from airtouch.simulation.compiled import jit
 
 
@@ -11,8 +12,10 @@ def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
 
     jitter_s: rms of the error of each time; times never run backwards. loss: share of rows
     lost, in runs of `burst` rows on average (Gilbert's two-state channel). The first row
-    always arrives.
+    always arrives. Raises AirTouchError for a loss outside 0..1, 1 excluded.
     """
+    if not 0.0 <= loss < 1.0:
+        raise AirTouchError(f"radio: the share of lost rows must be 0 or more and below 1, not {loss:g}")
     n = len(table)
     draws, errors = rng.random(n), rng.standard_normal(n)
     if jitter_s > 0.0:

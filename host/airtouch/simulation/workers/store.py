@@ -15,12 +15,12 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import make_folder
+from airtouch.logs.files import MANIFEST, make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
 
-REQUEST, FAILED, MANIFEST = "run.json", "diverged.jsonl", "manifest.csv"
+REQUEST, FAILED = "run.json", "diverged.jsonl"
 
 
 def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -> None:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.comparison.compare import SimulatedFlight
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import RATE_HZ
 from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES, edge_locked, height_class, names
 from airtouch.twin.recorded.flights import RecordedFlights
@@ -69,7 +69,7 @@ def _signals(data: np.ndarray, course: Course) -> Signals:
     span = slice(max(course.entry - MARGIN, 0), min(course.exit + MARGIN, len(data)))
     level = np.median(data[course.free], axis=0)
     level[ch.DOWN] = 0.0
-    return Signals((np.arange(span.start, span.stop) - course.entry) / RATE_HZ, data[span] - level)
+    return Signals((np.arange(span.start, span.stop) - course.entry) / SAMPLE_RATE_HZ, data[span] - level)
 
 
 def _around(flights: Sequence[tuple[np.ndarray, Course]], kind: str) -> AroundEdges:

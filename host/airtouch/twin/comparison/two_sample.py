@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import NAMES, RATE_HZ
+from airtouch.twin.recorded.channels import NAMES
 from airtouch.twin.recorded.course import PHASES, Course
 from airtouch.twin.recorded.features import PAIRS
 
@@ -89,7 +90,7 @@ def _features(x: np.ndarray) -> np.ndarray:
     slope = t @ x / (t @ t)
     residual = x - level - t[:, None] * slope
     power = np.abs(np.fft.rfft(residual * np.hanning(len(x))[:, None], axis=0)) ** 2
-    f = np.fft.rfftfreq(len(x), 1.0 / RATE_HZ)
+    f = np.fft.rfftfreq(len(x), 1.0 / SAMPLE_RATE_HZ)
     bands = [np.log(power[(f >= a) & (f < b)].mean(axis=0) + 1e-9) for a, b in BANDS_HZ]
     size = np.sqrt((residual * residual).sum(axis=0)) + 1e-9
     pairs = [(residual[:, i] @ residual[:, k]) / (size[i] * size[k]) for i, k in PAIRS]

@@ -17,7 +17,7 @@ from airtouch.simulation import effects as registry
 from airtouch.twin.recorded.near_range import NearRange
 from airtouch.vehicle import Vehicle
 
-#: `Lever.of` of a vehicle's field, and of an argument of `missions.drawn`
+#: `Lever.of` of a vehicle's field, and of an argument of `missions.course_values`
 VEHICLE, MISSION = "vehicle", "mission"
 #: signs of rotors 1 to 4 in each direction of trim
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
@@ -185,7 +185,7 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float] | n
 
 
 def mission(levers: Sequence[Lever], values: Sequence[float] | np.ndarray) -> dict[str, float]:
-    """Arguments of `missions.drawn`: height_m, added to the set height, and pulse_mps, of the pulses in hover."""
+    """Arguments of `missions.course_values`: height_m, added to the set height, and pulse_mps, of pulses in hover."""
     return {lever.key: float(v) for lever, v in zip(levers, values, strict=True) if lever.of == MISSION}
 
 

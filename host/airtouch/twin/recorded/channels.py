@@ -23,7 +23,6 @@ GRAVITY = 9.81  #: m/s²
 LAG_S, DELAY = 0.06, 2  #: first-order lag (s) and delay (samples) of thrust, as in `reference.motion_channels`
 #: percentile of the lagged thrust, and fraction of it from which the drone flies; no source: round numbers
 FLIGHT_PERCENTILE, FLIGHT_FRACTION = 90, 0.5
-RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
 #: motors 1 to 4 to roll, pitch, yaw and mean
 MIX = np.array([[-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1], [0.25, 0.25, 0.25, 0.25]])
 

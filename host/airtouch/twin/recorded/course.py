@@ -17,16 +17,16 @@ from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM, VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.recorded import pulses
 
-RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
 MIN_FREE_S = 3.0  #: s, least free air before the platform: a block of the spectra (`features.LENGTH`)
 MIN_FREE_M = 0.25  #: m, down range above which there is no ground effect: five rotor diameters
 SETTLED_S = 1.0  #: s after the climb until level flight counts as free air; no source: round number
 STEP_S = 1.5  #: s, longest duration of a velocity step; no source: round number
 #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains; no other source
 RISE_S = 0.35
-RATE_TOLERANCE = 0.02  #: relative difference from RATE_HZ that a log may have; no source: round number
+RATE_TOLERANCE = 0.02  #: relative difference from SAMPLE_RATE_HZ that a log may have; no source: round number
 #: Samples in which readings are taken, at 100 Hz; no source: round numbers, clear of the one reading that mixes both
 #: distances (host/docs/twin-findings.md).
 MEDIAN_ROWS = 5  #: of the median filter on the down range, against single wrong readings
@@ -85,8 +85,8 @@ class Course:
 
     def phases(self) -> dict[str, slice]:
         """Phase of PHASES -> samples."""
-        before, behind = (int(s * RATE_HZ) for s in AROUND_S)
-        settled = int(SETTLED_S * RATE_HZ)
+        before, behind = (int(s * SAMPLE_RATE_HZ) for s in AROUND_S)
+        settled = int(SETTLED_S * SAMPLE_RATE_HZ)
         step = max(min(self.step, self.entry - before), self.level + settled)
         spans = {"hover": (self.level + settled, step),
                  "cruise": (step, self.entry - before),
@@ -99,7 +99,7 @@ class Course:
     @property
     def free(self) -> slice:
         """Samples of level flight in free air before the platform."""
-        return slice(self.level + int(SETTLED_S * RATE_HZ), self.entry - int(AROUND_S[0] * RATE_HZ))
+        return slice(self.level + int(SETTLED_S * SAMPLE_RATE_HZ), self.entry - int(AROUND_S[0] * SAMPLE_RATE_HZ))
 
 
 def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | None = None) -> Course:
@@ -121,7 +121,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     last = len(log) if flying[leave.sample:].all() else leave.sample + int(np.argmin(flying[leave.sample:]))
     cruise = float(np.median(down[max(entry.sample + CRUISE.start, start):entry.sample + CRUISE.stop]))
     level = start + int(np.argmax(down[start:entry.sample] > LEVEL_PART * cruise))
-    free_s = (entry.sample - level) / RATE_HZ - SETTLED_S - AROUND_S[0]
+    free_s = (entry.sample - level) / SAMPLE_RATE_HZ - SETTLED_S - AROUND_S[0]
     if free_s < MIN_FREE_S or cruise < MIN_FREE_M:
         raise AirTouchError(f"{log.source}: {max(free_s, 0.0):.1f} s of level flight in free air before the "
                             f"platform; hover {MIN_FREE_S + 2:g} s at {MIN_FREE_M:g} m or higher first")
@@ -130,13 +130,13 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     step, measured, source = _velocity_step(log, level, entry.sample)
     stop = _stop(log, step, leave.sample, landing)
     speed = speed_mps if speed_mps is not None else measured
-    over = (leave.sample - entry.sample) / RATE_HZ
-    skipped = min(OVER.start, int(CLEARANCE_PART * RATE_HZ * over))
+    over = (leave.sample - entry.sample) / SAMPLE_RATE_HZ
+    skipped = min(OVER.start, int(CLEARANCE_PART * SAMPLE_RATE_HZ * over))
     clearance = float(np.median(down[entry.sample + skipped:leave.sample + CLEARANCE_STOP]))
     before = float(np.median(down[max(entry.sample + BEFORE.start, level):entry.sample + BEFORE.stop]))
-    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ,
-                  (step - level) / RATE_HZ, (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
-                  (landing - leave.sample) / RATE_HZ, speed,
+    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / SAMPLE_RATE_HZ,
+                  (step - level) / SAMPLE_RATE_HZ, (entry.sample - step) / SAMPLE_RATE_HZ, over,
+                  (stop - leave.sample) / SAMPLE_RATE_HZ, (landing - leave.sample) / SAMPLE_RATE_HZ, speed,
                   "stated" if speed_mps is not None else source, angle_deg or 0.0, start, level, step,
                   entry.sample, leave.sample, landing, pulses.period(log, level, step))
 
@@ -152,7 +152,7 @@ def check(log: FlightLog) -> None:
     if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
         raise AirTouchError(f"{log.source}: no down range in this log; log range.zrange (flow deck or Z-ranger) too")
     period = sample_period(log)
-    if abs(period - 1.0 / RATE_HZ) > RATE_TOLERANCE / RATE_HZ:
+    if abs(period - 1.0 / SAMPLE_RATE_HZ) > RATE_TOLERANCE / SAMPLE_RATE_HZ:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, a twin needs 100 Hz: "
                             "airtouch logs convert --rate 100")
 
@@ -184,24 +184,24 @@ def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, 
     The source is the logged velocity, or without one the horizontal acceleration, less its mean in level
     flight, integrated over STEP_S; accurate to about 0.07 m/s.
     """
-    settled = min(level + int(SETTLED_S * RATE_HZ), entry + SPEED.start)
+    settled = min(level + int(SETTLED_S * SAMPLE_RATE_HZ), entry + SPEED.start)
     if log.has(*VELOCITY[:2]):
         speed = _speed(log)
         final = float(np.median(speed[max(entry + SPEED.start, settled):entry + SPEED.stop]))
         slow = np.flatnonzero(speed[settled:entry] < 0.5 * final)
         half = settled + (int(slow[-1]) if len(slow) else 0)
-        return max(half - int(RISE_S * RATE_HZ), settled), final, "velocity"
+        return max(half - int(RISE_S * SAMPLE_RATE_HZ), settled), final, "velocity"
     gain = _gain(_horizontal(log, settled, entry))
     first = int(np.argmax(np.hypot(*gain.T)))
     final = float(np.hypot(*gain[first]))
-    total = np.hypot(*np.cumsum(_horizontal(log, settled, entry)[first:], axis=0).T) / RATE_HZ
+    total = np.hypot(*np.cumsum(_horizontal(log, settled, entry)[first:], axis=0).T) / SAMPLE_RATE_HZ
     half = first + int(np.argmax(total > 0.5 * final))
-    return max(settled + half - int(RISE_S * RATE_HZ), settled), final, "acceleration"
+    return max(settled + half - int(RISE_S * SAMPLE_RATE_HZ), settled), final, "acceleration"
 
 
 def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
     """Sample after an exit at which the forward flight ends: that of the largest loss of speed."""
-    if landing - leave < int(STEP_S * RATE_HZ):
+    if landing - leave < int(STEP_S * SAMPLE_RATE_HZ):
         return landing
     if log.has(*VELOCITY[:2]):
         speed = _speed(log)
@@ -210,8 +210,8 @@ def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
     else:
         forward = _gain(_horizontal(log, step, leave))[0]
         along = _gain(_horizontal(log, leave, landing)) @ (forward / max(np.hypot(*forward), 1e-9))
-        half = leave + int(np.argmin(along)) + int(RISE_S * RATE_HZ)
-    return min(max(half - int(RISE_S * RATE_HZ), leave), landing)
+        half = leave + int(np.argmin(along)) + int(RISE_S * SAMPLE_RATE_HZ)
+    return min(max(half - int(RISE_S * SAMPLE_RATE_HZ), leave), landing)
 
 
 def _speed(log: FlightLog) -> np.ndarray:
@@ -221,8 +221,8 @@ def _speed(log: FlightLog) -> np.ndarray:
 
 def _gain(acc: np.ndarray) -> np.ndarray:
     """Gain of speed over STEP_S (or half of the interval) from each sample on, (m, 2) m/s, of acc (n, 2)."""
-    n = max(min(int(STEP_S * RATE_HZ), len(acc) // 2), 1)
-    total = np.vstack([np.zeros(2), np.cumsum(acc, axis=0)]) / RATE_HZ
+    n = max(min(int(STEP_S * SAMPLE_RATE_HZ), len(acc) // 2), 1)
+    total = np.vstack([np.zeros(2), np.cumsum(acc, axis=0)]) / SAMPLE_RATE_HZ
     return total[n:] - total[:-n]
 
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import NAMES, RATE_HZ, channels
+from airtouch.twin.recorded.channels import NAMES, channels
 from airtouch.twin.recorded.course import OVER, Course
 
 #: bands of spectra in free air, Hz: octaves, above 4 Hz about half ones, from what a block resolves to half of the
@@ -90,7 +91,8 @@ def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = AROUND[0
 
     x: (n, 12) channels. edge: sample. NaN before the log begins, after the landing, and after the exit around an entry.
     """
-    level = x[course.entry + int(BASELINE_S[0] * RATE_HZ):course.entry + int(BASELINE_S[1] * RATE_HZ)].mean(axis=0)
+    start, stop = (course.entry + int(seconds * SAMPLE_RATE_HZ) for seconds in BASELINE_S)
+    level = x[start:stop].mean(axis=0)
     level[ch.DOWN] = 0.0
     out = np.full((before + after, 12), np.nan)
     start, stop = max(edge - before, 0), min(edge + after, len(x), course.landing)
@@ -104,7 +106,7 @@ def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
     """The features of group "trim"."""
     pwm = log.stack(PWM)[course.free]
     mean = np.nanmean(pwm, axis=1)
-    slope = np.polyfit(np.arange(len(mean)) / RATE_HZ, np.nan_to_num(mean, nan=float(np.nanmean(mean))), 1)[0]
+    slope = np.polyfit(np.arange(len(mean)) / SAMPLE_RATE_HZ, np.nan_to_num(mean, nan=float(np.nanmean(mean))), 1)[0]
     return np.r_[mean.mean(), slope, 100.0 * course.before_m, np.median(free[:, [ch.ROLL, ch.PITCH, ch.YAW]], axis=0)]
 
 
@@ -122,7 +124,7 @@ def _blocks(x: np.ndarray, length: int, step: int) -> np.ndarray | None:
 
 def _bins(length: int, bands: tuple) -> list[np.ndarray]:
     """Indices of the frequencies in each band."""
-    f = np.fft.rfftfreq(length, 1.0 / RATE_HZ)
+    f = np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE_HZ)
     return [np.flatnonzero((f >= a) & (f < b)) for a, b in bands]
 
 
@@ -173,7 +175,7 @@ def _edge(x: np.ndarray, course: Course, edge: int) -> np.ndarray:
     if name:
         locked = edge_locked(x, course, edge)
         for i, (a, b) in enumerate(BINS_S):
-            part = locked[AROUND[0] + round(a * RATE_HZ):AROUND[0] + round(b * RATE_HZ)]
+            part = locked[AROUND[0] + round(a * SAMPLE_RATE_HZ):AROUND[0] + round(b * SAMPLE_RATE_HZ)]
             if np.isfinite(part[:, 0]).mean() > MIN_VALID:
                 out[list(CLASSES).index(name), :, i] = np.nanmean(part, axis=0)
     return out.ravel()

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.twin.recorded import channels as ch
-from airtouch.twin.recorded.channels import RATE_HZ
 from airtouch.twin.recorded.course import Course
 
 #: s of readings over the floor that anchor the height, and s of dead reckoning after it; no source: round numbers
@@ -80,10 +80,10 @@ def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
     The fourth value is the standard deviation (m,) of height less down range, m, with each edge as one measurement.
     x: (n, 12) channels. An edge without readings over both surfaces is not in the list.
     """
-    down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ
+    down, dt = 0.01 * x[:, ch.DOWN], 1.0 / SAMPLE_RATE_HZ
     change = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
     t = np.arange(len(x)) * dt
-    anchor, carried, guard = (int(s * RATE_HZ) for s in (ANCHOR_S, CARRIED_S, GUARD_S))
+    anchor, carried, guard = (int(s * SAMPLE_RATE_HZ) for s in (ANCHOR_S, CARRIED_S, GUARD_S))
     spans = ((slice(course.entry - anchor, course.entry - guard // 2), course.entry,
               slice(course.entry + 2, min(course.entry + carried, course.exit - 3))),
              (slice(course.exit + guard, min(course.exit + anchor, course.landing)), course.exit + guard,

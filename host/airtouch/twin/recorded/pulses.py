@@ -7,6 +7,7 @@ pitch rate. Without them a simulated hover is calmer than the recorded one, in t
 import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.reference.finite import hold_finite
 from airtouch.robust import deviation
 
@@ -17,12 +18,11 @@ MIN_PULSES = 4  #: periods that a hover must hold; no source: least for a scatte
 #: 0.52 s, the others 6.5 or less
 THRESHOLD = 7.0
 CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped; no source: round number
-RATE_HZ = 100.0  #: Hz, of the log
 
 
 def period(log: FlightLog, start: int, stop: int) -> float:
     """Period in s of the pulses between two samples of a 100 Hz log; 0 without pulses."""
-    if stop - start < MIN_PULSES * PERIODS_S[0] * RATE_HZ:
+    if stop - start < MIN_PULSES * PERIODS_S[0] * SAMPLE_RATE_HZ:
         return 0.0
     jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)
     size = deviation(jumps)
@@ -32,7 +32,7 @@ def period(log: FlightLog, start: int, stop: int) -> float:
     sample = np.arange(len(jumps))
     scatter, best, best_s = jumps.std(), THRESHOLD, 0.0
     for seconds in PERIODS_S:
-        samples = seconds * RATE_HZ
+        samples = seconds * SAMPLE_RATE_HZ
         if len(jumps) < MIN_PULSES * samples:
             break
         phase = (sample % samples).astype(int)

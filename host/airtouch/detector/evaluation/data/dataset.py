@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import ENDINGS, MANIFEST, in_folder
 from airtouch.logs.flight_log import FlightLog
 
-MANIFEST = "manifest.csv"
 MOST_MPS = 100.0  #: m/s, above any commanded speed
-SUFFIXES = (".csv", ".csv.gz", ".parquet")  #: what counts as a log in a folder without one
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ def not_taken(paths: Iterable[str | Path]) -> Counter[str]:
     for folder in {p.resolve(): p for p in map(Path, paths) if (p / MANIFEST).is_file()}.values():
         listed = read_manifest(folder / MANIFEST)
         reasons.update(f"{c.use} in the manifest" for c in listed.values() if c.use not in (None, "clean"))
-        reasons["not in the manifest"] += sum(f.name not in listed for f in _logs(folder) if f.name != MANIFEST)
+        reasons["not in the manifest"] += sum(f.name not in listed for f in in_folder(folder))
     return +reasons
 
 
@@ -130,19 +129,15 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
     if listed:
         files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
     else:
-        files = _logs(folder)
+        files = in_folder(folder)
     if not files and listed:
         uses = Counter(str(condition.use) for condition in listed.values())
         raise AirTouchError(f"{folder}: no clean flight in its manifest, but "
                             f"{', '.join(f'{count} {use}' for use, count in uses.items())}; name the logs themselves "
                             "to take them")
     if not files:
-        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(SUFFIXES)})")
+        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)})")
     return files
-
-
-def _logs(folder: Path) -> list[Path]:
-    return sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
 
 
 def _condition(row: dict[str, str | None], place: str) -> Condition:

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from airtouch import logs
-from airtouch.detector import paper
-from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.paper import training
 from airtouch.detector.paper.decoding import decode
-from airtouch.detector.paper.features import feature_windows, flight_features
+from airtouch.detector.paper.detector import choose_decoding
+from airtouch.detector.paper.features import Features, feature_windows, flight_features
 from airtouch.detector.paper.losses import DEFAULT_LAMBDA
 from airtouch.detector.paper.network import float_layers
 from airtouch.detector.shared.pruning import BLOCK
@@ -44,18 +43,18 @@ class Variant:
     def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = training.EPOCHS) -> "VariantModel":
         """Weights from the training flights, decoding and lag from those held out among them."""
         use_tensorflow(seed)
-        parts = [self._windows(log, index) for index, log in enumerate(flights)]
-        windows = training.Windows(*(np.concatenate([getattr(p, name) for p in parts])
-                                  for name in ("x", "over", "alert", "flight")))
+        parts = [training.windows_of(log, self._features(log), index, rows=self.rows)
+                 for index, log in enumerate(flights)]
+        windows = training.join(parts)
         validation = training.held_out(len(flights), seed)
         used = ~np.isin(windows.flight, validation)
         network, losses = training.fit_keras(windows.select(used), windows.select(~used), epochs, 0.0, BLOCK,
-                                          self.df_lambda, lambda *_: None)
+                                             self.df_lambda, lambda *_: None)
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
         unseen = [flights[i] for i in validation] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
-        settings, lag, _ = paper.choose_decoding([self._decoding_inputs(log, model) for log in unseen],
-                                                 [logs.true_edges(log) for log in unseen], self.physical_filter)
+        settings, lag, _ = choose_decoding([self._decoding_inputs(log, model) for log in unseen],
+                                           [logs.true_edges(log) for log in unseen], self.physical_filter)
         return replace(model, settings=settings, lag_s=lag)
 
     def run(self, log: FlightLog, model: "VariantModel | None" = None) -> Trace:
@@ -77,32 +76,23 @@ class Variant:
         """What an ablation reports of training."""
         return {"converged_after_epochs": model.converged}
 
-    def _features(self, log: FlightLog) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Fused features (n, 3), armed (n,) and alerts (n,)."""
+    def _features(self, log: FlightLog) -> Features:
+        """The features of one flight, its fused ones shifted where they are `centred`."""
         features = flight_features(log, parameters=replace(DEFAULT, band_window=self.band_window))
-        fused = features.fused
-        if self.centred:
-            early = self.band_window // 2
-            fused = np.vstack([fused[early:], np.full((early, fused.shape[1]), np.nan, fused.dtype)])
-        return fused, features.armed, features.alert
-
-    def _windows(self, log: FlightLog, index: int) -> training.Windows:
-        """Training windows of one flight."""
-        fused, _, alert = self._features(log)
-        x, ends = feature_windows(fused, self.rows)
-        flying = logs.airborne(log)[ends]
-        x, ends = x[flying], ends[flying]
-        over = over_platform(logs.true_edges(log), len(log)).astype(np.float32)
-        return training.Windows(x, over[ends], alert[ends].astype(np.float32), np.full(len(ends), index, np.int32))
+        if not self.centred:
+            return features
+        early, fused = self.band_window // 2, features.fused
+        shifted = np.vstack([fused[early:], np.full((early, fused.shape[1]), np.nan, fused.dtype)])
+        return replace(features, fused=shifted)
 
     def _decoding_inputs(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P(over) (n,), armed (n,), alerts (n,)."""
-        fused, armed, alert = self._features(log)
-        x, ends = feature_windows(fused, self.rows)
+        features = self._features(log)
+        x, ends = feature_windows(features.fused, self.rows)
         logits = np.asarray(model.network.predict(x[..., None], batch_size=2048, verbose=0), dtype=np.float64)
         probability = np.full(len(log), np.nan)
         probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
-        return probability, armed, alert
+        return probability, features.armed, features.alert
 
 
 @dataclass(frozen=True)
@@ -127,7 +117,7 @@ def random_windows(flights: Sequence[FlightLog], *, seed: int = 0, epochs: int =
     test = np.random.default_rng(seed).uniform(size=len(windows.x)) < share
     nothing = windows.select(np.zeros(len(test), bool))  # to stop early on: the paper trains to the end
     weights, _ = training.fit_windows(windows.select(~test), nothing, epochs, 0.0, BLOCK, DEFAULT_LAMBDA,
-                                   lambda *_: None)
+                                      lambda *_: None)
     logits = infer_float(float_layers(weights), windows.x[test])
     predicted, over = logits[:, 1] > logits[:, 0], windows.over[test] > 0.5
     return {"balanced_accuracy": float(0.5 * (predicted[over].mean() + (~predicted[~over]).mean())),

@@ -1,0 +1,55 @@
+"""What goes before and after an adaptation: which flights can be used, and what more of them would be worth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.detector.evaluation import evaluate, summary
+from airtouch.detector.evaluation.data.dataset import FlightFile
+from airtouch.errors import AirTouchError
+from airtouch.twin.adapt import Adapted, Flight
+from airtouch.twin.recorded.course import course
+
+
+def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
+             progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
+    """Flights that can be used, and (path, reason) of the others.
+
+    A speed that is not stated comes from the log; speed_mps, m/s, where the log has no platform. progress: as
+    progress(done, total).
+    """
+    usable, left_out = [], []
+    for number, file in enumerate(files):
+        progress(number + 1, len(files))
+        try:
+            log = logs.read(file.path)
+            evaluate.check(log, best.SPARE_SENSORS)
+            speed = file.condition.speed_mps
+            if speed is None and evaluate.truth(log):
+                try:
+                    speed = course(log).speed_mps
+                except AirTouchError:
+                    speed = speed_mps
+            usable.append(Flight(FlightFile(file.path, replace(file.condition, speed_mps=speed or speed_mps)), log))
+        except AirTouchError as error:
+            left_out.append((str(file.path), str(error)))
+    return usable, left_out
+
+
+def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
+    """Estimated mean error, m, with the present flights and with `more`, and the exponent p of error ~ flights^-p.
+
+    Extrapolated from the errors with all and with half of the training flights; p is limited to 0 to 1. None without
+    a hold-out.
+    """
+    if not adapted.held_out or not adapted.held_out_half:
+        return None
+    now, half = (summary.summarise(s)["mean_abs_error_m"] for s in (adapted.held_out, adapted.held_out_half))
+    if not now or not half:
+        return None
+    exponent = float(np.clip(np.log2(half / now), 0.0, 1.0))
+    return {"now_m": now, "half_m": half, "then_m": now * ((labelled + more) / labelled) ** -exponent,
+            "exponent": exponent}
