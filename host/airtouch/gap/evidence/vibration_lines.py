@@ -17,6 +17,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signals.study import Study
 from airtouch.simulation import replay
@@ -85,7 +86,7 @@ def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
 def speeds(flight: Flight, study: Study) -> np.ndarray:
     """Rotor speeds (n, 4), rad/s: logged ones, or those of the mean command with each rotor's trim."""
     if flight.log.has(*RPM):
-        return np.nan_to_num(flight.log.stack(RPM)) * np.pi / 30.0
+        return interpolate_missing(flight.log.stack(RPM)) * np.pi / 30.0
     replayed = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
                       signals=flight.signals.copy(), pwm=flight.pwm).rotor_speed
     common = replayed.mean(axis=1, keepdims=True)
