@@ -48,7 +48,7 @@ def shaken(since_s, until_s, factor):
 
 
 def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
-    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)], slow=True))
+    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]))
     (name, since, until), = gate
     assert name == "shaken" and since == pytest.approx(12.0, abs=PIECE_S) and until == pytest.approx(14.0, abs=PIECE_S)
     assert price == pytest.approx(price_of_stretches(int(30.0 / PIECE_S)))
@@ -56,4 +56,4 @@ def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
 
 @pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(LIVELY)])
 def test_a_calm_or_hardly_livelier_stretch_is_no_burst(factor):
-    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)], slow=True)) == ((), 0.0)
+    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)])) == ((), 0.0)
