@@ -101,7 +101,7 @@ def closes(cell: Cell) -> bool:
     return removed(cell) >= HALF * energy(cell) > 0.0
 
 
-def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
+def headline(cells: Sequence[Cell], named: bool = False) -> Cell | None:
     """The cell that stands for the gap; None where no cell in the air stands out.
 
     It is in the channel and band with most energy over all phases in the air (with named effects: from which they
@@ -177,7 +177,8 @@ def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
     chosen = largest(of_map.cells, count)
     ordered = largest(of_map.cells, len(of_map.cells))
     more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
-    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered if c.after is not None]
+    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered
+                  if c.after is not None and c.after < c.gap]
     more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:MOST_REDUCED]]
     others = {c for c in more if c is not None and c not in chosen}
     return chosen + sorted(others, key=sure_ratio, reverse=True)
