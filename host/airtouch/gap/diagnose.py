@@ -40,6 +40,7 @@ MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; cho
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
+PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no wake is judged"
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if not usable:
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
+        notes += [PARTNER_UNUSED] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
     known = None if before is None else before.calibrated
@@ -176,8 +178,8 @@ def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
-    """The flights with their spectra; torque in the mean alone where nobody knows which share of it is aliases."""
-    data = Data(study, flights, slow=study.response is None)
+    """The flights with their spectra. Raises AirTouchError where they are too short for two halves."""
+    data = Data(study, flights)
     if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
         raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
                             "5 s in the air without a hole are needed")

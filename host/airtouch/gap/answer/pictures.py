@@ -11,6 +11,7 @@ import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
@@ -163,8 +164,8 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
 
 def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
     """Mean power (bins, COUNT) of a gap (n, COUNT) over all blocks in the air of a flight."""
-    known = np.where(flight.lost[:, None], 0.0, gap)
-    return (np.abs(blocks(known, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
+    bridged = interpolate_over(gap, ~flight.bridged)
+    return (np.abs(blocks(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
 
 
 def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:

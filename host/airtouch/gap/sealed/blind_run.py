@@ -51,9 +51,9 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
-    first = sorted(answers.glob("flight_????.json"))
-    # the key is opened for the answers above; effects can be withheld only when they are known
-    key = open_key(out, answers_sha256([json.loads(p.read_text()) for p in first]))["answers"]
+    # the key is opened for these answers; effects can be withheld only when they are known
+    first = [json.loads(_place(answers, n, ()).read_text()) for n in names]
+    key = open_key(out, answers_sha256(first))["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, spread)

@@ -103,7 +103,7 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
     signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
     model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
     force, turning = model.specific_force, model.angular_acceleration
-    turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
+    turning = 0.5 * (turning + np.concatenate([turning[1:], turning[-1:]]))
     rest = flight.phase == GROUND
     if rest.any():
         up = flight.body_to_world[:, 2, :] * vehicle.gravity_mps2

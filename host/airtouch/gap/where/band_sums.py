@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
 from airtouch.gap.where.regimes import REGIMES, regimes
@@ -59,7 +60,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
     parts: list[tuple] = []
     for start, stop in stretches(flight):
         valid = ~flight.bridged[start:stop]
-        values = _interpolated(residual[start:stop], valid)
+        values = interpolate_over(residual[start:stop], valid)
         bands = filtered(values)
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
         for first, last in _blocks(flight.phase[start:stop]):
@@ -81,16 +82,6 @@ def stretches(flight: Flight) -> list[tuple[int, int]]:
     kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.bridged)
     bounds = np.r_[0, np.flatnonzero(np.diff(kind)) + 1, len(kind)]
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
-
-
-def _interpolated(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """The values (n, c) with straight lines over the samples that are not valid; absent channels stay NaN."""
-    out = np.array(values)
-    if not valid.all() and valid.any():
-        index = np.arange(len(out))
-        for c in range(out.shape[1]):
-            out[:, c] = np.interp(index, index[valid], out[valid, c])
-    return out
 
 
 def _blocks(phase: np.ndarray) -> list[tuple[int, int]]:
