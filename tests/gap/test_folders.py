@@ -11,7 +11,7 @@ PAGE = ROOM.parents[1] / "docs" / "architecture.md"
 #: folders in the order of the package's own words, each a line that begins with its name
 FOLDERS = [name for name in re.findall(r"^(\w+)  +\S", gap.__doc__, re.M) if (ROOM / name).is_dir()]
 #: Modules that stand beside the folders, and the first folder that may not import them
-BESIDE = {"workspace": None, "second_process": None, "result": None, "measure": "answer", "diagnose": "sealed"}
+BESIDE = {"workspace": None, "second_process": None, "result": None, "measurement": "sealed", "diagnosis": "sealed"}
 
 
 def test_every_module_is_on_the_page_and_what_is_on_the_page_is_there():

@@ -13,7 +13,7 @@ from airtouch.extras import lacking
 from airtouch.gap.answer import words
 from airtouch.gap.answer.advice import ADD_AN_EFFECT
 from airtouch.gap.answer.pictures import Pictures
-from airtouch.gap.measure import Measurement
+from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.second_process import shared
 from airtouch.gap.where import summary

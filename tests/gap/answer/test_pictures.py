@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.pictures import of as pictures_of
+from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.nominal.build_study import declared_study
 from gap_flights import VEHICLE, flight
 from made_diagnosis import cell

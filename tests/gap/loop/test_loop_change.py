@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-import airtouch.gap.diagnose as diagnose
-import airtouch.gap.measure as measure
+import airtouch.gap.diagnosis as diagnose
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.edges.edge_effects import exact_sensors
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.nominal.build_study import declared_study
@@ -41,7 +41,7 @@ CLOSE, LATE = 0.1, 0.2
 def fly(active, numbers, vehicle=None):
     vehicle = vehicle or vehicles.load(VEHICLE)
     logs = list(batch.flights("diagnosis", numbers, vehicle=vehicle, effects=active, workers=1))
-    return list(measure.usable(logs, vehicle, []))
+    return list(ready_flights(logs, vehicle, []))
 
 
 def active_effects(name):

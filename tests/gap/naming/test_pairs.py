@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-import airtouch.gap.diagnose as diagnose
+import airtouch.gap.diagnosis as diagnose
 from airtouch.gap.answer.shrink import Shrink, gap_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.answer.unexplained import unexplained
-from airtouch.gap.diagnose import brief
+from airtouch.gap.diagnosis import brief
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of

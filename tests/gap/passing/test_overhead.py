@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import airtouch.gap.diagnose as module
+import airtouch.gap.diagnosis as module
 import gap_real
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN

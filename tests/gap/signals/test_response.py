@@ -2,8 +2,8 @@
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop import controller, loop_model
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.command_response import accelerations_per_command
@@ -124,7 +124,7 @@ def empirical(active: list[Active]) -> np.ndarray:
     vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
     outcomes = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
     logs = [log for log in outcomes if isinstance(log, FlightLog)]
-    for flight in measure.usable(logs, vehicle, []):
+    for flight in ready_flights(logs, vehicle, []):
         first = starts(flight, AIR)
         turns = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
         modelled = turns - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.diagnose import brief
+from airtouch.gap.diagnosis import brief
 from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import halves

@@ -1,18 +1,16 @@
 """The curves of a report, computed where everything else is: signals of the headline's cell, spectra, commands."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_over
-from airtouch.gap.nominal.build_study import declared_study, sensor_noise
+from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
@@ -23,9 +21,7 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import command_spectra
 from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
-from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.effects import Active
-from airtouch.vehicle import Vehicle
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
@@ -82,8 +78,8 @@ class Pictures:
     commands: Mapping[str, Any] = field(default_factory=dict)  #: `command_power.command_spectra`
 
 
-def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-       headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
+def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
+                headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis: headline is the cell that its answer speaks of."""
     commands = command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
@@ -94,15 +90,6 @@ def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effec
     channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
     return Pictures(_signal(_of_median_flight(gaps, headline), headline), frequencies(AIR),
                     _spectra(study, gaps, effects, channels), commands)
-
-
-def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
-    """The curves of a measurement, of its first flights."""
-    flights = list(measure.usable(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
-    if not flights:
-        return Pictures(commands=measurement.spectra)
-    curves = of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
-    return Pictures(curves.signal, curves.frequency_hz, curves.spectra, measurement.spectra)
 
 
 def _residual(study: Study, flight: Flight, effects: Sequence[Active] = ()) -> np.ndarray:

@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import brief
+from airtouch.gap.diagnosis import brief
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.sealed.blind import Say
 from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
@@ -124,7 +124,7 @@ def with_study(case: CaseFile) -> Answer:
 def _diagnosed(study: Study, case: Case) -> Answer:
     """Name, effects left out, and the diagnosis as JSON."""
     name, without, log = case
-    diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
+    diagnosis = brief(study, list(ready_flights([log], study.vehicle, [])), without).plain()
     diagnosis |= {"flights": [name], "without": list(without)}
     content = {k: diagnosis[k] for k in ANSWERED}
     return name, without, json.dumps(content) + "\n"

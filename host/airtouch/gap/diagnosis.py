@@ -5,19 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import callable_module
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.answer.pictures import of as pictures_of
+from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.related import signs_not_shown
@@ -77,8 +76,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
-    nominal = list(measure.usable(baseline, vehicle, notes))
-    usable = list(measure.usable(flights, vehicle, notes))
+    nominal = list(ready_flights(baseline, vehicle, notes))
+    usable = list(ready_flights(flights, vehicle, notes))
     if not usable:
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
@@ -145,7 +144,7 @@ def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bo
         arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
         next=steps,
-        cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=case.calibration.parameters if case.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
@@ -199,6 +198,3 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
         selection = recorded.without_names(selection)
         gap = gap_of(data, selection.parts, None)
     return selection, gap
-
-
-callable_module(__name__)
