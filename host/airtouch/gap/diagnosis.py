@@ -43,7 +43,7 @@ PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no w
 
 
 @dataclass(frozen=True)
-class Case:
+class Comparison:
     """What is diagnosed: flights made ready, compared with the study of a vehicle.
 
     usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
@@ -89,16 +89,18 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if partner:
         study, note = _with_partner(study, usable[0], seconds)
         notes.append(note)
-    case = Case(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
-    data = _data(study, case.judged)
+    comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
+    data = _data(study, comparison.judged)
     selection, gap = _selected(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
-    return replace(_explained(result, case, selection, pictures), notes=_notes(case, notes), calibrated=calibrated)
+    return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
+                   calibrated=calibrated)
 
 
-def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
+def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
+                        data: Data | None = None) -> Diagnosis:
     """`diagnose` with a study that is there already, without map, arms and advice: for many cases alike.
 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
@@ -126,27 +128,27 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
         shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
 
 
-def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
+def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
     """The answer with what it is compared with: the map and its largest cells, arms, what stays open, what to fly next.
 
     pictures: whether to keep the curves that a report shows.
     """
-    study, usable, nominal = case.study, case.usable, case.nominal
+    study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
     effects, is_effect = list(result.effects), result.verdict == "effect"
     terms = [candidates.term_of(e) for e in effects]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
-                       case.vehicle.name)
+                       comparison.vehicle.name)
     return replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
-        unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
+        arms=arms(comparison.vehicle, nominal, comparison.calibration, judged, selection, result) if is_effect else {},
+        unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         next=steps,
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
-        vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
-        calibration=case.calibration.parameters if case.calibration else {},
+        vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
+        calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
 
 
@@ -158,14 +160,15 @@ def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[s
     return calibrate.calibrated(vehicle, nominal, without=without)
 
 
-def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
+def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
-    notes = [note for f in case.usable for note in f.notes] + [*of_logs]
-    notes += list(case.calibration.notes) if case.calibration else [NO_BASELINE]
-    notes += differences(case.study, case.nominal)
-    notes += flown_unlike(case.study, case.usable)
-    if len(case.judged) < len(case.usable):
-        notes.append(f"candidates were judged on {len(case.judged)} of {len(case.usable)} flights, evenly chosen")
+    notes = [note for f in comparison.usable for note in f.notes] + [*of_logs]
+    notes += list(comparison.calibration.notes) if comparison.calibration else [NO_BASELINE]
+    notes += differences(comparison.study, comparison.nominal)
+    notes += flown_unlike(comparison.study, comparison.usable)
+    if len(comparison.judged) < len(comparison.usable):
+        notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
+                     "chosen")
     return tuple(dict.fromkeys(notes))
 
 

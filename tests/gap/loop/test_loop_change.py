@@ -94,7 +94,7 @@ def in_bands(x):
 @pytest.mark.parametrize("name", CHANGES)
 def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
     f = frequencies(AIR)
-    law = (nominal().response.steady, nominal().response.stepped)[stepped]
+    law = (nominal().response.quiet_law, nominal().response.stepped_law)[stepped]
     predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f), stepped)[:, 1]
     simulated = shares(name)[stepped] / shares(None)[stepped]
     band = (f > low) & (f < high)
@@ -144,7 +144,7 @@ def test_an_attitude_gain_is_named_with_its_strength(study):
 
     The position's gain acts before it, so that one flight knows their product best.
     """
-    diagnosis = diagnose.brief(study, gap_flights.fly(1, 97, {"controller_gain": {"attitude": 0.55}}))
+    diagnosis = diagnose.diagnose_with_study(study, gap_flights.fly(1, 97, {"controller_gain": {"attitude": 0.55}}))
     assert [e.name for e in diagnosis.effects] == ["controller_gain"]
     gain, position = (diagnosis.effects[0].parameters[name] for name in ("attitude", "position"))
     assert gain.low < 0.55 < gain.high

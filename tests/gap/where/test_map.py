@@ -11,7 +11,7 @@ from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.where import gap_map as maps
 from airtouch.gap.where.band_sums import stretches, sums
 from airtouch.gap.where.cell_words import in_words
-from airtouch.gap.where.filter_bank import BANDS_HZ, filtered, gains, sensor_rms
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES, regimes
 from airtouch.gap.where.summary import largest, significant
 from airtouch.simulation import signals as at
@@ -19,12 +19,12 @@ from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
 NOISE = float(prepare(VEHICLE, ())[0][0]["acc_noise"][0])
-WIDTH = np.array([b - a for a, b in BANDS_HZ])
+WIDTH = np.array([b - a for a, b in MAP_BANDS_HZ])
 
 
 def cell(gap_map, channel, band, phase="hover", regime="all"):
     return next(c for c in gap_map.cells if (c.channel, c.band_hz, c.phase, c.regime)
-                == (channel, BANDS_HZ[band], phase, regime))
+                == (channel, MAP_BANDS_HZ[band], phase, regime))
 
 
 def test_bands_share_the_power_out():

@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.answer.reasons import nearest
-from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
-from airtouch.gap.signals.channels import COLUMN, residual
+from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.gap.signals.study import Study
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import mean_of
+from airtouch.gap.where import summary
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
@@ -25,17 +26,17 @@ TINY = 1e-9  #: ratio to the floor at least, of which a logarithm is taken
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
                 ) -> list[dict[str, Any]]:
-    """The largest cells of the map that the named effects leave, JSON-ready (host/docs/gap.md, "The JSON").
+    """What the effects leave in the cells with most of the gap before any, JSON-ready (host/docs/gap.md, "The JSON").
 
-    cells: largest first. Each entry has the stretch of time in which most of it is (of the flight in which it is
-    largest), how far it is over the floor there, signals that the cell's power follows from block to block, and
-    the effects that gain most with the reason why they were not named.
+    cells: the headline, then the others, largest first. Each entry has the stretch of time in which most of the gap is,
+    of the flight in which it is largest, and in the phase of the cell; how far it is over the floor there; signals that
+    the cell's power follows from block to block; and the effects that gain most, with the reason why they were not
+    named.
     """
     terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
-    active = tuple(t.active() for t in terms if t.shows_in == MEAN)
-    chosen = [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]
-    model = (*study.calibration, *active)
-    gaps = [(f, residual(f, study.vehicle, model, study.controller)) for f in flights] if chosen else []
+    active = [t.active() for t in mean_of(terms)]
+    chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
+    gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []
     near = nearest(selection)
     out = []
     for cell in chosen:
@@ -124,8 +125,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
 def _block_means(study: Study, flight: Flight) -> dict[str, np.ndarray]:
     """Mean in the air (blocks,) of each signal of a flight, by its name."""
     samples = starts(flight, AIR)[:, None] + np.arange(LENGTH[AIR])
-    air = np.where(flight.phase == GROUND, np.nan, 1.0)
-    return {name: np.nanmean((values * air)[samples], axis=1) for name, values in _signals(study, flight).items()}
+    return {name: values[samples].mean(axis=1) for name, values in _signals(study, flight).items()}
 
 
 def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:

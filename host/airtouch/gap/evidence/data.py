@@ -154,7 +154,7 @@ def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.n
 def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
     """`_replay_spectra` of flight i, by regime."""
     bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
-                               data.workspace.once("residuals", i, Workspace))
+                               data.workspace.cached("residuals", i, Workspace))
     out = {}
     for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = blocks(bridged[:, :COMMAND.start], begin, r)
@@ -167,7 +167,7 @@ def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], 
             ) -> list[dict[str, np.ndarray]]:
     """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
     if not active:
-        return data.workspace.once(f"{name} of no effect", (), make)
+        return data.workspace.cached(f"{name} of no effect", (), make)
     if sum(len(f) for f in data.flights) > KEPT_SAMPLES:
         return make()
-    return data.workspace.once(name, tuple((a.effect.name, *a.values.values(), a.gate) for a in active), make, KEPT)
+    return data.workspace.cached(name, tuple(a.key for a in active), make, KEPT)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnosis import brief
+from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.sealed.blind import Say
@@ -25,8 +25,8 @@ from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
 Mapper = Callable[[Callable, Iterable], Iterable]
-Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
-CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
+Task = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
+TaskFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
 Answer = tuple[str, tuple[str, ...], str]  #: name of a flight, effects left out, the diagnosis as JSON
 AHEAD = 4  #: flights sent to each process and not yet back; chosen
 #: fields of a diagnosis that an answer has
@@ -84,7 +84,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
 
 
-def _answers(study: Study, files: Sequence[CaseFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+def _answers(study: Study, files: Sequence[TaskFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
     """Answers as they come, in the order of the flights.
 
     Local processes read the logs themselves: if a process dies while a log is written to its pipe, Python 3.11 waits
@@ -114,17 +114,17 @@ def _begin(study: Study | None) -> None:
     _study = study
 
 
-def with_study(case: CaseFile) -> Answer:
+def with_study(case: TaskFile) -> Answer:
     """The answer to one case, in a process that `_begin` has given the study."""
     assert _study is not None
     name, without, path = case
     return _diagnosed(_study, (name, without, read(path)))
 
 
-def _diagnosed(study: Study, case: Case) -> Answer:
+def _diagnosed(study: Study, case: Task) -> Answer:
     """Name, effects left out, and the diagnosis as JSON."""
     name, without, log = case
-    diagnosis = brief(study, list(ready_flights([log], study.vehicle, [])), without).plain()
+    diagnosis = diagnose_with_study(study, list(ready_flights([log], study.vehicle, [])), without).plain()
     diagnosis |= {"flights": [name], "without": list(without)}
     content = {k: diagnosis[k] for k in ANSWERED}
     return name, without, json.dumps(content) + "\n"

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 from airtouch.gap.where.regimes import REGIMES, regimes
 from airtouch.vehicle import Vehicle
 
@@ -48,7 +48,7 @@ def join(parts: Sequence[Sums]) -> Sums:
     if not parts:
         r = len(REGIMES)
         return Sums(np.zeros(0, int), np.zeros(0, int), np.zeros((0, r)),
-                    np.zeros((0, r, len(BANDS_HZ), COUNT)), np.zeros((0, r, COUNT)))
+                    np.zeros((0, r, len(MAP_BANDS_HZ), COUNT)), np.zeros((0, r, COUNT)))
     return Sums(np.concatenate([p.phase for p in parts]),
                 np.concatenate([np.full(len(p.phase), i) for i, p in enumerate(parts)]),
                 *(np.concatenate([getattr(p, key) for p in parts]) for key in ("weight", "power", "mean")))
@@ -68,7 +68,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
             mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
             if mask[0].any():
                 parts.append((flight.phase[start + first], mask.sum(axis=1),
-                              (mask @ flat[here]).reshape(len(REGIMES), len(BANDS_HZ), COUNT),
+                              (mask @ flat[here]).reshape(len(REGIMES), len(MAP_BANDS_HZ), COUNT),
                               mask @ bands[0, here]))
     if not parts:
         return join([])
@@ -78,8 +78,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
 
 def stretches(flight: Flight) -> list[tuple[int, int]]:
     """First sample and the one after the last of each stretch without contact, in the air or at rest."""
-    air = (flight.phase != GROUND) & ~flight.on_ground
-    kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.bridged)
+    kind = np.where(flight.on_ground, 1, np.where(flight.phase != GROUND, 2, 0)) * (flight.usable | flight.bridged)
     bounds = np.r_[0, np.flatnonzero(np.diff(kind)) + 1, len(kind)]
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
 

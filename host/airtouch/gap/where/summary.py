@@ -47,7 +47,7 @@ def over_floor(cell: Cell, value: float | None = None) -> float:
     return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, TINY)
 
 
-def after(cell: Cell) -> float:
+def ratio_after(cell: Cell) -> float:
     """The cell's gap over its floor with the named effects in the model; the gap without them, where none was tried."""
     return (cell.gap if cell.after is None else cell.after) / max(cell.floor, TINY)
 
@@ -184,11 +184,10 @@ def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
     return chosen + sorted(others, key=sure_ratio, reverse=True)
 
 
-def overall(cells: Iterable[Cell], key: str = "gap") -> float:
-    """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
-    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME
-              and getattr(c, key) is not None and c.floor > 0.0]
-    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
+def overall(cells: Iterable[Cell]) -> float:
+    """Root mean square over all cells in the air of gap over floor, each with the same weight; NaN without any."""
+    ratios = [c.gap / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME and c.floor > 0.0]
+    return rms(ratios) if ratios else float("nan")
 
 
 def rms(values: Sequence[float]) -> float:
