@@ -84,7 +84,7 @@ def candidates_of(names):
 
 
 def select_from(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):
-    data = Data(study, flights, slow=study.response is None)
+    data = Data(study, flights)
     return select(data, candidates_of(names), progress, without), data
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import short_flights
 from airtouch import vehicle
-from airtouch.gap.answer.pictures import of
+from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, RankedCandidate
@@ -48,5 +48,5 @@ def of_flights(logs, effects=(FOUND,), **more):
     terms = [term_of(e) for e in effects]
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)
-    pictures = of(study, flights, [], terms, result.headline, whole.cells)
+    pictures = pictures_of(study, flights, [], terms, result.headline, whole.cells)
     return replace(result, where=tuple(summary.cells_to_show(whole)), pictures=pictures)

@@ -95,10 +95,10 @@ def test_simulate_is_what_the_command_flies():
 
 
 def test_gap_is_called_by_name_and_stays_a_module(log, path, tmp_path):
-    from airtouch.gap.measure import Measurement, measure
+    from airtouch.gap.measurement import Measurement, measure
 
     assert isinstance(at.gap.measure(path), Measurement) and callable(measure)
-    from airtouch.gap.diagnose import diagnose  # the import of a module must not hide the function
+    from airtouch.gap.diagnosis import diagnose  # the import of a module must not hide the function
 
     assert callable(diagnose) and callable(at.gap.diagnose)
     with pytest.raises(at.AirTouchError, match="no flight to diagnose|too short|no flight in it"):

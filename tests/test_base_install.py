@@ -25,7 +25,7 @@ class Absent:
         if name.split(".")[0] in {sorted({m for some in EXTRAS.values() for m in some})!r}:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Absent())
-import airtouch.gap.measure, airtouch.simulation.batch
+import airtouch.gap.measurement, airtouch.simulation.batch
 from airtouch.cli import main
 for words, folder in json.load(sys.stdin):
     if not (pid := os.fork()):

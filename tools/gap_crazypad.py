@@ -27,7 +27,7 @@ from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import HoverPattern, hover_pattern
 from airtouch.gap.balance.priors import PRIORS, STEADY, Priors
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_corrections import show_corrections

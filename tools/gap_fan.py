@@ -13,10 +13,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import GROUND, PERIOD_S
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.logs import read
@@ -30,7 +29,7 @@ FAR = 5.0  #: power over the floor's from which a block is far above it; no sour
 def main(folder: Path) -> None:
     """Print, as a table, the mean torques of each flight and its blocks far above the floor."""
     vehicle = vehicles.load(VEHICLE)
-    fan, calm = (list(measure.usable([read(Path(p)) for p in group], vehicle, []))
+    fan, calm = (list(ready_flights([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
     study, _ = calibrate.calibrated(vehicle, calm)
     f = frequencies(AIR)

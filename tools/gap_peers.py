@@ -14,7 +14,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs import read

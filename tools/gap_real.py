@@ -32,7 +32,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import swarm_cuts
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog

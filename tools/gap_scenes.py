@@ -18,7 +18,7 @@ from itertools import islice
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.sealed.blind import VEHICLE, stripped
 from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signatures.alike import interchangeable

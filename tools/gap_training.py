@@ -36,7 +36,7 @@ from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario

@@ -31,10 +31,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import Flight
+from airtouch.gap.flights.flight import Flight, ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent, passing_sizes
 from airtouch.gap.sealed import blind
@@ -161,7 +160,7 @@ def _name(name: str, others: bool) -> str:
 
 def _ready(logs: list[Log], vehicle: Vehicle) -> list[tuple[str, Flight]]:
     """The flights of logs that can be used, with their names."""
-    return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], vehicle, []), strict=True))
+    return list(zip([name for name, _ in logs], ready_flights([log() for _, log in logs], vehicle, []), strict=True))
 
 
 def _evenly_spaced(items: list) -> list:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from airtouch.detector.registry import Detector
     from airtouch.detector.trace import Trace
-    from airtouch.gap.measure import Measurement
+    from airtouch.gap.measurement import Measurement
     from airtouch.gap.result import Diagnosis
     from airtouch.simulation.scenario import Scenario
     from airtouch.twin.adapt import Adapted, Progress
@@ -169,7 +169,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     The result's `plain()` is the JSON of `airtouch gap diagnose`.
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
-    import airtouch.gap.diagnose as module
+    import airtouch.gap.diagnosis as module
     from airtouch.report import gap_report
 
     logs = _logs(flights)
@@ -184,7 +184,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
 def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
             baseline: "Flight | Iterable[Flight]" = ()) -> "Measurement":
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
-    import airtouch.gap.measure as module
+    import airtouch.gap.measurement as module
 
     logs = _logs(flights)
     return module.measure(logs, _vehicle(vehicle, logs), _logs(baseline))

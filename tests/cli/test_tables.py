@@ -9,7 +9,7 @@ import time
 import pytest
 from rich.console import Console
 
-import airtouch.gap.diagnose as diagnose
+import airtouch.gap.diagnosis as diagnose
 from airtouch.cli.gap import show
 from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import short_flights
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import diagnose
-from airtouch.gap.measure import measure
+from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.measurement import measure
 from airtouch.logs.flight_log import ACC, ACC_WORLD, COLUMNS, GYRO, POSITION, PWM, VELOCITY, FlightLog
 from airtouch.simulation.effects import EFFECTS
 

@@ -6,7 +6,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-import airtouch.gap.diagnose as module
+import airtouch.gap.diagnosis as module
 from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError

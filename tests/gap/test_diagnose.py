@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.diagnose import MOST_SECONDS, flights_to_judge
+from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
 
 
 @pytest.mark.parametrize(("count", "seconds", "chosen"), [

@@ -11,7 +11,7 @@ PAGE = ROOM.parents[1] / "docs" / "architecture.md"
 #: folders in the order of the package's own words, each a line that begins with its name
 FOLDERS = [name for name in re.findall(r"^(\w+)  +\S", gap.__doc__, re.M) if (ROOM / name).is_dir()]
 #: Modules that stand beside the folders, and the first folder that may not import them
-BESIDE = {"workspace": None, "second_process": None, "result": None, "measure": "answer", "diagnose": "sealed"}
+BESIDE = {"workspace": None, "second_process": None, "result": None, "measurement": "sealed", "diagnosis": "sealed"}
 
 
 def test_every_module_is_on_the_page_and_what_is_on_the_page_is_there():
@@ -46,9 +46,11 @@ def test_a_folder_imports_only_those_above_it():
 
 
 def _imported(path):
-    """Names under `airtouch.gap` that a file imports, the first part of each."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Names under `airtouch.gap` that a file imports when it runs, the first part of each."""
+    names, tree = set(), ast.parse(path.read_text())
+    for_types = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    not_run = {id(node) for block in for_types for node in ast.walk(block)}
+    for node in (node for node in ast.walk(tree) if id(node) not in not_run):
         if isinstance(node, ast.ImportFrom) and node.module == "airtouch.gap":
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airtouch.gap."):

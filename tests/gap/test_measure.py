@@ -8,7 +8,7 @@ import pytest
 import short_flights
 from airtouch import logs, vehicle
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measure import measure
+from airtouch.gap.measurement import measure
 from airtouch.gap.where.summary import significant
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog
 from airtouch.logs.segments import KINDS

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from airtouch.gap import second_process
-from airtouch.gap.second_process import shared, spare_core
+from airtouch.gap.second_process import map_on_two_cores, spare_core
 from airtouch.simulation import effects
 
 forks = pytest.mark.skipif(not spare_core(), reason="one core, or a platform that does not fork safely")
@@ -22,7 +22,7 @@ def _slow(x):
 
 @forks
 def test_both_processes_work_and_the_order_stays():
-    results = shared(_slow, range(20))
+    results = map_on_two_cores(_slow, range(20))
     assert [x for x, _ in results] == list(range(20))
     assert len({pid for _, pid in results}) == 2
     assert not multiprocessing.active_children()
@@ -37,7 +37,7 @@ def test_what_a_dead_process_owes_is_done_here():
             os._exit(1)
         return _slow(x)[0]
 
-    assert shared(dies_elsewhere, range(8)) == list(range(8))
+    assert map_on_two_cores(dies_elsewhere, range(8)) == list(range(8))
 
 
 @forks
@@ -51,7 +51,7 @@ def test_an_error_of_the_other_process_is_raised_here():
         return x
 
     with pytest.raises(ValueError, match="item 7"):
-        shared(fails, range(8))
+        map_on_two_cores(fails, range(8))
     assert not multiprocessing.active_children()
 
 
@@ -62,13 +62,13 @@ def test_effects_come_back_as_the_registered_ones():
     def effect(name):
         return _slow(effects.get(name))[0]
 
-    assert all(e is effects.get(n) for n, e in zip(names, shared(effect, names), strict=True))
+    assert all(e is effects.get(n) for n, e in zip(names, map_on_two_cores(effect, names), strict=True))
 
 
 def test_one_core_forks_nothing(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     assert not spare_core()
-    assert {pid for _, pid in shared(_slow, range(4))} == {os.getpid()}
+    assert {pid for _, pid in map_on_two_cores(_slow, range(4))} == {os.getpid()}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks on Linux alone")

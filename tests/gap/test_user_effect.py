@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import airtouch.gap.measure as measure
-from airtouch.gap.diagnose import brief, diagnose
+from airtouch.gap.diagnosis import diagnose, diagnose_with_study
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.relations import own_effect
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
@@ -52,7 +52,8 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     assert abs(diagnosis.control["shrink"]["value"]) < 0.2
     (switch_on,) = [step.command for step in diagnosis.next if NAME in step.text]
     assert f"{NAME}.py --effect {NAME}:force=" in switch_on  # without its file the command would be refused
-    left_out = brief(diagnosis.calibrated[0], list(measure.usable(real, vehicle, [])), (NAME,))  # the same calibration
+    same_study, _ = diagnosis.calibrated
+    left_out = diagnose_with_study(same_study, list(ready_flights(real, vehicle, [])), (NAME,))
     assert NAME not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > diagnosis.gap["after"]
     unknown, nearest, *_ = left_out.ranking

@@ -12,9 +12,8 @@ import airtouch
 import made_diagnosis
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice, words
-from airtouch.gap.answer.pictures import of_measurement
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measure import measure
+from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import term_of
@@ -129,7 +128,7 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
 
 def test_page_of_a_measurement(pushed_flights, tmp_path):
     path, gap = tmp_path / "gap.html", measure(pushed_flights, VEHICLE)
-    pictures = of_measurement(gap, pushed_flights, VEHICLE)
+    pictures = pictures_of_measurement(gap, pushed_flights, VEHICLE)
     gap_report.write_measurement(path, gap, pictures, command="airtouch gap measure x")
     text, checker = checked(path)
     assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
@@ -142,7 +141,7 @@ def test_the_report_computes_nothing():
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
-        allowed = ("measure", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
+        allowed = ("measurement", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
                    "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)

@@ -1,7 +1,7 @@
 """Where the gap between simulation and reality lies, which effect causes it, how far it shrinks.
 
-`airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` take files, logs or tables, as
-`airtouch.api` says. Both are modules as well, whose functions take logs alone.
+`airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` are those of `airtouch.api`, which
+take files, logs or tables. Those of the modules `diagnosis` and `measurement` take logs alone.
 
 One folder a step; each imports only those above it. The decisions, file by file: host/docs/architecture.md.
 
@@ -22,35 +22,21 @@ answer      verdict, probabilities, parameters, how far, what to fly next
 balance     flights without a gyro: the balance of a hover
 sealed      sets whose effect is withheld: made, diagnosed, scored
 
-`diagnose` calls them all and fills a `result`; `measure` is the map alone. A `workspace` keeps what is worked out once;
-`second_process` shares work with another core.
+`diagnosis` calls them all and fills a `result`; `measurement` is the map alone. A `workspace` keeps what is worked out
+once; `second_process` shares work with another core.
 """
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what a call of them takes and returns; import the modules as `import airtouch.gap.diagnose as ...`
+if TYPE_CHECKING:
     from airtouch.api import diagnose, measure
 
-__all__ = ["callable_module", "diagnose", "measure"]
-
-
-class _Callable(ModuleType):
-    """A module that is called by its own name: `gap.diagnose(...)` is `airtouch.api.diagnose(...)`."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return getattr(importlib.import_module("airtouch.api"), self.__name__.rpartition(".")[2])(*arguments, **options)
-
-
-def callable_module(name: str) -> None:
-    """Make the module of that name one that can be called."""
-    sys.modules[name].__class__ = _Callable
-
+__all__ = ["diagnose", "measure"]
 
 if not TYPE_CHECKING:  # so that a type checker tells a name that is not there
     def __getattr__(name: str) -> Any:
-        if name in ("diagnose", "measure"):
-            return importlib.import_module(f"airtouch.gap.{name}")
+        """The two functions, whose modules are imported at their first use."""
+        if name in __all__:
+            return getattr(importlib.import_module("airtouch.api"), name)
         raise AttributeError(f"module 'airtouch.gap' has no attribute {name!r}")

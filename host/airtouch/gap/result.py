@@ -2,9 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:  # which import this module
+    from airtouch.gap.answer.pictures import Pictures
+    from airtouch.gap.nominal.calibrate import Calibration
+    from airtouch.gap.signals.study import Study
 
 
 @dataclass(frozen=True)
@@ -127,9 +132,9 @@ class Diagnosis:
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
     #: `gap.answer.pictures.Pictures`, where they were asked for
-    pictures: Any = field(default=None, repr=False, compare=False)
+    pictures: "Pictures | None" = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
-    calibrated: Any = field(default=None, repr=False, compare=False)
+    calibrated: "tuple[Study, Calibration | None] | None" = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""
@@ -155,7 +160,7 @@ class Diagnosis:
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, the fields of host/docs/gap.md, "The JSON"; floats rounded to six digits."""
-        made = {
+        content = {
             "verdict": self.verdict,
             "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()},
                          **({"seconds": [{"flight": f, "from_s": a, "to_s": b} for f, a, b in e.seconds]}
@@ -172,7 +177,7 @@ class Diagnosis:
             "floor_from": self.map.floor_from if self.map else None,
             "map": [plain_cell(c) for c in self.map.cells] if self.map else [],
         }
-        return rounded(made)
+        return rounded(content)
 
 
 def plain_cell(cell: Cell) -> dict[str, Any]:

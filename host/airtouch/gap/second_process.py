@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 MOST_ITEMS = 255  #: that are shared at once: each is one byte in a pipe
 
 
-def shared(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+def map_on_two_cores(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """`function` of each item, in their order.
 
     Where another core is free for this process, a fork of it does some of them: whoever is ready takes the next.

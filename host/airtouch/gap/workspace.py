@@ -4,11 +4,11 @@ from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
 Kept = TypeVar("Kept")
-MOST = 500  #: values of one kind
+MOST = 500  #: values of one kind that are kept; chosen
 
 
 class Workspace:
-    """Values by what they are and of what they are; of one kind those least recently used go first.
+    """Cached values by kind and key; the least recently used of a kind are dropped first.
 
     Flights, loops and problems have one each (`field(default_factory=Workspace, init=False)`), so that a changed copy
     begins with nothing. So does one in another process: what would be sent is larger than the work of making it anew.
@@ -20,11 +20,11 @@ class Workspace:
     def __reduce__(self) -> tuple[type["Workspace"], tuple[()]]:
         return Workspace, ()
 
-    def once(self, what: str, of: Hashable, make: Callable[[], Kept], most: int = MOST) -> Kept:
+    def cached(self, kind: str, key: Hashable, compute: Callable[[], Kept], most: int = MOST) -> Kept:
         """The value of a kind and key, made when it is not there; at most so many of the kind are kept."""
-        kept = self._kept.setdefault(what, {})
-        value = kept.pop(of) if of in kept else make()
-        kept[of] = value
+        kept = self._kept.setdefault(kind, {})
+        value = kept.pop(key) if key in kept else compute()
+        kept[key] = value
         if len(kept) > most:
             kept.pop(next(iter(kept)))
         return value

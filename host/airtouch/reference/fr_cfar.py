@@ -5,7 +5,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
-from airtouch.reference.finite import FLOAT32_MIN, hold_finite
+from airtouch.reference.finite import FLOAT32_MAX, FLOAT32_MIN, hold_finite
 
 POWER_LIMIT = float(np.float32(1e30))  #: cells are clamped to this, the square of SAMPLE_LIMIT
 

@@ -13,9 +13,9 @@ from airtouch.extras import lacking
 from airtouch.gap.answer import words
 from airtouch.gap.answer.advice import ADD_AN_EFFECT
 from airtouch.gap.answer.pictures import Pictures
-from airtouch.gap.measure import Measurement
+from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
-from airtouch.gap.second_process import shared
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.where import summary
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables
@@ -117,7 +117,7 @@ def _images(pictures: Pictures | None) -> list[dict[str, str]]:
         drawn.append(("Spectra of the motor commands",
                       "Delays, gains and noise in the loop show here, as a shape that differs.",
                       partial(gap_figures.commands, pictures.commands)))
-    files = shared(lambda one: one[2](), drawn)
+    files = map_on_two_cores(lambda one: one[2](), drawn)
     return [{"title": title, "data": embed(file), "text": text}
             for (title, text, _), file in zip(drawn, files, strict=True)]
 

@@ -1,9 +1,11 @@
 """Why a candidate is not the answer: each reason, by replay and by the relations of the signals."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
@@ -12,17 +14,20 @@ EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
 TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
 
 
-def judged(name, gain, evidence=None):
-    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
+def judged(name, gain, evidence=None, **more):
+    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence, **more)
 
 
 def selection(named=("mass",), inference=False, of_distance=False, **more):
-    """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing."""
+    """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing.
+
+    Of several that are named, each adds a quarter of its gain to the others.
+    """
     singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
-        steps.append(judged(n, total))
+        steps.append(judged(n, total, share=0.25 * EVIDENCE[n]))
     evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0, of_distance=of_distance) if inference else None
     settings = {"nameless_alone": 150.0, "nameless_beside": 4.0, "parts": (None, None),
                 "least": dict.fromkeys(EVIDENCE, 8.0),
@@ -68,11 +73,19 @@ def test_a_distance_is_told_as_one():
 
 
 def test_a_second_effect_is_told_apart_from_one_that_acts_alone():
-    pair = selection(("mass", "wind"))
-    assert why_not(pair, "wind", "effect") == ("named beside mass: adds 40 nats to it; the probability is that it "
-                                               "acts alone")
+    for named in (("mass", "wind"), ("wind", "mass")):  # in either order of the steps
+        pair = selection(named)
+        assert why_not(pair, "wind", "effect") == ("named beside mass: adds 10 nats to the others; the probability is "
+                                                   "that it acts alone")
     related = selection(("mass", "wind"), inference=True)
     assert why_not(related, "wind", "effect") == "named beside mass: the probability is that it acts alone"
+
+
+def test_effects_are_alike_by_what_each_gains_alone():
+    """Of two that are named the first is weighed by its own gain, not by that of both."""
+    near = {"gust": judged("gust", 198.0), "mass": judged("mass", 200.0), "wind": judged("wind", 40.0)}
+    for named in (("mass",), ("mass", "wind"), ("wind", "mass")):
+        assert alike_of(replace(selection(named), singles=near)) == (("gust", "mass"),)
 
 
 def test_where_nothing_is_named():

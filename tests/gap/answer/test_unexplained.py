@@ -1,5 +1,6 @@
 """What stays open: the seconds and the signals that a gap of known shape follows."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from airtouch.gap.answer.unexplained import followed_signals, over_floor, unexpl
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, starts
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
 from made_diagnosis import cell
@@ -54,6 +56,21 @@ def test_an_entry_tells_flight_and_seconds_of_the_strongest_gap():
     assert entry["flight"] == "windy.csv" and entry["channel"] == "force_x" and entry["phase"] == "hover"
     assert entry["from_s"] == pytest.approx(20.0, abs=LENGTH[AIR] / 100.0)
     assert entry["to_s"] == pytest.approx(28.0, abs=LENGTH[AIR] / 100.0)
+
+
+def test_the_seconds_of_an_entry_are_of_its_phase():
+    """The gap is strongest in cruise; an entry of the hover tells the worst of the hover, and what goes with it there.
+
+    Where no block is mostly of the phase, all count.
+    """
+    t = np.arange(4000) / 100.0
+    strength = np.where(t >= 25.0, 9.0, np.where((t >= 8.0) & (t < 14.0), 3.0, 0.1))
+    phase = np.where(t >= 25.0, KINDS.index("cruise"), KINDS.index("hover"))
+    cells = [CELL, replace(CELL, phase="cruise"), replace(CELL, phase="landing")]
+    hovering, cruising, landing = unexplained(STUDY, [hover(strength, phase=phase)], selection(), cells)
+    assert (hovering["from_s"], hovering["to_s"]) == pytest.approx((8.0, 14.0), abs=LENGTH[AIR] / 100.0)
+    assert hovering["over_floor"] < 0.5 * cruising["over_floor"] and cruising["from_s"] > 22.0
+    assert landing["from_s"] == cruising["from_s"] and landing["over_floor"] == cruising["over_floor"]
 
 
 def test_five_cells_are_told_at_most():

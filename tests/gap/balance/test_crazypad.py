@@ -8,7 +8,7 @@ from airtouch.gap.balance.hover_balance import ANSWER, POWER, Reference, evidenc
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses, weight_change
 from airtouch.gap.balance.hover_pattern import HoverPattern
 from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.logs import read
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at

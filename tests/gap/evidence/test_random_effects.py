@@ -13,11 +13,13 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import activate
 from airtouch.simulation.flight import prepare
+from gap_flights import flight as made_flight
 
 VEHICLE = vehicles.load()
 #: rotors that turn at speeds of their own, as real ones do: else their lines add up as their phases happen to stand
@@ -62,6 +64,15 @@ def test_lines_of_steady_rotors_lie_at_their_fold_with_their_power():
         assert line == pytest.approx(0.5 * 0.5 ** 2 * (turns[k] / 327.0) ** 4, rel=0.02)
         assert abs(f[np.argmax(np.where(np.abs(f - place) < 4.0, power[0], 0.0))] - place) <= f[1]
     assert np.all(vibration_lines.folded(np.ones((1, 256)))[0, 1:-1] == 0.5)
+
+
+def test_a_rotor_whose_speed_was_lost_turns_on():
+    rpm = np.linspace(19000.0, 21000.0, 400)
+    lost = (np.arange(400) % 40) < 3
+    one = made_flight(4.0)
+    one.log.columns.update({name: np.where(lost, np.nan, rpm) for name in vibration_lines.RPM})
+    speed = vibration_lines.speeds(one, declared_study(VEHICLE, ()))
+    assert speed == pytest.approx(np.tile(rpm[:, None] * np.pi / 30.0, 4), rel=1e-2)
 
 
 def test_a_spread_keeps_the_power_and_has_its_width():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import airtouch.gap.measure as measure
 import gap_flights
 from airtouch import vehicle as vehicles
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.logs.flight_log import FlightLog
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
@@ -22,7 +22,7 @@ def without(log, *rows):
 
 
 def as_flight(log):
-    (flight,) = measure.usable([log], VEHICLE, [])
+    (flight,) = ready_flights([log], VEHICLE, [])
     return flight
 
 

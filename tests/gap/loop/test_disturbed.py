@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop.controller import firmware_of
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
@@ -28,7 +28,7 @@ def spectra():
     turns, commanded = [], []
     for pair in zip(*both, strict=True):
         assert all(isinstance(log, FlightLog) for log in pair)
-        calm, rough = measure.usable(pair, VEHICLE, [])
+        calm, rough = ready_flights(pair, VEHICLE, [])
         n = min(len(calm), len(rough))
         first = starts(rough, AIR)
         first = first[first + 2 * blocks(np.zeros((n, 1)), first[:1], AIR).shape[1] <= n]

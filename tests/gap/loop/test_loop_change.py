@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-import airtouch.gap.diagnose as diagnose
-import airtouch.gap.measure as measure
+import airtouch.gap.diagnosis as diagnose
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.edges.edge_effects import exact_sensors
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.nominal.build_study import declared_study
@@ -41,7 +41,7 @@ CLOSE, LATE = 0.1, 0.2
 def fly(active, numbers, vehicle=None):
     vehicle = vehicle or vehicles.load(VEHICLE)
     logs = list(batch.flights("diagnosis", numbers, vehicle=vehicle, effects=active, workers=1))
-    return list(measure.usable(logs, vehicle, []))
+    return list(ready_flights(logs, vehicle, []))
 
 
 def active_effects(name):
@@ -94,7 +94,7 @@ def in_bands(x):
 @pytest.mark.parametrize("name", CHANGES)
 def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
     f = frequencies(AIR)
-    law = (nominal().response.steady, nominal().response.stepped)[stepped]
+    law = (nominal().response.quiet_law, nominal().response.stepped_law)[stepped]
     predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f), stepped)[:, 1]
     simulated = shares(name)[stepped] / shares(None)[stepped]
     band = (f > low) & (f < high)
@@ -144,7 +144,7 @@ def test_an_attitude_gain_is_named_with_its_strength(study):
 
     The position's gain acts before it, so that one flight knows their product best.
     """
-    diagnosis = diagnose.brief(study, gap_flights.fly(1, 97, {"controller_gain": {"attitude": 0.55}}))
+    diagnosis = diagnose.diagnose_with_study(study, gap_flights.fly(1, 97, {"controller_gain": {"attitude": 0.55}}))
     assert [e.name for e in diagnosis.effects] == ["controller_gain"]
     gain, position = (diagnosis.effects[0].parameters[name] for name in ("attitude", "position"))
     assert gain.low < 0.55 < gain.high

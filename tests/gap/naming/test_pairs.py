@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-import airtouch.gap.diagnose as diagnose
+import airtouch.gap.diagnosis as diagnose
 from airtouch.gap.answer.shrink import Shrink, gap_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
@@ -47,7 +47,7 @@ def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(delayed,
     if not closes:
         little = Shrink(1.4, 1.36, Quantity(0.1))
         monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), named=little))
-    diagnosis = diagnose.brief(recorded, data.flights, data=data)
+    diagnosis = diagnose.diagnose_with_study(recorded, data.flights, data=data)
     assert requests == [data]
     assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])
     assert (diagnosis.verdict == "effect") == closes

@@ -18,7 +18,7 @@ from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, 
 
 
 def trial(*flights):
-    return judging.trial_of(Data(FLOOR, list(flights), slow=True))
+    return judging.trial_of(Data(FLOOR, list(flights)))
 
 
 def test_of_variants_with_as_many_terms_the_best_is_taken():
@@ -129,14 +129,14 @@ def by_relations(monkeypatch, explained, likeliest="mass"):
 def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatch, explained):
     """They are asked with what was judged; what acts all along is not selected by the spectra anew."""
     answer, judgements = by_relations(monkeypatch, explained)
-    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))])
     assert select.select(data, candidates_of(["mass"])) is answer
     (judged_alone,) = judgements
     assert isinstance(judged_alone["mass"], Candidate) and judged_alone["mass"].gain > 100.0
 
 
 def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):
-    data = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True)
+    data = Data(scattered(), [with_a_push(9.0, 15.0)])
     answer, _ = by_relations(monkeypatch, explained=True, likeliest="downwash")
     assert select.select(data, candidates_of(["mass"])) is answer
     by_relations(monkeypatch, explained=False, likeliest="downwash")
@@ -144,13 +144,13 @@ def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_t
 
 
 def test_a_wake_of_some_seconds_is_named_though_another_effect_is_likeliest_in_the_whole_flight(monkeypatch):
-    data = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True)
+    data = Data(scattered(), [with_a_push(9.0, 15.0)])
     by_relations(monkeypatch, explained=False, likeliest="mass")
     assert [s.name for s in select.select(data, candidates_of(["mass"])).named] == ["downwash"]
 
 
 def test_a_wind_that_comes_and_goes_is_named_only_if_it_is_likeliest_in_the_whole_flight(monkeypatch):
-    data, passing = Data(scattered(), [with_a_push(9.0, 15.0)], slow=True), select.passing_effect
+    data, passing = Data(scattered(), [with_a_push(9.0, 15.0)]), select.passing_effect
     monkeypatch.setattr(select, "passing_effect", lambda *arguments: replace(passing(*arguments), name="wind"))
     answer, _ = by_relations(monkeypatch, explained=False, likeliest="mass")
     assert select.select(data, candidates_of(["mass"])) is answer

@@ -182,7 +182,7 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
 def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
-    gain = gated_effects(Data(study, flights, slow=True))["downwash"].gain
+    gain = gated_effects(Data(study, flights))["downwash"].gain
     monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
     assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
 
@@ -219,7 +219,7 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
 
 
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
-    data = Data(FLOOR, [hover(7)], slow=True)
+    data = Data(FLOOR, [hover(7)])
     for thorough in (False, True):
         best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
         assert best["imu_noise"].full == thorough
@@ -227,14 +227,14 @@ def test_a_look_that_is_thorough_fits_what_promises_nothing():
 
 
 def test_halves_share_no_block_and_leave_none_out():
-    three = Data(FLOOR, [hover(8), hover(9), hover(10, length_s=3.0)], slow=True)
+    three = Data(FLOOR, [hover(8), hover(9), hover(10, length_s=3.0)])
     first, second = judging.halves(three)
     for (i, regime, blocks), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
         assert (i, regime) == (j, of) and len(blocks) == len(three.first[i][regime]) and (blocks ^ other).all()
     (_, _, blocks), *_, (_, _, short) = first.pieces
     assert blocks[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
     assert 0 < short.sum() <= len(short), "a short flight is in both halves where it can be"
-    five = Data(FLOOR, [hover(k) for k in range(5)], slow=True)
+    five = Data(FLOOR, [hover(k) for k in range(5)])
     first, second = ({i for i, _, candidates_of in part.pieces if candidates_of.all()} for part in judging.halves(five))
     assert (first, second) == ({0, 2, 4}, {1, 3})
     assert all(candidates_of.dtype == bool for part in judging.halves(five) for _, _, candidates_of in part.pieces)
@@ -242,11 +242,11 @@ def test_halves_share_no_block_and_leave_none_out():
 
 
 def test_flights_last_as_long_as_their_samples():
-    assert Data(FLOOR, [hover(1), hover(2, length_s=10.0)], slow=True).seconds == pytest.approx(40.0)
+    assert Data(FLOOR, [hover(1), hover(2, length_s=10.0)]).seconds == pytest.approx(40.0)
 
 
 def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
-    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))])
     on = judging.trial_of(data)
     candidates = candidates_of(["mass", "thrust_coefficient", "weak_motor", "imu_noise"])
     mass = rounds.round_of(on, candidates, None)["mass"]

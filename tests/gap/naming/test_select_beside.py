@@ -160,7 +160,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
 
 
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
-    data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
+    data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)])
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
     packet_loss = judging.cross_validated(on, "packet_loss", (term,), None, 0.0)
     assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
@@ -238,7 +238,7 @@ def test_what_an_effect_adds_includes_its_companion():
 def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
     """Gusts that have no drag beside them, and the rotors' drag: what gusts add is all but what the drag gains."""
     without_companion = all_candidates(without=("rotor_drag",))["gust"]
-    data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)], slow=True)
+    data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)])
     selection = select(data, {**candidates_of(["rotor_drag"]), "gust": without_companion}, without=ALWAYS)
     shares = {s.name: s.share for s in selection.named}
     assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.whole.terms)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.answer.unexplained import unexplained
-from airtouch.gap.diagnose import brief
+from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
@@ -58,7 +58,7 @@ def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight)
 
 
 def test_the_diagnosis_says_when(study, nominal_flight):
-    diagnosis = brief(study, [pushed(nominal_flight, 0.03)])
+    diagnosis = diagnose_with_study(study, [pushed(nominal_flight, 0.03)])
     assert diagnosis.verdict == "effect"
     assert diagnosis.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
     stretches = [s for e in diagnosis.effects for s in e.seconds]
@@ -81,9 +81,9 @@ def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and
 
 def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
     wake = {"strength": 0.03, "width": 0.0, "turbulence": 1.0, "turbulence_time": 0.02, "swirl": 0.01}
-    assert brief(study, fly(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
+    assert diagnose_with_study(study, fly(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
     noise = {"rms": 0.02, "time": 0.02, "fast": 0.0, "fast_time": 0.01}
-    effect = brief(study, fly(1, 904, (("motor_noise", noise),))).effects[0]
+    effect = diagnose_with_study(study, fly(1, 904, (("motor_noise", noise),))).effects[0]
     assert effect.name == "motor_noise"
     assert effect.parameters["rms"].value == pytest.approx(0.02, rel=0.1)
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import airtouch.gap.diagnosis as module
 import gap_real
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
@@ -110,6 +111,15 @@ def test_a_partner_belongs_to_one_flight(tmp_path):
         diagnose([f.log for f in fly(2, 62)], VEHICLE, partner=[path(0.0, (0.0, 0.0, 0.5))])
     result = CliRunner().invoke(airtouch, ["gap", "diagnose", "x.csv", "--each", "--partner", "y.csv"])
     assert result.exit_code != 0 and "one flight" in str(result.exception or result.output)
+
+
+def test_where_no_wake_is_judged_a_note_says_that_the_partner_was_not_used(monkeypatch, nominal_flight):
+    """As in flights without a gyro, whose balance is judged instead."""
+    monkeypatch.setattr(module.balance_result, "applies", lambda *_: True)
+    monkeypatch.setattr(module.balance_result, "diagnosis", lambda *arguments: arguments[3])
+    log = nominal_flight.log.with_columns({k: np.zeros(len(nominal_flight)) for k in overhead.PLACE})
+    assert module.diagnose([log], VEHICLE) == []
+    assert module.diagnose([log], VEHICLE, partner=[log]) == [module.PARTNER_UNUSED]
 
 
 def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights):

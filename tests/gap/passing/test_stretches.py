@@ -48,7 +48,7 @@ def shaken(since_s, until_s, factor):
 
 
 def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
-    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)], slow=True), FORCE)
+    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]), FORCE)
     (name, since, until), = gate
     assert name == "shaken"
     assert (since, until) == pytest.approx((12.0, 14.0), abs=FORCE.piece_s)
@@ -57,4 +57,4 @@ def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
 
 @pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(FORCE.lively)])
 def test_a_calm_or_hardly_livelier_stretch_is_no_burst(factor):
-    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)], slow=True), FORCE) == ((), 0.0)
+    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)]), FORCE) == ((), 0.0)

@@ -51,6 +51,29 @@ def test_diagnosis_names_clear_effects(blind_check):
     assert figures["shrink"]["right"]["value"] > 0.75 and figures["shrink"]["wrong"]["value"] < 0.25
 
 
+def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch):
+    """Also for those beyond the ten thousandth, whose names are longer."""
+    names, opened = ["flight_1000", "flight_10000"], []
+    for name in ("sealed.json", *(f"{n}.csv.gz" for n in names)):
+        (tmp_path / name).touch()
+
+    def answer(folder, answers, cases, *_):
+        answers.mkdir(exist_ok=True)
+        for name, without in cases:
+            blind_run._place(answers, name, without).write_text(json.dumps({"flight": name, "without": without}))
+
+    def open_key(folder, answers):
+        opened.append(answers)
+        return {"answers": {n: {"effects": [{"name": "mass"}]} for n in names}}
+
+    for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None)):
+        monkeypatch.setattr(blind_run, name, stand_in)
+    monkeypatch.setattr(blind_run.blind_score, "score", lambda *_: {})
+    for _ in range(2):  # the second time with the answers without an effect
+        blind_run.run(tmp_path)
+    assert opened == 2 * [blind_key.answers_sha256([{"flight": n, "without": []} for n in names])]
+
+
 def dying(case):
     """A flight's answer as it was before; the first process that is given the second flight dies."""
     first = Path(os.environ["DIED"])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch import vehicle as vehicles
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop import controller, loop_model
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.command_response import accelerations_per_command
@@ -36,15 +36,15 @@ def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
     felt, commands = flights(rng, 1.0, 1.0)
     response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
-    np.testing.assert_allclose(response.steady.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
-    np.testing.assert_allclose(response.steady.coherent.imag, 0.0, atol=0.1)
+    np.testing.assert_allclose(response.quiet_law.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
+    np.testing.assert_allclose(response.quiet_law.coherent.imag, 0.0, atol=0.1)
 
 
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
     felt, commands = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
     response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
-    assert np.median(np.abs(response.steady.coherent)) == 0.0
+    assert np.median(np.abs(response.quiet_law.coherent)) == 0.0
 
 
 def test_a_weaker_response_earns_nothing_on_nominal_flights():
@@ -88,9 +88,9 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
     response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
     np.testing.assert_array_equal(response.quiet(commands[0])[:, 0], np.arange(20) % 4 != 0)
-    np.testing.assert_allclose(np.abs(response.stepped.coherent), 1.0 / 3.0, atol=0.05)
+    np.testing.assert_allclose(np.abs(response.stepped_law.coherent), 1.0 / 3.0, atol=0.05)
     variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
-    np.testing.assert_allclose(np.median(response.stepped.weight), np.sqrt(variances[0] / variances[1]), rtol=0.1)
+    np.testing.assert_allclose(np.median(response.stepped_law.weight), np.sqrt(variances[0] / variances[1]), rtol=0.1)
 
 
 def test_turning_under_an_outside_torque_is_the_closed_loop_s():
@@ -124,7 +124,7 @@ def empirical(active: list[Active]) -> np.ndarray:
     vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
     outcomes = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
     logs = [log for log in outcomes if isinstance(log, FlightLog)]
-    for flight in measure.usable(logs, vehicle, []):
+    for flight in ready_flights(logs, vehicle, []):
         first = starts(flight, AIR)
         turns = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
         modelled = turns - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]

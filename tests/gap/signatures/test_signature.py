@@ -14,7 +14,8 @@ def test_a_record_names_parameters_of_its_effect_with_values_in_their_bounds(nam
     parameters = {p.name: p for p in effect.parameters}
     assert name in NAMES and signature.shows_in in (MEAN, SPECTRUM, CLOCK)
     assert {*signature.free, *signature.free_later} <= parameters.keys() and signature.free
-    values = [*(item for variant in signature.variants for item in variant.items()), *(signature.steady or {}).items()]
+    values = [*(item for variant in signature.variants for item in variant.items()),
+              *(signature.without_random or {}).items()]
     values += [(signature.shape.parameter, v) for v in signature.shape.values] if signature.shape else []
     assert all(parameters[p].low <= value <= parameters[p].high for p, value in values)
     named = (*(signature.bursts or ()), signature.several_by, signature.class_by)
@@ -25,7 +26,7 @@ def test_a_record_names_parameters_of_its_effect_with_values_in_their_bounds(nam
 
 
 def test_only_an_effect_with_a_random_part_is_never_tried_without_it():
-    assert all(s.steady is not None for s in SIGNATURES.values() if s.always_random)
+    assert all(s.without_random is not None for s in SIGNATURES.values() if s.always_random)
 
 
 def test_an_effect_without_a_record_has_all_parameters_free_that_can_be_neutral():

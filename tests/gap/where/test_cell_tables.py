@@ -10,7 +10,7 @@ from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.where import cell_tables
 from airtouch.gap.where.band_sums import Sums
-from airtouch.gap.where.filter_bank import BANDS_HZ
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
@@ -23,8 +23,8 @@ def blocks_of(rng, flights, blocks, samples=200, rms=1.0, offsets=None, phase=AI
     flight = np.repeat(np.arange(flights), blocks)
     weight = np.zeros((n, len(REGIMES)))
     weight[:, 0] = samples
-    power = np.zeros((n, len(REGIMES), len(BANDS_HZ), COUNT))
-    power[:, 0] = samples * rms**2 * rng.chisquare(4, (n, len(BANDS_HZ), COUNT)) / 4
+    power = np.zeros((n, len(REGIMES), len(MAP_BANDS_HZ), COUNT))
+    power[:, 0] = samples * rms**2 * rng.chisquare(4, (n, len(MAP_BANDS_HZ), COUNT)) / 4
     mean = np.zeros((n, len(REGIMES), COUNT))
     values = np.zeros((n, COUNT)) if offsets is None else offsets[flight][:, None] * np.ones(COUNT)
     mean[:, 0], power[:, 0, 0] = samples * values, samples * values**2
@@ -38,7 +38,7 @@ def test_rms_is_the_mean_weighted_by_samples():
     sums = Sums(sums.phase, sums.flight, sums.weight * scale[:, None], sums.power * scale[:, None, None, None],
                 sums.mean * scale[:, None, None])
     table = cell_tables.table_of(sums, AIRBORNE, seed=0)
-    for band in range(1, len(BANDS_HZ)):
+    for band in range(1, len(MAP_BANDS_HZ)):
         squares = sums.power[:, 0, band, 0] / sums.weight[:, 0]
         assert table.rms[0, band, 0] == pytest.approx(np.sqrt(np.average(squares, weights=sums.weight[:, 0])))
     assert table.seconds[0] == pytest.approx(0.01 * 200 * scale.sum()) and table.seconds[1] == 0
@@ -64,7 +64,7 @@ def test_the_floor_of_an_offset_is_its_standard_deviation_between_flights():
     """Sample standard deviation, what all flights have in common taken off; at least the sensor's noise."""
     offsets = np.array([3.1, 2.9, 3.4, 2.7, 3.0, 3.3])
     sums = blocks_of(np.random.default_rng(3), len(offsets), 6, offsets=offsets)
-    sensor = np.full((len(BANDS_HZ), COUNT), 0.01)
+    sensor = np.full((len(MAP_BANDS_HZ), COUNT), 0.01)
     level, top = cell_tables.floors_of(sums, sensor)[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(np.std(offsets, ddof=1))
     assert top[0, 0, 0] > level[0, 0, 0]
@@ -78,14 +78,14 @@ def test_the_floor_of_a_phase_that_few_flights_have_is_that_of_those_few():
     sums = blocks_of(np.random.default_rng(3), len(offsets), 6, offsets=offsets)
     few = sums.flight < 2
     sums = replace(sums, phase=np.where(few, AIRBORNE, OTHER))
-    level, _ = cell_tables.floors_of(sums, np.full((len(BANDS_HZ), COUNT), 0.01))[AIRBORNE]
+    level, _ = cell_tables.floors_of(sums, np.full((len(MAP_BANDS_HZ), COUNT), 0.01))[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(np.std(offsets[:2], ddof=1))
 
 
 def test_without_a_baseline_the_spread_between_flights_counts_beside_the_sensor():
     offsets = np.array([0.2, -0.1, 0.4])
     sums = blocks_of(np.random.default_rng(4), 3, 6, offsets=offsets)
-    sensor = np.full((len(BANDS_HZ), COUNT), 0.3)
+    sensor = np.full((len(MAP_BANDS_HZ), COUNT), 0.3)
     level, _ = cell_tables.spreads_of(sums, sensor)[AIRBORNE]
     assert level[0, 0, 0] == pytest.approx(np.hypot(0.3, np.std(offsets, ddof=1)))
 

@@ -11,19 +11,20 @@ from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.where import gap_map as maps
 from airtouch.gap.where.band_sums import stretches, sums
 from airtouch.gap.where.cell_words import in_words
-from airtouch.gap.where.filter_bank import BANDS_HZ, filtered, gains, sensor_rms
-from airtouch.gap.where.regimes import REGIMES
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered, gains, sensor_rms
+from airtouch.gap.where.regimes import REGIMES, regimes
 from airtouch.gap.where.summary import largest, significant
+from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
 NOISE = float(prepare(VEHICLE, ())[0][0]["acc_noise"][0])
-WIDTH = np.array([b - a for a, b in BANDS_HZ])
+WIDTH = np.array([b - a for a, b in MAP_BANDS_HZ])
 
 
 def cell(gap_map, channel, band, phase="hover", regime="all"):
     return next(c for c in gap_map.cells if (c.channel, c.band_hz, c.phase, c.regime)
-                == (channel, BANDS_HZ[band], phase, regime))
+                == (channel, MAP_BANDS_HZ[band], phase, regime))
 
 
 def test_bands_share_the_power_out():
@@ -154,6 +155,15 @@ def test_after_an_effect_that_is_right_little_is_left(name, values, force, band)
     true_term = type(term)(term.effect, term.shows_in, term.free, {**true_term.values, **values})
     c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[true_term]), "force_x", band)
     assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
+
+
+@pytest.mark.parametrize("column", ["zrange_m", "z_m"])
+def test_the_height_is_a_regime_wherever_the_flight_has_it(column):
+    low = flight(4.0)
+    assert not regimes(low, VEHICLE)[:, 1:4].any()
+    low.log.columns[column] = np.full(len(low), 0.05)
+    low.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.05
+    assert regimes(low, VEHICLE)[:, 1].all() and REGIMES[1] == "height < 0.1 m"
 
 
 def test_of_several_effects_each_cell_names_the_one_that_takes_most():

@@ -1,7 +1,7 @@
 """The headline: the cell that most of the gap is in, or that the named effects explain."""
 
 from airtouch.gap.answer import advice, words
-from airtouch.gap.result import Cell, NamedEffect
+from airtouch.gap.result import BASELINE, Cell, GapMap, NamedEffect
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -17,6 +17,16 @@ def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
                             "floor, and it stands out in 4 of 5 phases in the air.")
     texts = [s.text for s in advice.steps("unknown", [], [], headline, [], True, "v")]
     assert "more time in hover" in texts[0] and not any("take-off" in t for t in texts)
+
+
+def test_a_cell_that_grows_is_not_one_from_which_the_effects_take_most():
+    """Of many cells of one phase beyond the largest, the one that shrinks is listed and those that grow are not."""
+    many = [cell(f"force_{a}", "hover", 9.0 - low, band_hz=(low, low + 1.0), after=9.5 - low)
+            for low in (0.0, 1.0, 2.0, 3.0) for a in "xyz"]
+    shrinking = cell("torque_x", "hover", 1.0, after=0.5)
+    for cells, more in ((many, []), ([*many, shrinking], [shrinking])):
+        shown = summary.cells_to_show(GapMap(tuple(cells), BASELINE, ()))
+        assert shown == [*summary.largest(cells), *more]
 
 
 def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():

@@ -34,7 +34,7 @@ def demo_command(out: Path, force: bool) -> None:
         say("reading and compiling")
         from airtouch.cli.gap import show
         from airtouch.gap.answer import words
-        from airtouch.gap.diagnose import diagnose
+        from airtouch.gap.diagnosis import diagnose
         from airtouch.logs import read
         from airtouch.report import gap_report
         from airtouch.vehicle import load

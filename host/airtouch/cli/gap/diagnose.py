@@ -81,7 +81,7 @@ def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) 
     """A function that diagnoses flights, with all other arguments fixed."""
     from functools import partial
 
-    import airtouch.gap.diagnose as diagnose
+    import airtouch.gap.diagnosis as diagnose
 
     return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without), partner=partner)
 

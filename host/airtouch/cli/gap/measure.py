@@ -23,7 +23,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     """
     check_free(report, json_path, force)
     with Bar() as bar:
-        import airtouch.gap.measure as measure
+        import airtouch.gap.measurement as measure
         from airtouch.cli.gap import files, show
         from airtouch.gap.sealed import on_cluster
 
@@ -37,11 +37,11 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     if json_path:
         scores.write_json(json_path, measurement.plain(), force)
     if report:
-        from airtouch.gap.answer import pictures
         from airtouch.report import gap_report
 
-        gap_report.write_measurement(report, measurement, pictures.of_measurement(measurement, flights, vehicle),
-                                     force=force, command=typed("measure", real, baseline, vehicle_name))
+        pictures = measure.pictures_of_measurement(measurement, flights, vehicle)
+        gap_report.write_measurement(report, measurement, pictures, force=force,
+                                     command=typed("measure", real, baseline, vehicle_name))
     show.measurement(scores.console(), measurement)
     show.left_out(measurement.left_out)
     written(json_path, report)

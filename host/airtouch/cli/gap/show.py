@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from airtouch.gap.answer import words
-from airtouch.gap.measure import Measurement
+from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import interval, ratio, short

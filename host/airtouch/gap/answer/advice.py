@@ -36,7 +36,7 @@ def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[st
         next_steps.append(NextStep(
             "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
             "of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
-    if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
+    if any(f.rates is None for f in flights):
         next_steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(next_steps)
 

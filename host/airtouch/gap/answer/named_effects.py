@@ -31,14 +31,16 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
 
     Their order is that of the selection, so that the first is the first of the ranking.
     """
-    whole, chosen = selection.whole, selection.chosen
-    if whole is None or chosen is None:
+    hypothesis, chosen = selection.whole, selection.chosen
+    if hypothesis is None or chosen is None:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}
-    fitted = best_shape(data, whole_of(data), [t for t in whole.terms if t.shows_in != CLOCK], _mean_of_halves(whole))
+    in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
+    fitted = best_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
     names = {t.name for t in chosen.terms}
     shown = [t for t in fitted.terms if t.name in names]
-    effects = [_named(t, *_in_spectra(data, whole, fitted, t, readings), readings) for t in shown if not t.companion]
+    effects = [_named(t, *_in_spectra(data, hypothesis, fitted, t, readings), readings)
+               for t in shown if not t.companion]
     for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, part) for e in effects]
     effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
@@ -52,7 +54,7 @@ def _named(term: Term, x: np.ndarray, covariance: np.ndarray, readings: Mapping[
     return NamedEffect(term.name, term.quantities(*fitted), term.gate)
 
 
-def _in_spectra(data: Data, whole: Candidate, fitted: FittedTerms, term: Term, readings: Mapping[str, Reading],
+def _in_spectra(data: Data, hypothesis: Candidate, fitted: FittedTerms, term: Term, readings: Mapping[str, Reading],
                 ) -> tuple[np.ndarray, np.ndarray]:
     """Scaled parameters (k,) of an effect that shows in the spectra, and their covariance (k, k).
 
@@ -63,7 +65,7 @@ def _in_spectra(data: Data, whole: Candidate, fitted: FittedTerms, term: Term, r
         x, covariance = fitted.scaled[place], fitted.covariance[place, place]
     else:
         x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)
-    of_halves = [t.scaled(t.values) for f in whole.fits for t in f.terms if t.identity == term.identity]
+    of_halves = [t.scaled(t.values) for f in hypothesis.fits for t in f.terms if t.identity == term.identity]
     apart = 0.5 * (of_halves[0] - of_halves[1]) if len(of_halves) == 2 else np.zeros(len(x))
     error = _model_error(data.study.controller, term, term.name in readings and len(x) == 1)
     return x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2)
@@ -89,7 +91,8 @@ def _in_times(data: Data, term: Term) -> tuple[np.ndarray, np.ndarray]:
     bursts is the variance of a Poisson number of bursts.
     """
     samples = sum(len(f) for f in data.flights)
-    count = 2.0 * samples / (CORRELATION_S / PERIOD_S)
+    independent = samples / (CORRELATION_S / PERIOD_S)
+    count = 2.0 * independent  # a standard deviation from n values has the relative variance 1 / (2 n)
     if term.signature.bursts is not None:
         share, burst = (term.values[p] for p in term.signature.bursts)
         count = share * samples / (2.0 * burst - 1.0)
@@ -97,32 +100,32 @@ def _in_times(data: Data, term: Term) -> tuple[np.ndarray, np.ndarray]:
     return x, np.diag(x ** 2 / max(count, 1.0))
 
 
-def best_shape(data: Data, whole: BlockSet, terms: Sequence[Term], start: np.ndarray | None) -> FittedTerms:
+def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: np.ndarray | None) -> FittedTerms:
     """Effects fitted to all the data, in the shape that gains most.
 
     start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
     """
-    best = fit(data, whole, terms, start)
+    best = fit(data, all_blocks, terms, start)
     for i, term in enumerate(terms):
-        level = judge(data, whole, best.terms) + SHAPE_PRICE
+        level = judge(data, all_blocks, best.terms) + SHAPE_PRICE
         for shaped in term.shaped():
-            trial = fit(data, whole, [*terms[:i], shaped, *terms[i + 1:]], start)
-            gain = judge(data, whole, trial.terms)
+            trial = fit(data, all_blocks, [*terms[:i], shaped, *terms[i + 1:]], start)
+            gain = judge(data, all_blocks, trial.terms)
             if gain > level:
                 best, level = trial, gain
-    return converged(data, whole, best)
+    return converged(data, all_blocks, best)
 
 
-def converged(data: Data, whole: BlockSet, best: FittedTerms) -> FittedTerms:
+def converged(data: Data, all_blocks: BlockSet, best: FittedTerms) -> FittedTerms:
     """The fit, begun anew where it ended until that gains nothing.
 
     Parameters that trade against each other, as a battery's charge and capacity, lie along a bent valley, which one fit
     leaves off half way: strengths of seven simulated batteries came out up to a third too small.
     """
-    level = judge(data, whole, best.terms)
+    level = judge(data, all_blocks, best.terms)
     for _ in range(RESTARTS if len(best.scaled) > 1 else 0):
-        again = fit(data, whole, best.terms, best.scaled)
-        reached = judge(data, whole, again.terms)
+        again = fit(data, all_blocks, best.terms, best.scaled)
+        reached = judge(data, all_blocks, again.terms)
         if reached > level:
             best = again
         if reached < level + SETTLED:

@@ -1,30 +1,25 @@
 """The curves of a report, computed where everything else is: signals of the headline's cell, spectra, commands."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.nominal.build_study import declared_study, sensor_noise
+from airtouch.gap.flights.missing import interpolate_over
+from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import Cell
-from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, angular_acceleration
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
 from airtouch.gap.signals.study import Study
-from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import command_spectra
-from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
-from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.effects import Active
-from airtouch.vehicle import Vehicle
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
@@ -81,38 +76,24 @@ class Pictures:
     commands: Mapping[str, Any] = field(default_factory=dict)  #: `command_power.command_spectra`
 
 
-def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-       headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
+def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
+                headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis: headline is the cell that its answer speaks of."""
     commands = command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
         return Pictures(commands=commands)
-    active = [t.active() for t in effects if t.shows_in == MEAN]
-    gaps = [FlightGap(f, _residual(study, f), _residual(study, f, active) if active else None)
+    active = [t.active() for t in mean_of(effects)]
+    gaps = [FlightGap(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
     return Pictures(_signal(_of_median_flight(gaps, headline), headline), frequencies(AIR),
                     _spectra(study, gaps, effects, channels), commands)
 
 
-def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
-    """The curves of a measurement, of its first flights."""
-    flights = list(measure.usable(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
-    if not flights:
-        return Pictures(commands=measurement.spectra)
-    curves = of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
-    return Pictures(curves.signal, curves.frequency_hz, curves.spectra, measurement.spectra)
-
-
-def _residual(study: Study, flight: Flight, effects: Sequence[Active] = ()) -> np.ndarray:
-    """Measured minus modelled (n, COUNT) of a flight, with effects in the model."""
-    return residual(flight, study.vehicle, (*study.calibration, *effects), study.controller)
-
-
 def _signal(gap: FlightGap, cell: Cell) -> Signal:
     """The curves of one flight in a cell's channel, up to the end of its band."""
     flight, c = gap.flight, COLUMN[cell.channel]
-    band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else 0
+    band = MAP_BANDS_HZ.index(cell.band_hz) if cell.band_hz in MAP_BANDS_HZ else 0
     measured, after = _measured(flight, c), None if gap.after is None else gap.after[:, c]
     return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, None if measured is None else _lowpass(flight, measured, band),
@@ -132,7 +113,7 @@ def _measured(flight: Flight, channel: int) -> np.ndarray | None:
     if channel < 3:
         return flight.acceleration[:, channel]
     if TORQUE.start <= channel < TORQUE.stop and flight.rates is not None:
-        return np.diff(flight.rates[:, channel - 3], append=flight.rates[-1:, channel - 3]) / PERIOD_S
+        return angular_acceleration(flight)[:, channel - TORQUE.start]
     return None
 
 
@@ -141,7 +122,7 @@ def _lowpass(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
     out = np.full(len(values), np.nan)
     for start, stop in stretches(flight):
         here = values[start:stop]
-        if band < len(BANDS_HZ) - 1:
+        if band < len(MAP_BANDS_HZ) - 1:
             here = filtered(np.nan_to_num(here[:, None]))[:max(band, 1) + 1].sum(axis=0)[:, 0]
         out[start:stop] = here
     return out
@@ -163,8 +144,8 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
 
 def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
     """Mean power (bins, COUNT) of a gap (n, COUNT) over all blocks in the air of a flight."""
-    known = np.where(flight.lost[:, None], 0.0, gap)
-    return (np.abs(blocks(known, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
+    bridged = interpolate_over(gap, ~flight.bridged)
+    return (np.abs(blocks(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
 
 
 def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:

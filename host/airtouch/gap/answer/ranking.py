@@ -82,8 +82,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     if not selection.named:
         return ()
     groups = []
-    best = selection.named[0]
-    first = selection.singles[best.name] if selection.inference is not None else best
+    first = selection.singles[selection.named[0].name]
     same = [n for n, j in selection.singles.items() if (j.full or selection.inference is not None)
             and selection.gained(first) - selection.gained(j) < CLOSE]
     if len(same) > 1:

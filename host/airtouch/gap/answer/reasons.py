@@ -89,8 +89,7 @@ def _why_beside(selection: Selection, step: Candidate) -> str:
     first = selection.named[0].name
     if selection.inference is not None:
         return f"named beside {first}: the probability is that it acts alone"
-    before = selection.steps[selection.steps.index(step) - 1].gain
-    return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
+    return f"named beside {first}: adds {step.share:.0f} nats to the others; the probability is that it acts alone"
 
 
 def _why_not_unknown(selection: Selection) -> str:

@@ -30,7 +30,7 @@ PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap
 SEED = 0  #: of the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
 LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
-LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
+LEAST_EXCESS = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
 JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
 
 
@@ -48,13 +48,13 @@ class Gap:
     """A gap on held-out data, and how far the effects named close it.
 
     cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; calm: by how much the
-    energy there (floor 1) is below nominal flights' once the effects named are in the model; before: energies (n,)
-    without any effect, calm added; named: the shrink of the effects named.
+    energy there (floor 1) is below nominal flights' once the effects named are in the model; energies_before
+    (n,): energies without any effect, calm added; named: the shrink of the effects named.
     """
 
     cells: tuple[np.ndarray, np.ndarray]
     calm: float
-    before: np.ndarray
+    energies_before: np.ndarray
     named: Shrink
 
 
@@ -72,7 +72,7 @@ def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: 
     """How far another hypothesis than the effects named closes the gap of two halves."""
     if _only_jitter(candidate):
         return shrink_of_jitter(data)
-    return _shrink(gap.before, gap.calm + _energies(data, parts, _terms(candidate), gap.cells))
+    return _shrink(gap.energies_before, gap.calm + _energies(data, parts, _terms(candidate), gap.cells))
 
 
 def _only_jitter(candidate: Candidate | None) -> bool:
@@ -108,10 +108,10 @@ def shrink_of_jitter(data: Data) -> Shrink:
 def share_closed(before: float, after: float) -> float:
     """Share of the gap that is gone, (rms before - rms after) / (rms before - 1), within -1 and 1; the floor is 1.
 
-    before, after: energies, the squares of these rms values. A gap of LEAST_GAP or less has no share: 0.
+    before, after: energies, the squares of these rms values. A gap of LEAST_EXCESS or less has no share: 0.
     """
     over = np.sqrt(before) - 1.0
-    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_GAP else 0.0
+    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_EXCESS else 0.0
 
 
 def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:

@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.answer.reasons import nearest
-from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell
-from airtouch.gap.signals.channels import COLUMN, residual
+from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.gap.signals.study import Study
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import mean_of
+from airtouch.gap.where import summary
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
 MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
@@ -24,24 +26,24 @@ TINY = 1e-9  #: ratio to the floor at least, of which a logarithm is taken
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
                 ) -> list[dict[str, Any]]:
-    """The largest cells of the map that the named effects leave, JSON-ready (host/docs/gap.md, "The JSON").
+    """What the effects leave in the cells with most of the gap before any, JSON-ready (host/docs/gap.md, "The JSON").
 
-    cells: largest first. Each entry has the stretch of time in which most of it is (of the flight in which it is
-    largest), how far it is over the floor there, signals that the cell's power follows from block to block, and
-    the effects that gain most with the reason why they were not named.
+    cells: the headline, then the others, largest first. Each entry has the stretch of time in which most of the gap is,
+    of the flight in which it is largest, and in the phase of the cell; how far it is over the floor there; signals that
+    the cell's power follows from block to block; and the effects that gain most, with the reason why they were not
+    named.
     """
     terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
-    active = tuple(t.active() for t in terms if t.shows_in == MEAN)
-    chosen = [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]
-    model = (*study.calibration, *active)
-    gaps = [(f, residual(f, study.vehicle, model, study.controller)) for f in flights] if chosen else []
+    active = [t.active() for t in mean_of(terms)]
+    chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
+    gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []
     near = nearest(selection)
     out = []
     for cell in chosen:
-        ratios = [(f, r) for f, gap in gaps if len(r := over_floor(study, f, gap, cell))]
+        ratios = _in_phase([(f, over_floor(study, f, gap, cell)) for f, gap in gaps], cell.phase)
         if not ratios:
             continue
-        flight, ratio = max(ratios, key=lambda pair: float(pair[1].max()))
+        flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
         first, last = worst_stretch(ratio)
         begin = starts(flight, AIR)
         out.append({"channel": cell.channel, "band_hz": list(cell.band_hz), "phase": cell.phase, "flight": flight.name,
@@ -65,10 +67,26 @@ def over_floor(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.
     return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
 
 
+def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:
+    """Flights with their ratios (blocks,), NaN in blocks most of which is another phase; as they are where all are."""
+    place = KINDS.index(phase)
+    within = [(f, np.where(_commonest_phase(f) == place, ratio, np.nan)) for f, ratio in ratios]
+    return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] or [(f, r) for f, r in ratios if len(r)]
+
+
+def _commonest_phase(flight: Flight) -> np.ndarray:
+    """Phase of most samples of each block in the air (blocks,), a place in `segments.KINDS`."""
+    phase = flight.phase[starts(flight, AIR)[:, None] + np.arange(LENGTH[AIR])]
+    return (phase[:, :, None] == np.arange(len(KINDS))).sum(axis=1).argmax(axis=1)
+
+
 def worst_stretch(ratio: np.ndarray) -> tuple[int, int]:
-    """First and last block around the largest ratio (blocks,) that stay above the middle between it and the median."""
-    peak = int(np.argmax(ratio))
-    limit = 0.5 * (ratio[peak] + float(np.median(ratio)))
+    """First and last block around the largest ratio (blocks,) that stay above the middle between it and the median.
+
+    A block of NaN counts in neither and ends the stretch.
+    """
+    peak = int(np.nanargmax(ratio))
+    limit = 0.5 * (ratio[peak] + float(np.nanmedian(ratio)))
     first = last = peak
     while first > 0 and ratio[first - 1] >= limit:
         first -= 1
@@ -80,23 +98,25 @@ def worst_stretch(ratio: np.ndarray) -> tuple[int, int]:
 def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
     """Names of the signals whose mean over a block ranks like a cell's power (Spearman), the closest first.
 
-    ratios: flights with the cell's rms over its floor (blocks,). A signal that not every flight has is left out.
+    ratios: flights with the cell's rms over its floor (blocks,), NaN in blocks that do not count. A signal that not
+    every flight has is left out.
     """
     from scipy.stats import spearmanr  # slow to import, and seldom needed
 
-    power = np.concatenate([np.log(np.maximum(ratio, TINY)) for _, ratio in ratios])
-    means = [_block_means(study, flight) for flight, _ in ratios]
-    if len(power[::2]) < FEWEST:  # every other block: they overlap by half
+    power = np.concatenate([np.log(np.maximum(ratio, TINY)) for _, ratio in ratios])[::2]  # they overlap by half
+    known = np.isfinite(power)
+    if known.sum() < FEWEST:
         return []
+    means = [_block_means(study, flight) for flight, _ in ratios]
     names = list(dict.fromkeys(name for of_flight in means for name in of_flight))
     correlations = []
     for name in names:
         if not all(name in of_flight for of_flight in means):
             continue
-        values = np.concatenate([of_flight[name] for of_flight in means])
+        values = np.concatenate([of_flight[name] for of_flight in means])[::2][known]
         if np.ptp(values) == 0.0:
             continue
-        rank = spearmanr(values[::2], power[::2])
+        rank = spearmanr(values, power[known])
         if rank.pvalue < CHANCE / len(names):
             correlations.append((abs(rank.statistic), name))
     return [name for _, name in sorted(correlations, reverse=True)]
@@ -105,8 +125,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
 def _block_means(study: Study, flight: Flight) -> dict[str, np.ndarray]:
     """Mean in the air (blocks,) of each signal of a flight, by its name."""
     samples = starts(flight, AIR)[:, None] + np.arange(LENGTH[AIR])
-    air = np.where(flight.phase == GROUND, np.nan, 1.0)
-    return {name: np.nanmean((values * air)[samples], axis=1) for name, values in _signals(study, flight).items()}
+    return {name: values[samples].mean(axis=1) for name, values in _signals(study, flight).items()}
 
 
 def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:

@@ -85,8 +85,8 @@ def _cells_in_words(cells: Sequence[Cell]) -> str:
 
 
 def _after_in_words(cell: Cell) -> str:
-    """`at take-off in lift at 0-0.5 Hz (6.1 to 4 times the floor)`."""
-    before, after = short(ratio(cell)), short(summary.after(cell))
+    """The cell with what is left of it, as `at take-off in lift at 0-0.5 Hz (6.1 to 4 times the floor)`."""
+    before, after = short(ratio(cell)), short(summary.ratio_after(cell))
     change = f"{before} to {after} times the floor" if after != before else f"{after} times the floor, as before"
     return f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} ({change})"
 
@@ -97,7 +97,7 @@ def remaining_in_words(cells: Sequence[Cell]) -> list[str]:
 
 
 def band_in_words(cell: Cell) -> str:
-    """`0-0.5 Hz`."""
+    """The band in words, as `0-0.5 Hz`."""
     return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
 
@@ -107,7 +107,7 @@ def name_in_words(name: str) -> str:
 
 
 def effect_in_words(effect: NamedEffect) -> str:
-    """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`; of one that comes and goes, when it acts."""
+    """The effect with its parameters, as `weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`, and when it acts."""
     when = seconds_in_words(effect)
     return (f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
             + (f"; acts from {when}" if when else ""))
@@ -128,7 +128,7 @@ def all_open_in_words(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def open_in_words(entry: Mapping[str, Any]) -> str:
-    """`lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv; follows height`."""
+    """What stays open, as `lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv`."""
     low, high = entry["band_hz"]
     follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
     return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to "
@@ -167,7 +167,7 @@ def quantity(q: Quantity, form: str | None = None) -> str:
 
 
 def joined(names: list[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
+    """The names as a list in words: `a`, `a and b`, `a, b and c`."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
@@ -184,6 +184,6 @@ def overall(gap: Mapping[str, float]) -> str:
 
 
 def rotor_in_words(rotor: Mapping[str, float]) -> str:
-    """`rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
+    """A rotor's speeds, as `rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
     return (f"rotor {rotor['rotor']}: {rotor['logged']:.0f} rpm logged, {rotor['ratio']:.3f} of the model's "
             f"({rotor['low']:.3f} to {rotor['high']:.3f} over {rotor['flights']} flights)")

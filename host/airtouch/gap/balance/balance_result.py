@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.gap.answer.advice import steps as next_steps
-from airtouch.gap.answer.pictures import of as pictures_of
+from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
@@ -28,6 +27,7 @@ from airtouch.gap.balance.hover_posterior import (
     probabilities,
     quantile,
 )
+from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, Quantity, RankedCandidate
@@ -79,7 +79,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         shrink=shrink[first].share if verdict == "effect" else None,
         control=_control(total, first, shrink) if verdict == "effect" else {},
         notes=_notes(voltage, notes),
-        cannot=measure.cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
+        cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)

@@ -82,7 +82,7 @@ def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> d
         with_effect = _simulated_responses(floor, crossing, (Active(term.effect, stepped),))
         return {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k]) for k in KINDS}
 
-    return floor.workspace.once("templates", (effect, parameter, crossing), make)
+    return floor.workspace.cached("templates", (effect, parameter, crossing), make)
 
 
 def crossing_of(flight: Flight) -> Crossing:
@@ -119,7 +119,7 @@ def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[
                          ) -> dict[str, np.ndarray]:
     """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; cached."""
     key = (crossing, tuple((a.effect.name, tuple(a.values.items())) for a in active))
-    return floor.workspace.once("flown", key, lambda: _simulate(floor, crossing, active))
+    return floor.workspace.cached("flown", key, lambda: _simulate(floor, crossing, active))
 
 
 def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active]) -> dict[str, np.ndarray]:

@@ -52,7 +52,7 @@ def edges_of(flight: Flight) -> list[Edge]:
     if not flight.log.has("zrange_m"):
         return []
     air = flight.phase != GROUND
-    return flight.workspace.once("edges", (), lambda: [
+    return flight.workspace.cached("edges", (), lambda: [
         e for e in true_edges(flight.log, PLATFORM_STEP_M)
         if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()])
 

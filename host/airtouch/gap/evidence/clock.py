@@ -12,6 +12,7 @@ from airtouch.gap.signatures.term import Term
 
 #: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
+SAMPLES_OF_ONE = 2.0  #: samples that count as one independent value of being lost; chosen
 CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
 
 
@@ -34,7 +35,7 @@ def loss(data: Data) -> tuple[float, float]:
     share, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if share <= nominal:
         return share, 0.0
-    n = len(missing) / 2.0
+    n = len(missing) / SAMPLES_OF_ONE
     arrived = (1.0 - share) * np.log((1.0 - share) / (1.0 - nominal))
     return share, float(n * (share * np.log(share / nominal) + arrived))
 

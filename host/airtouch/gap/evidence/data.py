@@ -23,7 +23,7 @@ KEPT, KEPT_SAMPLES = 96, 20000
 class Data:
     """Flights with their blocks and the spectra of the gap before any effect is added.
 
-    slow: torque counts below the bins in which commands hold aliases only. By flight, and the first two by regime:
+    By flight, and the first two by regime:
     first (blocks,): first sample of each block; base (blocks, bins, COUNT): spectra of the gap, unit/sqrt(Hz);
     measured_torque (blocks, bins, 3): those in the air of the measured angular acceleration; quiet (blocks, 3): blocks
     in the air and axes in which no set-point stepped; bridging (blocks, bins, COUNT): power that lost rows add there.
@@ -31,13 +31,17 @@ class Data:
 
     study: Study
     flights: Sequence[Flight]
-    slow: bool = False
-    first: list[dict[str, np.ndarray]] = field(default_factory=list)
-    base: list[dict[str, np.ndarray]] = field(default_factory=list)
-    measured_torque: list[np.ndarray] = field(default_factory=list)
-    quiet: list[np.ndarray] = field(default_factory=list)
-    bridging: list[np.ndarray] = field(default_factory=list)
+    first: list[dict[str, np.ndarray]] = field(init=False, compare=False, repr=False)
+    base: list[dict[str, np.ndarray]] = field(init=False, compare=False, repr=False)
+    measured_torque: list[np.ndarray] = field(init=False, compare=False, repr=False)
+    quiet: list[np.ndarray] = field(default_factory=list, init=False, compare=False, repr=False)
+    bridging: list[np.ndarray] = field(init=False, compare=False, repr=False)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
+
+    @property
+    def slow(self) -> bool:
+        """Whether torque counts in the means alone: nobody knows what commands above them are, aliases or torque."""
+        return self.study.response is None
 
     @property
     def seconds(self) -> float:
@@ -65,8 +69,7 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     response = data.study.response
     replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
-        with_all = _replay_spectra(data, replayed)
-        return _without_scaling(data, replayed, with_all) if data.slow else with_all
+        return _without_scaling(data, replayed, _replay_spectra(data, replayed))
     return _cached(data, "by response", active, lambda: _by_response(data, response, active, replayed))
 
 
@@ -151,7 +154,7 @@ def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.n
 def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
     """`_replay_spectra` of flight i, by regime."""
     bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
-                               data.workspace.once("residuals", i, Workspace))
+                               data.workspace.cached("residuals", i, Workspace))
     out = {}
     for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = blocks(bridged[:, :COMMAND.start], begin, r)
@@ -164,7 +167,7 @@ def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], 
             ) -> list[dict[str, np.ndarray]]:
     """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
     if not active:
-        return data.workspace.once(f"{name} of no effect", (), make)
+        return data.workspace.cached(f"{name} of no effect", (), make)
     if sum(len(f) for f in data.flights) > KEPT_SAMPLES:
         return make()
-    return data.workspace.once(name, tuple((a.effect.name, *a.values.values(), a.gate) for a in active), make, KEPT)
+    return data.workspace.cached(name, tuple(a.key for a in active), make, KEPT)

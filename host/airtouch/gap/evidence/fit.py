@@ -18,7 +18,7 @@ from airtouch.gap.evidence.least_squares import without_offsets
 from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
-from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term, Terms, mean_places
 from airtouch.simulation.effects import Active
@@ -30,6 +30,7 @@ PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural
 CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
 #: strengths of a random effect that are tried before the best is refined: how many, from the least to the largest
 GRID_SIZE, LEAST_STRENGTH, LARGEST_STRENGTH = 40, 0.003, 1e3
+LEAST_CURVATURE = 1e-6  #: nats, curvature in the logarithm of a strength, by which is divided at least; chosen
 CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelihood's curvature is taken; chosen
 
 
@@ -51,7 +52,7 @@ class FittedTerms:
 
 def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
     """Scaled parameters (k,) of the mean effects among terms with values."""
-    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in terms if t.shows_in == MEAN)])
+    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in mean_of(terms))])
 
 
 def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
@@ -62,7 +63,7 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     these around neutral. Mean and random effects are fitted in turn until neither moves.
     """
     problem = problem_of(data, part)
-    mean, random = tuple(t for t in terms if t.shows_in == MEAN), random_of(terms)
+    mean, random = mean_of(terms), random_of(terms)
     x = start_of(problem, mean, start)
     random_power: np.ndarray | float = 0.0
     if random and mean and start is not None:
@@ -162,11 +163,14 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.
 
 
 def strength_variance(data: Data, part: BlockSet, terms: Sequence[Term], term: Term) -> np.ndarray:
-    """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature; inf for none."""
+    """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature.
+
+    It is 1e6 times the strength squared where the likelihood is flat (LEAST_CURVATURE).
+    """
     x = term.scaled(term.values)
     levels = []
     for amount in (-CURVATURE_STEP, 0.0, CURVATURE_STEP):
         scaled_term = term.fitted(x * np.exp(amount))
         levels.append(judge(data, part, [scaled_term if t is term else t for t in terms]))
     curvature = (2.0 * levels[1] - levels[0] - levels[2]) / CURVATURE_STEP ** 2
-    return np.diag(x ** 2 / max(curvature, 1e-6))
+    return np.diag(x ** 2 / max(curvature, LEAST_CURVATURE))

@@ -14,8 +14,9 @@ from airtouch.gap.signatures.term import Term, mean_places
 ITERATIONS = 8  #: steps at most; chosen
 ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
 TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
-#: damping after a step that failed; factor on it after a step that gained; both chosen
-LEAST_DAMPING, CALMED = 0.01, 0.1
+DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after one that failed; chosen
+FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: 0.1, damping after the first step that failed; chosen
+ROUNDING = 1e-9  #: nats that a step must gain at least; chosen, above rounding
 COMMAND_PRIOR = 1.5  #: standard deviation, natural steps, of parameters of effects that only the commands show; chosen
 CLOSE = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
 #: scaled parameters from which effects of the loop may start; chosen
@@ -106,9 +107,9 @@ def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tup
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
-        if new.cost < now.cost - 1e-9:
-            return new, covariance, damping * CALMED, True
-        damping = max(damping, LEAST_DAMPING) / CALMED
+        if new.cost < now.cost - ROUNDING:
+            return new, covariance, damping * DAMPING_FACTOR, True
+        damping = max(damping / DAMPING_FACTOR, FIRST_DAMPING)
     return now, covariance, damping, False
 
 

@@ -36,11 +36,11 @@ class Likelihood:
 
     def __call__(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """Log likelihood of values (n,)."""
-        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self._falls, self.known)
+        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self._exponent, self.known)
 
     def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        each = _each(squared(values), self.power + added, self.tail, self._falls)
+        each = _each(squared(values), self.power + added, self.tail, self._exponent)
         each[~self.known] = 0.0
         return each
 
@@ -50,9 +50,9 @@ class Likelihood:
         size (n,): the values' squared size.
         """
         grows = (unit != 0.0) & self.known
-        rest = tailed(size, self.power + others, self.tail, self._falls, self.known & ~grows)
+        rest = tailed(size, self.power + others, self.tail, self._exponent, self.known & ~grows)
         own = np.flatnonzero(grows)
-        power, tail, falls, known = (x[own] for x in (self.power + others, self.tail, self._falls, self.known))
+        power, tail, falls, known = (x[own] for x in (self.power + others, self.tail, self._exponent, self.known))
         own_size, own_unit = size[own], unit[own]
 
         def at(x: float) -> float:
@@ -70,7 +70,7 @@ class Likelihood:
         return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
 
     @functools.cached_property
-    def _falls(self) -> np.ndarray:
+    def _exponent(self) -> np.ndarray:
         """Power (n,) of the tails' fall."""
         return self.freedom + 1.0
 

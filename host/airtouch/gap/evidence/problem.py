@@ -18,8 +18,8 @@ from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged, squared
-from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN, signature_of
+from airtouch.gap.signatures.candidates import mean_of, random_of
+from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
@@ -118,7 +118,7 @@ class Problem:
         wide: the commands' floor is as uncertain as under random effects, though there are none.
         """
         random = random_of(terms)
-        mean = [t.active() for t in terms if t.shows_in == MEAN]
+        mean = [t.active() for t in mean_of(terms)]
         command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + command_power, cost
 
@@ -230,4 +230,4 @@ def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
 
 def problem_of(data: Data, part: BlockSet) -> Problem:
     """The flattened blocks of a part, made once."""
-    return data.workspace.once("problem", part.key, lambda: Problem(data, part))
+    return data.workspace.cached("problem", part.key, lambda: Problem(data, part))

@@ -35,7 +35,7 @@ LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four roto
 def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
-    of_unit = data.workspace.once("random", (term.name, *sorted(unit.values.items())),
+    of_unit = data.workspace.cached("random", unit.active().key,
                                   lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
     (name, *_) = term.free
     neutral = neutral_of(parameter_of(term.effect, name))
@@ -138,9 +138,14 @@ def _torque_noise(study: Study, regime: str, gyro: np.ndarray) -> np.ndarray:
     return np.minimum(gyro, floor) + beyond
 
 
+def folded_frequencies(f: np.ndarray) -> np.ndarray:
+    """Frequencies (5, bins), Hz, that a log at RATE_HZ folds to f (bins,): f itself first, up to two rates and f."""
+    return np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
+
+
 def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
     """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded."""
-    whole = np.concatenate([f, 1.0 / PERIOD_S - f, 1.0 / PERIOD_S + f, 2.0 / PERIOD_S - f, 2.0 / PERIOD_S + f])
+    whole = folded_frequencies(f).ravel()
     b = np.zeros(5)
     filters.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
     late = np.exp(-2j * np.pi * whole * float(row["step"]))  # by one step
@@ -181,7 +186,7 @@ def _thrust_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     arms = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
                      -row["rotor_x"] / row["inertia"][1],
                      np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
-    aliases = np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
+    aliases = folded_frequencies(f)
     density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
     folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
     folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences

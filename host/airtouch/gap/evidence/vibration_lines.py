@@ -17,6 +17,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signals.study import Study
 from airtouch.simulation import replay
@@ -49,7 +50,7 @@ class Lines:
 
 def lines(data: Data) -> Lines:
     """The lines of the flights of `data` (`data.Data`); computed once."""
-    return data.workspace.once("lines", (), lambda: _search(data))
+    return data.workspace.cached("lines", (), lambda: _search(data))
 
 
 def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
@@ -85,7 +86,7 @@ def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
 def speeds(flight: Flight, study: Study) -> np.ndarray:
     """Rotor speeds (n, 4), rad/s: logged ones, or those of the mean command with each rotor's trim."""
     if flight.log.has(*RPM):
-        return np.nan_to_num(flight.log.stack(RPM)) * np.pi / 30.0
+        return interpolate_missing(flight.log.stack(RPM)) * np.pi / 30.0
     replayed = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
                       signals=flight.signals.copy(), pwm=flight.pwm).rotor_speed
     common = replayed.mean(axis=1, keepdims=True)
@@ -122,7 +123,7 @@ class _Sample:
         self.two = {h: widened(two, h) for h in SPREADS_HZ}
 
     def gain(self, spread_hz: float, shift: int) -> float:
-        """Log likelihood that lines of the best strength gain over none."""
+        """Twice the log likelihood that lines of the best strength gain over none."""
         return _best(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
 
 
@@ -141,13 +142,16 @@ def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
-    """Gain in log likelihood of lines of the best strength over none, and that strength (power)."""
+    """Twice the log likelihood that lines of the best strength gain over none, and that strength (power).
+
+    over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1.
+    """
     strengths = STRENGTHS / max(float(shape.mean()), 1e-300)
     size, flat = over.ravel(), shape.ravel()
     tail, falls, known = (np.full(len(size), x) for x in (FREEDOM, FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
-        """Log likelihood of lines of a strength (power)."""
+        """Twice the log likelihood of lines of a strength (power), but for a constant."""
         return -tailed(size, 1.0 + strength * flat, tail, falls, known)
 
     levels = [likelihood(s) for s in strengths]

@@ -1,5 +1,7 @@
 """Whether a log can be diagnosed: values that cannot be, columns that it lacks, what no diagnosis of it can tell."""
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +74,12 @@ def cannot_tell(log: FlightLog) -> tuple[str, ...]:
     if not log.has("vx_mps", "vy_mps"):
         cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
     return tuple(cannot)
+
+
+def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """What logs cannot say, each reason once, with the number of flights where it is not all.
+
+    flights: reasons of each flight.
+    """
+    count = Counter(reason for one in flights for reason in one)
+    return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())

@@ -1,6 +1,6 @@
 """A flight made ready for the diagnosis: a regular clock, what effects see, what was measured."""
 
-from collections.abc import Container
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -96,6 +96,15 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
                   notes=notes, cannot=cannot)
+
+
+def ready_flights(logs: Iterable[FlightLog], vehicle: Vehicle, reasons: list[str]) -> Iterator[Flight]:
+    """Flights made ready, one at a time; the reasons why others cannot be are added to `reasons`."""
+    for log in logs:
+        try:
+            yield ready(log, vehicle)
+        except AirTouchError as error:
+            reasons.append(str(error))
 
 
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:

@@ -87,7 +87,7 @@ class ClosedLoop:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
         row = self._plant(active).row
         key = row.tobytes()
-        return self.workspace.once("ratio", key, lambda: self._power(row) / self.nominal_power(), PLANTS)
+        return self.workspace.cached("ratio", key, lambda: self._power(row) / self.nominal_power(), PLANTS)
 
     def torque_change(self, active: Sequence[Active], f: np.ndarray) -> Change | None:
         """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is."""
@@ -99,7 +99,7 @@ class ClosedLoop:
             loop = self._loops(self._nominal_row)[AXES.index("roll")]
             return change_of(loop, self._torques(self._nominal_row, f), self._torques(row, f), f)
 
-        return self.workspace.once("change", (row.tobytes(), f.tobytes()), make, PLANTS)
+        return self.workspace.cached("change", (row.tobytes(), f.tobytes()), make, PLANTS)
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
@@ -123,7 +123,7 @@ class ClosedLoop:
 
     def nominal_power(self) -> np.ndarray:
         """Power of the commands (bins, AXES) that the model makes of the vehicle as calibrated."""
-        return self.workspace.once("power", (), lambda: self._power(self._nominal_row))
+        return self.workspace.cached("power", (), lambda: self._power(self._nominal_row))
 
     def with_steps(self, share: np.ndarray, excess: np.ndarray, f: np.ndarray) -> "ClosedLoop":
         """The same loop with `steps`, from blocks of nominal flights in which a set-point stepped.
@@ -152,7 +152,7 @@ class ClosedLoop:
             row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
             return PlantUnderEffects(row, not _same_loop(row, self._nominal_row))
 
-        return self.workspace.once("plant", tuple((a.effect.name, *a.values.values()) for a in active), make, PLANTS)
+        return self.workspace.cached("plant", tuple((a.effect.name, *a.values.values()) for a in active), make, PLANTS)
 
     def _loops(self, row: PlantRow) -> list[AxisLoop]:
         """The loops of AXES under a plant row; cached."""
@@ -162,7 +162,7 @@ class ClosedLoop:
             return [AxisLoop(axis_plant(row, axis), own, c)
                     for axis, own, c in zip(AXES, by_firmware, controllers, strict=True)]
 
-        return self.workspace.once("loops", row.tobytes(), make, PLANTS)
+        return self.workspace.cached("loops", row.tobytes(), make, PLANTS)
 
     def _torques(self, row: PlantRow, f: np.ndarray) -> list[AxisTorque]:
         """Torques of commands about roll and pitch at frequencies f, cached for all plant rows with the same loop."""
@@ -173,7 +173,7 @@ class ClosedLoop:
 
     def _once_a_loop(self, what: str, loop: AxisLoop, f: np.ndarray, make: Callable[[], Made]) -> Made:
         """A value of a loop at frequencies f, the same for all plant rows with that loop; cached."""
-        return self.workspace.once("axis", (what, loop, f.tobytes()), make, LOOPS)
+        return self.workspace.cached("axis", (what, loop, f.tobytes()), make, LOOPS)
 
     def _power(self, row: PlantRow) -> np.ndarray:
         """Modelled power of the commands (bins, AXES) of a plant row, N^2/Hz; far above any where it would not fly."""

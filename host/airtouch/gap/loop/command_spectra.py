@@ -33,7 +33,7 @@ STEPS = 12  #: iterations to the power of highest likelihood; chosen
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
-    return flight.workspace.once("command spectra", vehicle, lambda: _block_spectra(flight, vehicle))
+    return flight.workspace.cached("command spectra", vehicle, lambda: _block_spectra(flight, vehicle))
 
 
 def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +49,7 @@ def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.nda
 
 def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Collective, roll, pitch and yaw commands (n, 4), N per motor, above HIGHPASS_HZ."""
-    return flight.workspace.once("commands", vehicle, lambda: highpassed(vehicle.thrust(flight.pwm) @ MIX.T))
+    return flight.workspace.cached("commands", vehicle, lambda: highpassed(vehicle.thrust(flight.pwm) @ MIX.T))
 
 
 def highpassed(values: np.ndarray) -> np.ndarray:

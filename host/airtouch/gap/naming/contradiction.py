@@ -10,15 +10,17 @@ from airtouch.gap.naming.selection import UNKNOWN_ASSUMED, Candidate
 CHANCE_LOSS = 1.0
 
 
-def contradicted(on: Trial, chosen: Candidate | None) -> tuple[float, str]:
+def contradicted(trial: Trial, chosen: Candidate | None) -> tuple[float, str]:
     """Held-out nats that effects lose where they say what the flights do not show, and the worst cell in words.
 
-    0 and no words where nothing is chosen.
+    0 and no words where nothing is chosen or lost.
     """
     if chosen is None or not chosen.fits:
         return 0.0, ""
-    gains = held_out_cell_gains(on, chosen)
+    gains = held_out_cell_gains(trial, chosen)
     lost = losses(gains)
+    if not lost.any():
+        return 0.0, ""
     in_a_channel_that_loses = lost[channel_cells()] > 0.0
     worst = int(np.argmin(np.where(in_a_channel_that_loses, gains, np.inf)))
     return float(lost.sum()), cell_words(worst)

@@ -26,7 +26,7 @@ class Search:
     name of every candidate that is judged.
     """
 
-    on: Trial
+    trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
     alone: Mapping[str, Candidate]
     least: Mapping[str, float]
@@ -75,7 +75,7 @@ def forward(search: Search, passing: Candidate | None) -> State:
         if best is None:
             break
         state = _added(search, state, best)
-    return replace(state, steps=tuple(with_shares(search.on, state.steps)))
+    return replace(state, steps=tuple(with_shares(search.trial, state.steps)))
 
 
 def _begun(search: Search, passing: Candidate | None) -> State:
@@ -111,7 +111,7 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     if not state.named:  # what nominal flights have as well stands beside every candidate
         there = {s.name for s in state.steps}
         singles = {**singles, **{n: j for n, j in state.tried.items() if n not in there}}
-    left_by_another = bool(state.named) and is_random_misfit(search.on, state.steps[-1], best)
+    left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
     steps = (*state.steps, replace(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
@@ -129,9 +129,9 @@ def _beside(search: Search, steps: Sequence[Candidate], before: Mapping[str, Can
     only those are judged again that gained something without it: a deviation takes gain from others, it seldom lends
     any.
     """
-    on, named = search.on, any(s.named for s in steps)
+    trial, named = search.trial, any(s.named for s in steps)
     gained = {n for n, j in before.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
     sure = {n for n, j in before.items() if j.full and j.evidence >= LEAST_GAIN and not is_random(n)}
-    tried = round_of(on, worth, steps[-1], search.progress, promising=sure)
-    return tried, {n: least_further_gain(on, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
+    tried = round_of(trial, worth, steps[-1], search.progress, promising=sure)
+    return tried, {n: least_further_gain(trial, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}

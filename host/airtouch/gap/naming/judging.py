@@ -75,7 +75,7 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def cross_validated(on: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float) -> Candidate:
+def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs. Its gain is
@@ -85,52 +85,52 @@ def cross_validated(on: Trial, name: str, terms: Terms, chosen: Candidate | None
     """
     before = chosen.terms if chosen else ()
     paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
-    certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(on, terms, chosen)
+    certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(trial, terms, chosen)
     if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
-        fits = tuple(_fit_on(on, half, spectral, chosen) for half in (0, 1))
-        gain = clock_gains(on.data, before)
+        fits = tuple(_fit_on(trial, half, spectral, chosen) for half in (0, 1))
+        gain = clock_gains(trial.data, before)
         for train, test in ROUND_TRIP:
-            gain += gain_of(on, test, fits[train].terms) if spectral else 0.0
+            gain += gain_of(trial, test, fits[train].terms) if spectral else 0.0
         gain += certain - price_of(fits[-1].terms) - paid
-    of_clock = [clock_gain(on.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
+    of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(on.data, terms), fits, choice_cost=paid, strength=strength,
+    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, choice_cost=paid, strength=strength,
                      covariance=covariance, apart=apart, gained_while_certain=certain)
 
 
-def _lost_to_uncertainty(on: Trial, terms: Terms, chosen: Candidate | None) -> float:
+def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
     """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
 
     Beside a random effect the commands' floor is less certain.
     """
     if chosen is None or not chosen.fits or random_of(chosen.terms) or not random_of(terms):
         return 0.0
-    return sum(gain_of(on, test, chosen.fits[train].terms) - gain_of(on, test, chosen.fits[train].terms, True)
+    return sum(gain_of(trial, test, chosen.fits[train].terms) - gain_of(trial, test, chosen.fits[train].terms, True)
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(on: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None) -> FittedTerms:
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None) -> FittedTerms:
     """Effects fitted on a half, from where those that are chosen ended there."""
-    part = on.parts[half]
-    return _refined(on.data, part, fit(on.data, part, terms, _start(chosen, terms, half)))
+    part = trial.parts[half]
+    return _refined(trial.data, part, fit(trial.data, part, terms, _start(chosen, terms, half)))
 
 
-def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
+def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
     """Nats that fitted effects add on a half, over no effect as sure of the commands' floor.
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
-    return judge(on.data, on.parts[half], terms, wide) - on.base[wide or bool(random_of(terms))][half]
+    return judge(trial.data, trial.parts[half], terms, wide) - trial.base[wide or bool(random_of(terms))][half]
 
 
-def held_out_cell_gains(on: Trial, hypothesis: Candidate) -> np.ndarray:
+def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
-    return np.sum([cell_gains(on.data, on.parts[test], hypothesis.fits[train].terms) for train, test in ROUND_TRIP],
-                  axis=0)
+    return np.sum([cell_gains(trial.data, trial.parts[test], hypothesis.fits[train].terms)
+                   for train, test in ROUND_TRIP], axis=0)
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],

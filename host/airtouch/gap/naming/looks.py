@@ -37,7 +37,7 @@ class RandomLook(NamedTuple):
 class RoundStart:
     """What a round begins from: the hypothesis that is chosen, and what it leaves of each half."""
 
-    on: Trial
+    trial: Trial
     chosen: Candidate | None
     halves: Sequence[Remainder]
 
@@ -65,10 +65,11 @@ class Looks:
     unseen: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(on: Trial, chosen: Candidate | None) -> RoundStart:
+def start_of(trial: Trial, chosen: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
     fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    return RoundStart(on, chosen, [remainder_of(on.data, part, fitted[1 - half]) for half, part in enumerate(on.parts)])
+    halves = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.parts)]
+    return RoundStart(trial, chosen, halves)
 
 
 def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
@@ -103,7 +104,7 @@ def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
         looks.unseen.append(variant)
     else:
         look = _mean_look(start, variant)
-        if look.gain < start.gain + HOPELESS and _only_in_commands(start.on, variant.terms):
+        if look.gain < start.gain + HOPELESS and _only_in_commands(start.trial, variant.terms):
             looks.unseen.append(variant)
         else:
             looks.means.append(look)
@@ -112,7 +113,7 @@ def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
 def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    look = first_order(start.on.data, start.halves, terms, start.terms)
+    look = first_order(start.trial.data, start.halves, terms, start.terms)
     gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
     halves = np.array(look.fitted)[:, :k]
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
@@ -125,11 +126,11 @@ def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: in
     return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
 
 
-def _only_in_commands(on: Trial, terms: Terms) -> bool:
+def _only_in_commands(trial: Trial, terms: Terms) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
-    law = on.data.study.controller
+    law = trial.data.study.controller
     moved = [t.active(np.ones(len(t.free))) for t in terms]
-    return law is not None and not any(shows(on.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
+    return law is not None and not any(shows(trial.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
 def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,

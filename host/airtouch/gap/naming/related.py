@@ -28,23 +28,23 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(known))
 
 
-def related(on: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
+def related(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
     candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
     """
     steps: list[Candidate] = []
-    for effect in dict.fromkeys(of.effect for of in inference.classes):
-        own = [of for of in inference.classes if of.effect == effect]
+    for effect in dict.fromkeys(c.effect for c in inference.classes):
+        own = [c for c in inference.classes if c.effect == effect]
         variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
-        judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(effect,))
+        judged = round_of(trial, variants, steps[-1] if steps else None, progress, promising=(effect,))
         if effect in judged:
             steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
     return Selection(
         singles=alone, steps=tuple(steps), nameless_alone=inference.nameless_alone,
-        nameless_beside=inference.unexplained, parts=on.parts, least=dict.fromkeys(alone, FIRST_GAIN),
-        nominal=on.data.study.nominal, assumed=False, nominal_gain=0.0, simulated=True, same_models=True,
+        nameless_beside=inference.unexplained, parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN),
+        nominal=trial.data.study.nominal, assumed=False, nominal_gain=0.0, simulated=True, same_models=True,
         inference=inference)
 
 
@@ -57,11 +57,11 @@ def signs_not_shown(selection: Selection) -> list[str]:
             for name in selection.inference.without_sign if name in names]
 
 
-def matching(of: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
+def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
-    alone = of.name.partition(" ")[2]
+    alone = effect_class.name.partition(" ")[2]
     if alone:
         return [v for v in variants if v[0].free == (alone,)]
-    if of.shape is None:
+    if effect_class.shape is None:
         return list(variants)
-    return [v for v in variants if v[0].values[v[0].signature.class_by] == of.shape]
+    return [v for v in variants if v[0].values[v[0].signature.class_by] == effect_class.shape]

@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, cross_validated
 from airtouch.gap.naming.looks import PricedVariant, first_looks, random_looks, start_of
 from airtouch.gap.naming.selection import Candidate
-from airtouch.gap.second_process import shared
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
@@ -38,7 +38,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
     waiting = [*looks.unseen, *random, *means_to_fit]
-    fitted = shared(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
+    fitted = map_on_two_cores(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
     best = best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}

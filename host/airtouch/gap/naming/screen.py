@@ -19,7 +19,7 @@ from airtouch.gap.signatures.term import Term
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken; chosen
 ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen
 NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none; chosen, far above rounding
-UNBOUNDED = 1e6  #: scaled parameter up to which the effects beside may give way: any
+UNBOUNDED = 1e6  #: scaled parameter up to which the effects beside may change: any
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def first_order(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
                 ) -> FirstOrder:
     """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
 
-    beside: effects chosen before, free to give way a little.
+    beside: effects chosen before, free to change.
     """
     mean, other = ([t for t in some if t.shows_in == MEAN and not t.signature.commands_only]
                    for some in (terms, beside))
@@ -118,7 +118,7 @@ def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
                 for a, b in zip(after, before, strict=True)]
 
     variant = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
-    return data.workspace.once("change", (term.name, term.free[i], variant), make)
+    return data.workspace.cached("change", (term.name, term.free[i], variant), make)
 
 
 def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:

@@ -43,15 +43,15 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     them (`_by_relations`), but for an effect of a user's own that explains the flights in the replay too: its class was
     learned from few flights. candidates: the variants of every effect by name; progress: is told every name judged.
     """
-    on = trial_of(data)
-    alone = round_of(on, candidates, None, progress)
+    trial = trial_of(data)
+    alone = round_of(trial, candidates, None, progress)
     # without a model of the loop the first effect must gain as much as a further one; of evidence, FIRST_GAIN is enough
     least = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
-    search = Search(on, candidates, alone, least, progress)
+    search = Search(trial, candidates, alone, least, progress)
     inference = inference_of(data, list(candidates))
     if inference is not None and NAMES.issuperset(candidates):
         return _by_relations(search, inference, without)
-    passing = passing_effect(on, alone, least, without)
+    passing = passing_effect(trial, alone, least, without)
     answer = _by_replay(search, forward(search, passing), passing)
     if inference is None or answer.explained and answer.named and answer.named[0].name not in NAMES:
         return answer
@@ -64,10 +64,10 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     It may name a wake of some seconds, what else comes and goes if the relations find it likeliest as well, and what
     has more shapes than its class.
     """
-    answer = related(search.on, search.candidates, search.alone, inference, search.progress)
+    answer = related(search.trial, search.candidates, search.alone, inference, search.progress)
     if answer.explained:
         return answer
-    passing = passing_effect(search.on, search.alone, search.least, without)
+    passing = passing_effect(search.trial, search.alone, search.least, without)
     if not replay_may_name(passing, inference):
         return answer
     state = forward(search, passing)
@@ -95,25 +95,26 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     passing: the effect that comes and goes of its first step; it is taken back where beside the others it is no more
     than nominal flights have.
     """
-    on, study = search.on, search.on.data.study
-    if passing is not None and as_in_nominal_flights(on.data, passing, state.steps):
+    trial, study = search.trial, search.trial.data.study
+    if passing is not None and as_in_nominal_flights(trial.data, passing, state.steps):
         state = forward(search, None)
-    before = nameless(on, None)
-    after = nameless(on, state.steps[-1]) if state.steps else before
+    before = nameless(trial, None)
+    after = nameless(trial, state.steps[-1]) if state.steps else before
     last = state.steps[-1].terms if state.steps else ()
     selection = Selection(
-        singles=state.singles, steps=state.steps, nameless_alone=before, nameless_beside=after, parts=on.parts,
+        singles=state.singles, steps=state.steps, nameless_alone=before, nameless_beside=after, parts=trial.parts,
         least=state.least, nominal=study.nominal,
-        assumed=bool(random_of(last)) if study.simulated else assumes(on.data, last),
-        nominal_gain=_nominal_gain(on.data), simulated=study.simulated, same_models=study.same_models,
-        left_of_times=clock_left(on.data, last))
-    return replace(selection, contradicted=contradicted(on, selection.chosen)) if study.simulated else selection
+        assumed=bool(random_of(last)) if study.simulated else assumes(trial.data, last),
+        nominal_gain=_nominal_gain(trial.data), simulated=study.simulated, same_models=study.same_models,
+        left_of_times=clock_left(trial.data, last))
+    return replace(selection, contradicted=contradicted(trial, selection.chosen)) if study.simulated else selection
 
 
-def nameless(on: Trial, chosen: Candidate | None) -> float:
+def nameless(trial: Trial, chosen: Candidate | None) -> float:
     """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    return max(sum(nameless_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, chosen.terms if chosen else ())
+    of_spectra = max(sum(nameless_gain(trial.data, trial.parts, fits)), 0.0)
+    return of_spectra + clock_left(trial.data, chosen.terms if chosen else ())
 
 
 def _nominal_gain(data: Data) -> float:

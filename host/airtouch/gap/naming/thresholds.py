@@ -10,8 +10,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, held_out_cell_gains
 from airtouch.gap.naming.selection import Candidate
-from airtouch.gap.signatures.candidates import is_random, random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
 #: of what the effects before it gain, that a further one must gain: in simulated flights of what they gain where it
@@ -26,25 +25,25 @@ ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 RANDOM_SHARE = 0.25
 
 
-def least_further_gain(on: Trial, base: Candidate, extended: Candidate) -> float:
+def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> float:
     """Held-out nats that a further effect must gain to be added.
 
     base: the hypothesis of the effects before it; extended: the same with the further one.
     """
     names = {t.name for t in base.terms}
     new = [t for t in extended.terms if t.name not in names]
-    share = RECORDED_SHARE if on.data.study.recorded else LEAST_SHARE
-    if assumes(on.data, base.terms) and changes_loop(on.data, new):
-        share = ASSUMED_SHARE if on.data.study.same_models else LOOP_SHARE
-    return misfit(on, base, extended, share, everywhere=is_random(extended.name))
+    share = RECORDED_SHARE if trial.data.study.recorded else LEAST_SHARE
+    if assumes(trial.data, base.terms) and changes_loop(trial.data, new):
+        share = ASSUMED_SHARE if trial.data.study.same_models else LOOP_SHARE
+    return misfit(trial, base, extended, share, everywhere=is_random(extended.name))
 
 
-def is_random_misfit(on: Trial, base: Candidate, extended: Candidate) -> bool:
+def is_random_misfit(trial: Trial, base: Candidate, extended: Candidate) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
-    return is_random(extended.name) and extended.gain - base.gain < misfit(on, base, extended, RANDOM_SHARE)
+    return is_random(extended.name) and extended.gain - base.gain < misfit(trial, base, extended, RANDOM_SHARE)
 
 
-def misfit(on: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:
+def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the effects before it are wrong by a share of theirs.
 
     base, extended: as for `least_further_gain`. What the effects on the logged times gain is no model's and does not
@@ -52,11 +51,11 @@ def misfit(on: Trial, base: Candidate, extended: Candidate, share: float, everyw
     gains (`gain_in_improved_cells`), unless `everywhere`; nor are cells looked at where it gains more than the whole
     share.
     """
-    whole = max(LEAST_GAIN, share * (base.gain - clock_gains(on.data, base.terms)))
+    whole = max(LEAST_GAIN, share * (base.gain - clock_gains(trial.data, base.terms)))
     fitted = extended.full and extended.fits and base.fits
-    if everywhere or on.data.study.recorded or not fitted or extended.gain - base.gain >= whole:
+    if everywhere or trial.data.study.recorded or not fitted or extended.gain - base.gain >= whole:
         return whole
-    there = gain_in_improved_cells(held_out_cell_gains(on, base), held_out_cell_gains(on, extended))
+    there = gain_in_improved_cells(held_out_cell_gains(trial, base), held_out_cell_gains(trial, extended))
     return max(LEAST_GAIN, share * there)
 
 
@@ -79,4 +78,4 @@ def assumes(data: Data, terms: Sequence[Term]) -> bool:
 def changes_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether one of the mean effects, at its values, changes the control loop; False where no loop is modelled."""
     law = data.study.controller
-    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.shows_in == MEAN)
+    return law is not None and any(law.changes_loop((t.active(),)) for t in mean_of(terms))

@@ -17,7 +17,7 @@ from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
-from airtouch.gap.second_process import shared
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
@@ -37,7 +37,7 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
 
     It is measured in FLIGHTS of them, each held against the study of all.
     """
-    return scatter_of(shared(partial(_apparent_in, study, without), evenly_chosen(flights)),
+    return scatter_of(map_on_two_cores(partial(_apparent_in, study, without), evenly_chosen(flights)),
                       any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
 
 

@@ -45,9 +45,9 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
     bridging = [bridging_power(f, vehicle, calibration, begin[AIR], q, response)
                 for f, begin, q in zip(flights, first, quiet, strict=True)]
     floor = floor_of(flights, residuals, first, spectra, sensor_noise(vehicle), bridging)
-    if loop is not None and response is not None and response.stepped is not None:
-        over = response.stepped.power / np.maximum(response.steady.power, 1e-30)
-        loop = loop.with_steps(response.stepped.coherent, over, frequencies(AIR))
+    if loop is not None and response is not None and response.stepped_law is not None:
+        over = response.stepped_law.power / np.maximum(response.quiet_law.power, 1e-30)
+        loop = loop.with_steps(response.stepped_law.coherent, over, frequencies(AIR))
     return Study(vehicle, calibration, loop, floor, response, nominal=len(flights))
 
 

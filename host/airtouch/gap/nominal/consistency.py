@@ -115,8 +115,8 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
 
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:
     """Trim (flights, 6) of each flight, m/s^2 and rad/s^2; worked out once for a flight and a vehicle."""
-    key = vehicle, tuple((a.effect.name, *a.values.values()) for a in calibration)
-    return np.array([f.workspace.once("trim", key, partial(_trim, f, vehicle, calibration)) for f in flights])
+    key = vehicle, tuple(a.key for a in calibration)
+    return np.array([f.workspace.cached("trim", key, partial(_trim, f, vehicle, calibration)) for f in flights])
 
 
 def _trim(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active]) -> np.ndarray:

@@ -24,11 +24,11 @@ from airtouch.simulation.effects.effect import Gate
 PLACE = ("x_m", "y_m", "z_m")
 #: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-#: the rule by which known seconds are compared with the rest of a flight was chosen among seven on recorded flights
-#: (host/docs/looks.md, 2026-11-25 04:11); of the numbers below none has a source of its own, all were chosen
+#: The rule by which known seconds are compared with the rest of a flight was chosen among seven, on recorded flights
+#: (host/docs/looks.md, 2026-11-25 04:11). The numbers below have no source of their own: all were chosen.
 APART_S = 0.1  #: s, stretches with less between them are one
 LEAST_S = 0.05  #: s, shorter ones are none
-SHIFTS = 8  #: places of the known seconds around the rest of the flight
+SHIFTS = 8  #: parts of a flight, by each of which but the last the known seconds are shifted: SHIFTS - 1 other places
 MARGIN_S = 0.25  #: s around the known seconds, in which a wake may already or still act
 LEAST_SHARE = 0.5  #: of the known seconds that shifted ones must hold
 
@@ -104,7 +104,7 @@ def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
 
 
 def _shifted(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
-    """The same stretches SHIFTS times around a flight, cut at its end."""
+    """The same stretches at SHIFTS - 1 places beside the known one, around a flight, cut at its end."""
     long = len(flight) * PERIOD_S
     return [tuple((flight.name, (a + shift) % long, min((a + shift) % long + b - a, long)) for a, b in seconds)
-            for shift in np.arange(SHIFTS) * long / SHIFTS]
+            for shift in np.arange(1, SHIFTS) * long / SHIFTS]

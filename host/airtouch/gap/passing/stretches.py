@@ -17,7 +17,7 @@ from airtouch.logs.segments import KINDS
 from airtouch.simulation.effects.effect import Gate
 
 #: no number here has a source: all were chosen
-MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
+MOST_STRETCHES = 4  #: stretches in which an effect may act, times the number of flights, of all flights together
 WORST = 0.25  #: share of the blocks, those explained worst, that an effect is first fitted to
 LEAST_WORST = 2  #: blocks that it is first fitted to at least
 ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches
@@ -63,7 +63,7 @@ def price_of_stretches(blocks: int) -> float:
 def best_stretches(gain: np.ndarray, flight: np.ndarray, price: float) -> list[tuple[int, int]]:
     """Disjoint stretches (first, last) of blocks of one flight with the largest sums of gain, each over its price.
 
-    gain (b,): nats of each block; flight (b,): its flight's number. MOST_STRETCHES for each flight at most.
+    gain (b,): nats of each block; flight (b,): its flight's number. MOST_STRETCHES times the number of flights at most.
     """
     remaining, out = gain.copy(), []
     while len(out) < MOST_STRETCHES * (int(flight.max()) + 1):

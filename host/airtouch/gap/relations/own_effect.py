@@ -15,7 +15,7 @@ from airtouch.gap.relations.calibration import HIGHEST_START, ClassCalibration, 
 from airtouch.gap.relations.effect_class import learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, halved, scaled
 from airtouch.gap.relations.library import SHARES, Library
-from airtouch.gap.second_process import shared
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
 from airtouch.simulation.effects import get
 from airtouch.vehicle import Vehicle
@@ -53,7 +53,7 @@ def _with_class(library: Library, scene: Scene, name: str) -> Library:
     high = drawing.kind.highest
     low = min(_weakest(library, scene, drawing), HIGHEST_START * high)
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()])) for i in range(PAIRS)]
-    flown = shared(partial(_pair, library, scene, drawing), enumerate(strengths))
+    flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
     pairs = [p for p in flown if p is not None]
     if len(pairs) < LEAST_PAIRS:
         return library

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_key import OPENED, SEALED, key_of, seal
 from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
@@ -88,7 +88,7 @@ def _nats_when_told(study: Study, log: FlightLog, effects: Sequence[Mapping[str,
     if len(effects) != 1:
         return {}
     told = Active(get(effects[0]["name"]), effects[0]["values"])
-    return {"nats": log_ratio(Data(study, list(measure.usable([log], study.vehicle, []))), told)}
+    return {"nats": log_ratio(Data(study, list(ready_flights([log], study.vehicle, []))), told)}
 
 
 def stripped(log: FlightLog) -> FlightLog:
@@ -108,7 +108,7 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
     """Three severities of each kind of effect that such flights show at all, in the unit of the kind's strength."""
     vehicle = study.vehicle
     logs = nominal(vehicle, NONE_FIRST, NONE, seed)
-    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in logs]
+    without = [Data(study, list(ready_flights([log], vehicle, []))) for log in logs]
     found = {}
     asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
     for number, (name, kind) in enumerate(asked.items(), 1):
@@ -121,7 +121,7 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
 
 def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
     """What flights of a set are held against."""
-    return calibrate.calibrated(vehicle, list(measure.usable(cal, vehicle, [])))[0]
+    return calibrate.calibrated(vehicle, list(ready_flights(cal, vehicle, [])))[0]
 
 
 def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[list[tuple[str, int]]]:
@@ -158,7 +158,7 @@ def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Seve
         active: list[Active] = [KINDS[k].active(severities[k][place] * WEAKER ** attempt, rng) for k, place in drawn]
         log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=vehicle, effects=active, seed=seed,
                               workers=1)))
-        if isinstance(log, FlightLog) and list(measure.usable([stripped(log)], vehicle, [])):
+        if isinstance(log, FlightLog) and list(ready_flights([stripped(log)], vehicle, [])):
             return stripped(log), [{"name": a.effect.name, "kind": k, "level": place, "values": dict(a.values)}
                                    for a, (k, place) in zip(active, drawn, strict=True)]
     raise AirTouchError(f"{', '.join(k for k, _ in drawn)}: {TRIES} flights crashed; lower its highest strength")

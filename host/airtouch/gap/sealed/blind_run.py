@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import brief
+from airtouch.gap.diagnosis import diagnose_with_study
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.sealed.blind import Say
 from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
@@ -25,8 +25,8 @@ from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
 Mapper = Callable[[Callable, Iterable], Iterable]
-Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
-CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
+Task = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
+TaskFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
 Answer = tuple[str, tuple[str, ...], str]  #: name of a flight, effects left out, the diagnosis as JSON
 AHEAD = 4  #: flights sent to each process and not yet back; chosen
 #: fields of a diagnosis that an answer has
@@ -51,9 +51,9 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
-    first = sorted(answers.glob("flight_????.json"))
-    # the key is opened for the answers above; effects can be withheld only when they are known
-    key = open_key(out, answers_sha256([json.loads(p.read_text()) for p in first]))["answers"]
+    # the key is opened for these answers; effects can be withheld only when they are known
+    first = [json.loads(_place(answers, n, ()).read_text()) for n in names]
+    key = open_key(out, answers_sha256(first))["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, spread)
@@ -84,7 +84,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
 
 
-def _answers(study: Study, files: Sequence[CaseFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+def _answers(study: Study, files: Sequence[TaskFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
     """Answers as they come, in the order of the flights.
 
     Local processes read the logs themselves: if a process dies while a log is written to its pipe, Python 3.11 waits
@@ -114,17 +114,17 @@ def _begin(study: Study | None) -> None:
     _study = study
 
 
-def with_study(case: CaseFile) -> Answer:
+def with_study(case: TaskFile) -> Answer:
     """The answer to one case, in a process that `_begin` has given the study."""
     assert _study is not None
     name, without, path = case
     return _diagnosed(_study, (name, without, read(path)))
 
 
-def _diagnosed(study: Study, case: Case) -> Answer:
+def _diagnosed(study: Study, case: Task) -> Answer:
     """Name, effects left out, and the diagnosis as JSON."""
     name, without, log = case
-    diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
+    diagnosis = diagnose_with_study(study, list(ready_flights([log], study.vehicle, [])), without).plain()
     diagnosis |= {"flights": [name], "without": list(without)}
     content = {k: diagnosis[k] for k in ANSWERED}
     return name, without, json.dumps(content) + "\n"

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
-import airtouch.gap.measure as measure
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.random_draws import KINDS, Kind
@@ -77,7 +77,7 @@ def _log_ratios(actives: Sequence[Active], study: Study, scenario: str, without:
         log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
         if not isinstance(log, FlightLog):
             continue
-        flights = list(measure.usable([part_seen(log)], study.vehicle, []))
+        flights = list(ready_flights([part_seen(log)], study.vehicle, []))
         if flights:
             yes.append(log_ratio(Data(study, flights), active))
             no.append(log_ratio(without[i % len(without)], active))

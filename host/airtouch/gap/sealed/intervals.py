@@ -13,8 +13,8 @@ Figure = dict[str, float | None]
 
 def share(values: Iterable[Any]) -> Figure:
     """Share of true values with n and Wilson's 95 % interval."""
-    found = [bool(v) for v in values]
-    return wilson(sum(found), len(found))
+    hits = [bool(v) for v in values]
+    return wilson(sum(hits), len(hits))
 
 
 def wilson(hits: int, n: int, z: float = 1.959964) -> Figure:
@@ -40,10 +40,10 @@ def pooled(pairs: Sequence[tuple[float, float]]) -> Figure:
     if not pairs:
         return {"value": None, "low": None, "high": None, "median": None, "n": 0}
     x = np.array(pairs)
-    gone, there = x[:, 0] - x[:, 1], x[:, 0] - 1.0
-    low, high = _bootstrap(lambda pick: gone[pick].sum(axis=1) / there[pick].sum(axis=1), len(x))
-    return {"value": float(gone.sum() / there.sum()), "low": low, "high": high,
-            "median": float(np.median(gone / there)), "n": len(x)}
+    removed, excess = x[:, 0] - x[:, 1], x[:, 0] - 1.0
+    low, high = _bootstrap(lambda pick: removed[pick].sum(axis=1) / excess[pick].sum(axis=1), len(x))
+    return {"value": float(removed.sum() / excess.sum()), "low": low, "high": high,
+            "median": float(np.median(removed / excess)), "n": len(x)}
 
 
 def median(values: np.ndarray) -> Figure:

@@ -1,6 +1,7 @@
 """The gap's channels: what was measured minus what the model says, sample by sample.
 
-Replay view: specific force (3), angular acceleration (3), and the gyro's mean (3). Command
+Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3),
+judged below 0.3 Hz. Command
 view: the controller's command (4), filtered to have the spectrum of nominal flights where
 the effects in the model are all that changed it.
 """
@@ -75,13 +76,13 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     """
     gated = [a for a in active if a.gate]
     if not gated:
-        return _steady(flight, vehicle, active, controller, seed)
+        return _ungated_residual(flight, vehicle, active, controller, seed)
     always, cache = [a for a in active if not a.gate], workspace or Workspace()
 
     def of(some: Sequence[Active]) -> np.ndarray:
         """Residual of effects that always act; cached."""
-        return cache.once("residual", tuple((a.effect.name, *a.values.values()) for a in some),
-                          lambda: _steady(flight, vehicle, some, controller, seed), KEPT)
+        return cache.cached("residual", tuple(a.key for a in some),
+                          lambda: _ungated_residual(flight, vehicle, some, controller, seed), KEPT)
 
     out = of(always).copy()
     for a in gated:
@@ -91,8 +92,8 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     return out
 
 
-def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: ClosedLoop | None, seed: int,
-            ) -> np.ndarray:
+def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: ClosedLoop | None,
+                      seed: int) -> np.ndarray:
     """`residual` of effects that always act."""
     out = np.full((len(flight), COUNT), np.nan)
     plant = prepare(vehicle, active)[0]
@@ -103,7 +104,7 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
     signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
     model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
     force, turning = model.specific_force, model.angular_acceleration
-    turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
+    turning = 0.5 * (turning + np.concatenate([turning[1:], turning[-1:]]))
     rest = flight.phase == GROUND
     if rest.any():
         up = flight.body_to_world[:, 2, :] * vehicle.gravity_mps2
@@ -130,4 +131,4 @@ def angular_acceleration(flight: Flight) -> np.ndarray:
             out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
         return interpolate_missing(np.where(flight.bridged[:, None], np.nan, out))
 
-    return flight.workspace.once("turning", (), make)
+    return flight.workspace.cached("turning", (), make)

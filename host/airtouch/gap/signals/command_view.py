@@ -147,7 +147,7 @@ class CommandView:
         if not self.spectra:
             return self.floor, 0.0
         ratio = self.loop.ratio(active)
-        return self.workspace.once("power", (ratio.tobytes(), wide), lambda: self._expected(ratio, wide), KEPT)
+        return self.workspace.cached("power", (ratio.tobytes(), wide), lambda: self._expected(ratio, wide), KEPT)
 
     def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
         """`power` where that of the commands is a multiple (bins, AXES) of nominal flights'."""

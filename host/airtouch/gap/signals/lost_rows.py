@@ -34,11 +34,11 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))
     if not flight.lost.any() or not len(first):
         return total
-    known, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
+    gap, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
     for k in range(1, SHIFTS + 1):
         offset = k * len(flight) // (SHIFTS + 1)
         poorer = _without(flight, np.roll(flight.lost, offset))
-        change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - known)
+        change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - gap)
         begin = (first + offset) % len(flight)
         room = _in_flight(flight, begin)
         spectrum = blocks(change, begin[room], AIR)
@@ -51,7 +51,7 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
 
 
 def _in_flight(flight: Flight, begin: np.ndarray) -> np.ndarray:
-    """Whether blocks that begin at samples (blocks,) end before the flight does and hold usable samples only, bool."""
+    """Whether blocks that begin at samples (blocks,) end before the flight does, of usable or bridged samples, bool."""
     bad = (flight.phase == GROUND) | ~(flight.usable | flight.bridged)
     before = np.cumsum(np.concatenate([[0], bad]))
     room = begin + LENGTH[AIR] <= len(flight)
@@ -65,8 +65,8 @@ def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
 
     workspace: see `residual`.
     """
-    known = residual(flight, vehicle, active, workspace=workspace)
-    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, known))
+    gap = residual(flight, vehicle, active, workspace=workspace)
+    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, gap))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

@@ -126,8 +126,8 @@ class Response:
 
     nominal: np.ndarray
     calm: np.ndarray
-    steady: Law
-    stepped: Law | None
+    quiet_law: Law
+    stepped_law: Law | None
 
     def quiet(self, modelled: np.ndarray) -> np.ndarray:
         """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3)."""
@@ -140,11 +140,11 @@ class Response:
         spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
         change: by effects that change the loop.
         """
-        residual = self.steady.residual(torque, change, QUIET)
+        residual = self.quiet_law.residual(torque, change, QUIET)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
         if len(with_step):
-            stepped = np.array(np.nan) if self.stepped is None else \
-                self.stepped.residual(torque.of_blocks(with_step), change, STEPPED)
+            stepped = np.array(np.nan) if self.stepped_law is None else \
+                self.stepped_law.residual(torque.of_blocks(with_step), change, STEPPED)
             residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
         out = spectra.copy()
         out[:, FIRST_BIN:, TORQUE] = residual[:, FIRST_BIN:]
@@ -152,15 +152,15 @@ class Response:
 
     def weighted(self, quiet: np.ndarray, torque: np.ndarray) -> np.ndarray:
         """Torque (blocks, bins, 3) weighted as its residual is in quiet and in other blocks (blocks, 3)."""
-        stepped = np.nan if self.stepped is None else self.stepped.weight
-        return torque * np.where(quiet[:, None], self.steady.weight, stepped)
+        stepped = np.nan if self.stepped_law is None else self.stepped_law.weight
+        return torque * np.where(quiet[:, None], self.quiet_law.weight, stepped)
 
     def doubt(self, quiet: np.ndarray, modelled: np.ndarray, change: Change) -> np.ndarray:
         """Power (blocks, bins, 3) that the residual may have because steps, and what the limits cut of them, differ.
 
         quiet (blocks, 3): whether no set-point stepped; modelled: torque of the commands (blocks, bins, 3).
         """
-        law = self.stepped
+        law = self.stepped_law
         if law is None:
             return np.zeros(modelled.shape)
         doubt = (CUT_DOUBT * law.weight * np.abs(law.coherent) * change.cut) ** 2
@@ -172,7 +172,7 @@ class Response:
         sensed: on the gyro alone.
         """
         by_kind = [np.ones(self.nominal.shape) if law is None else
-                   law.weight ** 2 * (1.0 if sensed else law.random) for law in (self.steady, self.stepped)]
+                   law.weight ** 2 * (1.0 if sensed else law.random) for law in (self.quiet_law, self.stepped_law)]
         out = np.nan_to_num(np.where(quiet[:, None], *by_kind), nan=1.0)  # no law: such blocks do not count
         out[:, :FIRST_BIN] = 1.0
         return out
@@ -192,7 +192,7 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
         stepped, _ = _law(y, w, ~quiet, loop, floor)
-    return Response(nominal=_smooth(nominal), calm=calm, steady=steady, stepped=stepped)
+    return Response(nominal=_smooth(nominal), calm=calm, quiet_law=steady, stepped_law=stepped)
 
 
 def _quiet_blocks(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,8 +1,8 @@
 """Short-time spectra of the gap, and the floor that they are held against.
 
 Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping (Welch 1967). A bin's value over the
-floor's standard deviation is one standard normal number (real and imaginary part each) when nothing is wrong. The file
-reads: blocks of a flight, their spectra, which bins count, the floor of nominal flights.
+square root of the floor's power is a complex normal number of power 1 when nothing is wrong. The file reads: blocks of
+a flight, their spectra, which bins count, the floor of nominal flights.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
-MOST_LOST = 0.1  #: share of lost rows that a block may have; chosen
+MOST_LOST = 0.1  #: share of bridged samples that a block may have; chosen
 HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
 LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted; chosen
 #: Hz, below which, in the lowest band, torque and rate hold the trim of a flight, which does not go with how hard it is
@@ -33,9 +33,9 @@ SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floo
 
 
 def starts(flight: Flight, regime: str) -> np.ndarray:
-    """First samples of the blocks of a regime that hold usable samples only."""
+    """First samples of the blocks of a regime that hold usable samples, at most MOST_LOST of them bridged."""
     length = LENGTH[regime]
-    good = flight.on_ground if regime == REST else (flight.phase != GROUND) & ~flight.on_ground
+    good = flight.on_ground if regime == REST else flight.phase != GROUND
     near = good & (flight.usable | flight.bridged)
     may_begin = (count_within(~near, length) == 0) & (count_within(flight.bridged, length) <= MOST_LOST * length)
     return half_overlapping(may_begin, length)
@@ -47,7 +47,7 @@ def frequencies(regime: str) -> np.ndarray:
 
 
 def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
-    """Spectra (blocks, bins, channels) of values (n, channels), unit/sqrt(Hz), two-sided.
+    """Spectra (blocks, bins, channels) of values (n, channels), unit/sqrt(Hz).
 
     |.|^2 has the mean of the one-sided PSD; a constant x gives x * sqrt(duration / 1.5).
     """

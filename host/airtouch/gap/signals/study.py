@@ -1,15 +1,24 @@
 """The study of a vehicle: the model and the floor that flights are compared with."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.response import Response
 from airtouch.gap.signals.spectra import Floor
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.effect import Gate
 from airtouch.vehicle import Vehicle
+
+if TYPE_CHECKING:  # folders below this one
+    from airtouch.gap.relations.library import Library
+    from airtouch.gap.unnamed.columns import NamelessFloor
 
 
 @dataclass(frozen=True)
@@ -29,11 +38,15 @@ class Study:
     controller: ClosedLoop | None
     floor: Floor
     response: Response | None = None
-    nameless_floor: Any = None
+    nameless_floor: "NamelessFloor | None" = None
     nominal: int = 0
     scatter: Scatter | None = None
-    relations: Any = None
+    relations: "Library | None" = None
     overhead: Gate = ()
+
+    def residual(self, flight: Flight, active: Sequence[Active] = ()) -> np.ndarray:
+        """Measured minus modelled (n, COUNT) of a flight, with effects in the model: `channels.residual`."""
+        return residual(flight, self.vehicle, (*self.calibration, *active), self.controller)
 
     @property
     def simulated(self) -> bool:
@@ -47,5 +60,8 @@ class Study:
 
     @property
     def recorded(self) -> bool:
-        """Whether its nominal flights are recorded ones. Without nominal flights this is False, as `simulated` is."""
+        """Whether its nominal flights are not known to be a simulator's; one flight alone is not.
+
+        Without nominal flights this is False, as `simulated` is.
+        """
         return self.scatter is not None and not self.scatter.exact

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.result import NamedEffect
-from airtouch.gap.signatures.signature import ALWAYS_RANDOM, COMPANIONS, GATED, SIGNATURES, SPECTRUM, signature_of
+from airtouch.gap.signatures.signature import ALWAYS_RANDOM, COMPANIONS, GATED, MEAN, SIGNATURES, SPECTRUM, signature_of
 from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
@@ -21,7 +21,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     without = set(without)
     out: dict[str, list[Terms]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
     for name, signature in SIGNATURES.items():
-        if name in out and signature.steady is not None:
+        if name in out and signature.without_random is not None:
             random: list[Terms] = [(*v, random_part_of(name)) for v in out[name]]
             out[name] = random if name in ALWAYS_RANDOM else out[name] + random
     for name, companion in COMPANIONS.items():
@@ -36,7 +36,7 @@ def gated_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     without, out = set(without), {}
     for name in GATED:
         if name in EFFECTS and name not in without:
-            random = () if SIGNATURES[name].steady is None else (random_part_of(name),)
+            random = () if SIGNATURES[name].without_random is None else (random_part_of(name),)
             out[name] = [(t, *random) for t in terms(name)]
     return out
 
@@ -45,7 +45,7 @@ def terms(name: str) -> list[Term]:
     """The hypotheses of one effect, one for each variant, with all free parameters at neutral."""
     effect = get(name)
     signature, where = signature_of(effect), shows_in(effect)
-    neutral = effect.scaled(effect.values(), 0.0) | dict(signature.steady or {})
+    neutral = effect.scaled(effect.values(), 0.0) | dict(signature.without_random or {})
     together = [Term(effect, where, signature.free, neutral | dict(v)) for v in signature.variants]
     return together + ([Term(effect, where, (p,), neutral) for p in signature.free] if signature.alone_too else [])
 
@@ -60,13 +60,18 @@ def shows_in(effect: Effect) -> str:
 def random_part_of(name: str) -> Term:
     """The random part of an effect, where and when its mean part acts."""
     effect = get(name)
-    return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, **(SIGNATURES[name].steady or {})}),
-                True)
+    values = effect.values({"strength": 1.0, **(SIGNATURES[name].without_random or {})})
+    return Term(effect, SPECTRUM, ("turbulence",), values, True)
 
 
 def strength_term(terms: Sequence[Term]) -> Term:
     """The term whose strength is that of the effect: the random part of one that is ALWAYS_RANDOM, else the first."""
     return terms[-1] if terms[0].name in ALWAYS_RANDOM else terms[0]
+
+
+def mean_of(terms: Sequence[Term]) -> list[Term]:
+    """The terms that change the mean of the gap."""
+    return [t for t in terms if t.shows_in == MEAN]
 
 
 def random_of(terms: Sequence[Term]) -> list[Term]:

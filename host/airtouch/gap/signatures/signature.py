@@ -61,8 +61,8 @@ class Signature:
     comes_and_goes: whether it may act in a part of a flight only.
 
     What is beside it:
-    steady: values at which the effect has no random part, for a mean part whose random part is a term of its own; None
-    for an effect without a random part.
+    without_random: values at which the effect has no random part, for a mean part whose random part is a term of its
+    own; None for an effect without a random part.
     always_random: whether the effect is only tried with its random part, because the mean alone has other names.
     companion: the effect that a variant has beside it; "" without one.
     several_by: parameter of which each value is an effect of its own, several of which may act together; "" for none.
@@ -83,7 +83,7 @@ class Signature:
     spectrum: str = ""
     bursts: Bursts | None = None
     comes_and_goes: bool = False
-    steady: Mapping[str, float] | None = None
+    without_random: Mapping[str, float] | None = None
     always_random: bool = False
     companion: str = ""
     several_by: str = ""
@@ -125,7 +125,8 @@ def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
 SIGNATURES: dict[str, Signature] = {
     "ground_effect": Signature(
         ("strength",), variants=_each("fade", 0.0, 0.06, 0.0875, 0.129),
-        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), steady={"turbulence": 0.0}, at_edges=True,
+        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), without_random={"turbulence": 0.0},
+        at_edges=True,
         # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of
         # opened sealed sets
         own_scatter=0.07),
@@ -163,7 +164,7 @@ SIGNATURES: dict[str, Signature] = {
     "range_step": Signature(("residual", "kick"), commands_only=True, at_edges=True),
     "flow_scale": Signature(("share", "transient"), commands_only=True, at_edges=True),
     "downwash": Signature(
-        ("strength",), steady={"turbulence": 0.0, "width": 0.0}, always_random=True, comes_and_goes=True),
+        ("strength",), without_random={"turbulence": 0.0, "width": 0.0}, always_random=True, comes_and_goes=True),
     "controller_gain": Signature(
         ("rate", "attitude", "position", "height"), alone_too=True, commands_only=True, factors=True),
 }

@@ -17,8 +17,7 @@ from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
-from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.unnamed.basis import BASIS, basis
 
@@ -72,7 +71,7 @@ class Regressors:
 
 def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
     """The regressors of each channel of each flight of a part that has known values; made once."""
-    return problem.workspace.once("regressors", (), lambda: _regressors(data, part, problem))
+    return problem.workspace.cached("regressors", (), lambda: _regressors(data, part, problem))
 
 
 def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
@@ -100,7 +99,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
             out.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
         return out
 
-    return data.workspace.once("basis", (), make)
+    return data.workspace.cached("basis", (), make)
 
 
 def _loop_columns(data: Data) -> list[np.ndarray]:
@@ -119,7 +118,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
             out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
         return out
 
-    return data.workspace.once("loop", (), make)
+    return data.workspace.cached("loop", (), make)
 
 
 def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.ndarray:
@@ -147,6 +146,6 @@ def allowed_columns(data: Data, terms: Sequence[Term], channel: int) -> np.ndarr
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
         out[len(BASIS):] = False
-    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.shows_in == MEAN]):
+    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in mean_of(terms)]):
         out[OF_COMMAND[yaw]] = False
     return out

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.where.filter_bank import BANDS_HZ, filtered
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 from airtouch.gap.where.regimes import REGIMES, regimes
 from airtouch.vehicle import Vehicle
 
@@ -47,7 +48,7 @@ def join(parts: Sequence[Sums]) -> Sums:
     if not parts:
         r = len(REGIMES)
         return Sums(np.zeros(0, int), np.zeros(0, int), np.zeros((0, r)),
-                    np.zeros((0, r, len(BANDS_HZ), COUNT)), np.zeros((0, r, COUNT)))
+                    np.zeros((0, r, len(MAP_BANDS_HZ), COUNT)), np.zeros((0, r, COUNT)))
     return Sums(np.concatenate([p.phase for p in parts]),
                 np.concatenate([np.full(len(p.phase), i) for i, p in enumerate(parts)]),
                 *(np.concatenate([getattr(p, key) for p in parts]) for key in ("weight", "power", "mean")))
@@ -59,7 +60,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
     parts: list[tuple] = []
     for start, stop in stretches(flight):
         valid = ~flight.bridged[start:stop]
-        values = _interpolated(residual[start:stop], valid)
+        values = interpolate_over(residual[start:stop], valid)
         bands = filtered(values)
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
         for first, last in _blocks(flight.phase[start:stop]):
@@ -67,7 +68,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
             mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
             if mask[0].any():
                 parts.append((flight.phase[start + first], mask.sum(axis=1),
-                              (mask @ flat[here]).reshape(len(REGIMES), len(BANDS_HZ), COUNT),
+                              (mask @ flat[here]).reshape(len(REGIMES), len(MAP_BANDS_HZ), COUNT),
                               mask @ bands[0, here]))
     if not parts:
         return join([])
@@ -77,20 +78,9 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
 
 def stretches(flight: Flight) -> list[tuple[int, int]]:
     """First sample and the one after the last of each stretch without contact, in the air or at rest."""
-    air = (flight.phase != GROUND) & ~flight.on_ground
-    kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.bridged)
+    kind = np.where(flight.on_ground, 1, np.where(flight.phase != GROUND, 2, 0)) * (flight.usable | flight.bridged)
     bounds = np.r_[0, np.flatnonzero(np.diff(kind)) + 1, len(kind)]
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
-
-
-def _interpolated(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """The values (n, c) with straight lines over the samples that are not valid; absent channels stay NaN."""
-    out = np.array(values)
-    if not valid.all() and valid.any():
-        index = np.arange(len(out))
-        for c in range(out.shape[1]):
-            out[:, c] = np.interp(index, index[valid], out[valid, c])
-    return out
 
 
 def _blocks(phase: np.ndarray) -> list[tuple[int, int]]:

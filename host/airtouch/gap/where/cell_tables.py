@@ -8,7 +8,7 @@ from scipy.special import gammaincinv
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.signatures.term import WITHIN_90
 from airtouch.gap.where.band_sums import Sums
-from airtouch.gap.where.filter_bank import BANDS_HZ
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
@@ -73,7 +73,7 @@ def _freedom(seconds: np.ndarray, blocks: np.ndarray) -> np.ndarray:
 
     seconds, blocks (regimes,). Bendat and Piersol, Random Data, 4th ed., section 8.3.
     """
-    width = np.array([b - a for a, b in BANDS_HZ])
+    width = np.array([b - a for a, b in MAP_BANDS_HZ])
     limit = np.maximum(FREEDOM * blocks, 1.0)[:, None]
     return np.clip(2.0 * seconds[:, None] * width, 1.0, limit)[:, :, None]
 

@@ -24,7 +24,7 @@ def interval(cell: Cell) -> str:
 
 def short(value: float) -> str:
     """The value with two digits, or its whole part where that has more."""
-    return f"{value:.0f}" if 10.0 <= abs(value) < 1e5 else f"{value:.2g}"
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
 
 
 def ratio(cell: Cell) -> float:

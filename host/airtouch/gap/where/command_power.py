@@ -29,14 +29,14 @@ def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower])
     blocks, nominal_blocks = (sum(p.blocks for p in powers) for powers in (flown, nominal))
     if not blocks:
         return {}
-    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
+    content: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
     mean = np.sum([p.total for p in flown], axis=0) / blocks
     of_nominal = np.sum([p.total for p in nominal], axis=0) / nominal_blocks if nominal_blocks else None
     for i, axis in enumerate(AXES):
-        made[axis] = {"flown": mean[:, i].tolist()}
+        content[axis] = {"flown": mean[:, i].tolist()}
         if of_nominal is not None:
-            made[axis]["nominal"] = of_nominal[:, i].tolist()
-    return made
+            content[axis]["nominal"] = of_nominal[:, i].tolist()
+    return content
 
 
 def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:

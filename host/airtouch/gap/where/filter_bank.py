@@ -13,7 +13,7 @@ from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
 #: edges of the map's bands, Hz: about octaves, chosen; the last ends at half the 100 Hz of the flights
-BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
+MAP_BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
 CROSSOVER = 0.3  #: half the width of a crossover between two bands, as a fraction of its frequency; chosen
 NOISE_FREQUENCIES = 2000  #: at which the gain of a band is averaged for the sensors' noise; chosen
 
@@ -21,7 +21,7 @@ NOISE_FREQUENCIES = 2000  #: at which the gain of a band is averaged for the sen
 def gains(f: np.ndarray) -> np.ndarray:
     """Amplitude gain (bands, len(f)) of each band at frequencies f, Hz; the squares of all bands add up to 1."""
     lowpass = [np.zeros(len(f))]
-    for _, edge in BANDS_HZ[:-1]:
+    for _, edge in MAP_BANDS_HZ[:-1]:
         position = np.clip((f - edge) / (2.0 * CROSSOVER * edge) + 0.5, 0.0, 1.0)
         lowpass.append(np.cos(0.5 * np.pi * position) ** 2)
     lowpass.append(np.ones(len(f)))
@@ -47,7 +47,7 @@ def sensor_rms(vehicle: Vehicle) -> np.ndarray:
     gain = gains(f) ** 2
     white = gain.mean(axis=1)
     differenced = (gain * difference_power(f)).mean(axis=1) / PERIOD_S ** 2
-    out = np.zeros((len(BANDS_HZ), COUNT))
+    out = np.zeros((len(MAP_BANDS_HZ), COUNT))
     out[:, FORCE] = white[:, None] * np.asarray(row["acc_noise"]) ** 2
     out[:, TORQUE] = differenced[:, None] * np.asarray(row["gyro_noise"]) ** 2
     out[:, RATE] = white[:, None] * np.asarray(row["gyro_noise"]) ** 2

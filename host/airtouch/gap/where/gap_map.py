@@ -16,15 +16,14 @@ from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signals.study import Study
-from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import Sums, join, sums
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
-from airtouch.gap.where.filter_bank import BANDS_HZ, gains, sensor_rms
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.gap.where.summary import TINY
 from airtouch.logs.segments import KINDS
@@ -72,7 +71,7 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
-    gap = residual(flight, study.vehicle, study.calibration, study.controller)
+    gap = study.residual(flight)
     after = _sums_with(study, flight, terms) if terms else None
     return Part(flight.name, sums(flight, gap, study.vehicle), after, flight.rates is not None,
                 tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
@@ -102,9 +101,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    active = [t.active() for t in terms if t.shows_in == MEAN]
-    gap = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
-               study.vehicle)
+    gap = sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
     random = random_of(terms)
     if not random or not len(gap.phase):
         return gap
@@ -160,7 +157,7 @@ def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
     long = table.seconds >= LEAST_SECONDS
     for r, b, c in np.argwhere(long[:, None, None] & shown & np.isfinite(table.rms)):
         cells.append(Cell(
-            CHANNELS[c].name, BANDS_HZ[b], phase.kind, float(table.rms[r, b, c]), float(phase.floor[r, b, c]),
+            CHANNELS[c].name, MAP_BANDS_HZ[b], phase.kind, float(table.rms[r, b, c]), float(phase.floor[r, b, c]),
             CHANNELS[c].unit, float(table.low[r, b, c]), float(table.high[r, b, c]), REGIMES[r], int(table.blocks[r]),
             int(table.flights[r]), None if after is None else float(after.rms[r, b, c]),
             float(phase.floor_high[r, b, c]), None if phase.best is None else phase.best[r, b, c] or None))
@@ -171,10 +168,11 @@ def visible(phase: int, baseline: bool, no_gyro: bool) -> np.ndarray:
     """Mask (bands, COUNT) of the cells that mean something in a phase, a place in KINDS.
 
     Rates hold turns that were flown, so in the air they are only held against baseline
-    flights; without a gyro torque is known at low frequency only; commands need a law.
+    flights; without a gyro torque is known at low frequency only;
+    commands are judged in all bands but the lowest and the highest (0.6 to 30 Hz).
     """
     at_rest = phase == GROUND
-    out = np.ones((len(BANDS_HZ), COUNT), bool)
+    out = np.ones((len(MAP_BANDS_HZ), COUNT), bool)
     out[1:, RATE] = False
     out[:, RATE] &= at_rest or baseline
     out[0, COMMAND], out[-1, COMMAND] = False, False

@@ -30,8 +30,8 @@ def regimes(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     out[:, 0] = True
     air = flight.phase != GROUND
     quantities = {
-        "height": flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1) if log.has("zrange_m")
-        else None,
+        "height": flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1)
+        if log.has("zrange_m") or log.has("z_m") else None,
         "speed": np.hypot(log["vx_mps"], log["vy_mps"]) if log.has("vx_mps", "vy_mps") else None,
         "cell voltage": log["vbat_V"] / vehicle.battery_cells if log.has("vbat_V") else None,
     }

@@ -47,7 +47,7 @@ def over_floor(cell: Cell, value: float | None = None) -> float:
     return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, TINY)
 
 
-def after(cell: Cell) -> float:
+def ratio_after(cell: Cell) -> float:
     """The cell's gap over its floor with the named effects in the model; the gap without them, where none was tried."""
     return (cell.gap if cell.after is None else cell.after) / max(cell.floor, TINY)
 
@@ -101,7 +101,7 @@ def closes(cell: Cell) -> bool:
     return removed(cell) >= HALF * energy(cell) > 0.0
 
 
-def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
+def headline(cells: Sequence[Cell], named: bool = False) -> Cell | None:
     """The cell that stands for the gap; None where no cell in the air stands out.
 
     It is in the channel and band with most energy over all phases in the air (with named effects: from which they
@@ -177,17 +177,17 @@ def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
     chosen = largest(of_map.cells, count)
     ordered = largest(of_map.cells, len(of_map.cells))
     more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
-    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered if c.after is not None]
+    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered
+                  if c.after is not None and c.after < c.gap]
     more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:MOST_REDUCED]]
     others = {c for c in more if c is not None and c not in chosen}
     return chosen + sorted(others, key=sure_ratio, reverse=True)
 
 
-def overall(cells: Iterable[Cell], key: str = "gap") -> float:
-    """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
-    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME
-              and getattr(c, key) is not None and c.floor > 0.0]
-    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
+def overall(cells: Iterable[Cell]) -> float:
+    """Root mean square over all cells in the air of gap over floor, each with the same weight; NaN without any."""
+    ratios = [c.gap / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME and c.floor > 0.0]
+    return rms(ratios) if ratios else float("nan")
 
 
 def rms(values: Sequence[float]) -> float:

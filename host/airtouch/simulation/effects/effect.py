@@ -2,7 +2,7 @@
 
 import inspect
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -127,3 +127,8 @@ class Active:
     effect: Effect
     values: Mapping[str, float]
     gate: Gate = ()
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for the same effect with the same values and gate."""
+        return self.effect.name, *sorted(self.values.items()), self.gate

@@ -1,16 +1,17 @@
 """Where: the gap of recorded flights to the simulator, before anything is blamed for it."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap import callable_module
-from airtouch.gap.flights.flight import Flight, ready
+from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
+from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.flight import ready, ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
@@ -88,7 +89,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     run: what maps a function over flights, in place of `map`, to spread the work.
     """
     left_out: list[str] = []
-    nominal = list(usable(baseline, vehicle, left_out))
+    nominal = list(ready_flights(baseline, vehicle, left_out))
     studies, fitted = [declared_study(vehicle, nominal)], None
     notes = differences(studies[0], nominal)
     if nominal and calibrated:
@@ -143,22 +144,10 @@ def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight 
                           rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
 
 
-def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> Iterator[Flight]:
-    """Flights made ready, one at a time; the reasons of those that cannot be go to `left_out`."""
-    for log in logs:
-        try:
-            yield ready(log, vehicle)
-        except AirTouchError as error:
-            left_out.append(str(error))
-
-
-def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """What logs cannot say, each reason once, with the number of flights where it is not all.
-
-    flights: reasons of each flight.
-    """
-    count = Counter(reason for one in flights for reason in one)
-    return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
-
-
-callable_module(__name__)
+def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
+    """The curves of a measurement, of its first flights."""
+    flights = list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
+    if not flights:
+        return Pictures(commands=measurement.spectra)
+    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
+    return replace(curves, commands=measurement.spectra)

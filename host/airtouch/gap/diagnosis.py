@@ -5,19 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import airtouch.gap.measure as measure
 from airtouch.errors import AirTouchError
-from airtouch.gap import callable_module
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.answer.pictures import of as pictures_of
+from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import recorded
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.related import signs_not_shown
@@ -40,10 +39,11 @@ MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; cho
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
+PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no wake is judged"
 
 
 @dataclass(frozen=True)
-class Case:
+class Comparison:
     """What is diagnosed: flights made ready, compared with the study of a vehicle.
 
     usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
@@ -76,11 +76,12 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
-    nominal = list(measure.usable(baseline, vehicle, notes))
-    usable = list(measure.usable(flights, vehicle, notes))
+    nominal = list(ready_flights(baseline, vehicle, notes))
+    usable = list(ready_flights(flights, vehicle, notes))
     if not usable:
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
+        notes += [PARTNER_UNUSED] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
     known = None if before is None else before.calibrated
@@ -88,16 +89,18 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if partner:
         study, note = _with_partner(study, usable[0], seconds)
         notes.append(note)
-    case = Case(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
-    data = _data(study, case.judged)
+    comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
+    data = _data(study, comparison.judged)
     selection, gap = _selected(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
-    return replace(_explained(result, case, selection, pictures), notes=_notes(case, notes), calibrated=calibrated)
+    return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
+                   calibrated=calibrated)
 
 
-def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
+def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
+                        data: Data | None = None) -> Diagnosis:
     """`diagnose` with a study that is there already, without map, arms and advice: for many cases alike.
 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
@@ -125,27 +128,27 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
         shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
 
 
-def _explained(result: Diagnosis, case: Case, selection: Selection, pictures: bool) -> Diagnosis:
+def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
     """The answer with what it is compared with: the map and its largest cells, arms, what stays open, what to fly next.
 
     pictures: whether to keep the curves that a report shows.
     """
-    study, usable, nominal = case.study, case.usable, case.nominal
+    study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
     effects, is_effect = list(result.effects), result.verdict == "effect"
     terms = [candidates.term_of(e) for e in effects]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
-                       case.vehicle.name)
+                       comparison.vehicle.name)
     return replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(case.vehicle, nominal, case.calibration, case.judged, selection, result) if is_effect else {},
-        unexplained=tuple(unexplained(study, case.judged, selection, cells)) if result.verdict == "unknown" else (),
+        arms=arms(comparison.vehicle, nominal, comparison.calibration, judged, selection, result) if is_effect else {},
+        unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         next=steps,
-        cannot=measure.cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
-        vehicle=case.vehicle.name, baseline=tuple(f.name for f in nominal),
-        calibration=case.calibration.parameters if case.calibration else {},
+        cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
+        calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
 
 
@@ -157,14 +160,15 @@ def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[s
     return calibrate.calibrated(vehicle, nominal, without=without)
 
 
-def _notes(case: Case, of_logs: Sequence[str]) -> tuple[str, ...]:
+def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
-    notes = [note for f in case.usable for note in f.notes] + [*of_logs]
-    notes += list(case.calibration.notes) if case.calibration else [NO_BASELINE]
-    notes += differences(case.study, case.nominal)
-    notes += flown_unlike(case.study, case.usable)
-    if len(case.judged) < len(case.usable):
-        notes.append(f"candidates were judged on {len(case.judged)} of {len(case.usable)} flights, evenly chosen")
+    notes = [note for f in comparison.usable for note in f.notes] + [*of_logs]
+    notes += list(comparison.calibration.notes) if comparison.calibration else [NO_BASELINE]
+    notes += differences(comparison.study, comparison.nominal)
+    notes += flown_unlike(comparison.study, comparison.usable)
+    if len(comparison.judged) < len(comparison.usable):
+        notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
+                     "chosen")
     return tuple(dict.fromkeys(notes))
 
 
@@ -176,8 +180,8 @@ def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
-    """The flights with their spectra; torque in the mean alone where nobody knows which share of it is aliases."""
-    data = Data(study, flights, slow=study.response is None)
+    """The flights with their spectra. Raises AirTouchError where they are too short for two halves."""
+    data = Data(study, flights)
     if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
         raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
                             "5 s in the air without a hole are needed")
@@ -203,6 +207,3 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
         selection = recorded.without_names(selection)
         gap = gap_of(data, selection.parts, None)
     return selection, gap
-
-
-callable_module(__name__)
