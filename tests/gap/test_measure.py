@@ -91,7 +91,7 @@ def test_any_map_may_spread_the_work_and_progress_is_told(sweeps):
         return reversed([function(i) for i in reversed(items)])
 
     gap = measure(sweeps, VEHICLE, progress=messages.append)
-    assert measure(sweeps, VEHICLE, run=backwards).plain() == gap.plain()
+    assert measure(sweeps, VEHICLE, mapper=backwards).plain() == gap.plain()
     assert counts == [3] and messages == list(gap.flights)
 
 
@@ -121,5 +121,5 @@ def test_a_cluster_gives_the_same(sweeps):
     from airtouch.gap.sealed.on_cluster import mapper
 
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        on_cluster = measure(sweeps, VEHICLE, run=mapper(cluster.scheduler_address))
+        on_cluster = measure(sweeps, VEHICLE, mapper=mapper(cluster.scheduler_address))
     assert on_cluster.plain() == measure(sweeps, VEHICLE).plain()

@@ -79,14 +79,14 @@ class MeasuredFlight:
 
 def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[FlightLog] = (), *,
             calibrated: bool = True, progress: Callable[[str], None] = lambda _: None,
-            run: Callable = map) -> Measurement:
+            mapper: Callable = map) -> Measurement:
     """Hold flights against the vehicle's model and map what is left.
 
     Flights that cannot be used are left out with their reason; raises AirTouchError when
     none is left. Works from accelerations and motor commands; `cannot` says what more
     channels would show. Where `flights` reads them as it goes, one is in memory at a time.
     calibrated: whether the vehicle is also calibrated on the baseline, for the second arm;
-    run: what maps a function over flights, in place of `map`, to spread the work.
+    mapper: what maps a function over flights, in place of `map`, to spread the work.
     """
     left_out: list[str] = []
     nominal = list(ready_flights(baseline, vehicle, left_out))
@@ -97,7 +97,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
         studies.append(study)
         notes += [n for n in fitted.notes if n not in notes]
-    measured = _measured(studies, flights, run, progress, left_out)
+    measured = _measured(studies, flights, mapper, progress, left_out)
     maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
@@ -115,14 +115,14 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         cannot=cannot_of([m.cannot for m in measured]), left_out=tuple(left_out))
 
 
-def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], run: Callable, progress: Callable[[str], None],
+def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], mapper: Callable, progress: Callable[[str], None],
               left_out: list[str]) -> list[MeasuredFlight]:
     """Each flight that can be used against the model of each study; reasons of the others are added to `left_out`.
 
     Raises AirTouchError when no flight can be used.
     """
     measured: list[MeasuredFlight] = []
-    for one in run(partial(measured_flight, tuple(studies)), flights):
+    for one in mapper(partial(measured_flight, tuple(studies)), flights):
         if isinstance(one, str):
             left_out.append(one)
         else:

@@ -133,7 +133,7 @@ def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path)
             function, item = pickle.loads(jobs[-1])
             yield function(item)
 
-    blind_run.answer(folder, tmp_path / "answers", [(name, ())], study=study, spread=spread)
+    blind_run.answer(folder, tmp_path / "answers", [(name, ())], study=study, mapper=spread)
     assert len(jobs) == 1 and len(jobs[0]) < 2e6  # dask warns of 10 MB
     assert (tmp_path / "answers" / f"{name}.json").read_bytes() == (folder / "answers" / f"{name}.json").read_bytes()
 

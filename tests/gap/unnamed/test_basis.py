@@ -67,8 +67,8 @@ def test_time_height_and_axes_of_the_world():
     t = np.arange(len(hover)) * 0.01
     np.testing.assert_allclose(column["time"][:, 0], t / TIME_S)
     np.testing.assert_allclose(column["time_thrust"][:, 0], t / TIME_S * column["thrust"][:, 0])
-    np.testing.assert_allclose(column["height"], 0.25)  # a quarter at twice the height
-    np.testing.assert_allclose(column["height_roll"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(column["near"], 0.25)  # a quarter at twice the height
+    np.testing.assert_allclose(column["near_roll"], 0.0, atol=1e-12)
     # a push along x of the world is felt along the body's x by cos, along its y by -sin of the yaw
     np.testing.assert_allclose(column["world_x"][0], [c, -s, 0.0], atol=1e-12)
     np.testing.assert_allclose(column["world_y"][0], [s, c, 0.0], atol=1e-12)
@@ -81,5 +81,5 @@ def test_columns_are_the_signals_that_they_are_named_after():
     assert np.all(column["in_air"][simulated.on_ground] == 0.0) and np.all(column["one"] == 1.0)
     assert abs(column["thrust"][hover, 0].mean() - 1.0) < 0.1  # of its weight
     np.testing.assert_allclose(column["vx"][hover, 1], simulated.signals[hover, at.VELOCITY])
-    rows = np.stack([column[k][hover] for k in ("world_x", "world_y", "tilt")], axis=1)
+    rows = np.stack([column[k][hover] for k in ("world_x", "world_y", "world_z")], axis=1)
     np.testing.assert_allclose(np.linalg.norm(rows, axis=2), 1.0, rtol=1e-9)  # rows of a rotation

@@ -90,7 +90,7 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     with Bar() as bar:
         from airtouch.gap.sealed import blind_run as check
 
-        figures = check.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
+        figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
     _scored(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 

@@ -31,7 +31,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
         vehicle = files.vehicle_of(vehicle_name, flights)
         run = on_cluster.mapper(dask) if dask else map
         bar.expect(len(flights) + bool(baseline))
-        measurement = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
+        measurement = measure.measure(flights, vehicle, nominal, progress=bar, mapper=run)
     failed = (*flights.failed.values(), *nominal.failed.values())
     measurement = replace(measurement, left_out=(*failed, *measurement.left_out))
     if json_path:

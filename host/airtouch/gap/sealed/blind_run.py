@@ -37,10 +37,10 @@ _study: Study | None = None
 
 
 def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
-        spread: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
+        mapper: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
 
-    unknown: how many single flights are diagnosed once more without their effect, all by default. spread: what
+    unknown: how many single flights are diagnosed once more without their effect, all by default. mapper: what
     stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about 4 s of
     one core for each flight, once more for each single one.
     """
@@ -50,21 +50,21 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     answers = out / "answers"
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
-    answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
+    answer(out, answers, [(n, ()) for n in names], workers, progress, study, mapper)
     # the key is opened for these answers; effects can be withheld only when they are known
     first = [json.loads(_place(answers, n, ()).read_text()) for n in names]
     key = open_key(out, answers_sha256(first))["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
-    answer(out, answers, cases, workers, progress, study, spread)
+    answer(out, answers, cases, workers, progress, study, mapper)
     return blind_score.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
-           progress: Say = lambda _: None, study: Study | None = None, spread: Mapper | None = None) -> None:
+           progress: Say = lambda _: None, study: Study | None = None, mapper: Mapper | None = None) -> None:
     """Diagnose flights of a set, one JSON each in `answers`; each case is a flight and effects to leave out.
 
-    study: of the set, where it is there already; spread: as for `run`. A local process that dies takes nothing along
+    study: of the set, where it is there already; mapper: as for `run`. A local process that dies takes nothing along
     but the flights that it was at, which are done again. Raises AirTouchError where processes die again and again.
     """
     answers.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
         study = study or study_in(folder)
         files = [(name, without, folder / f"{name}.csv.gz") for name, without in todo]
         try:
-            for name, without, text in _answers(study, files, min(workers, len(todo)), spread):
+            for name, without, text in _answers(study, files, min(workers, len(todo)), mapper):
                 write_bytes(text.encode(), _place(answers, name, without), True)
                 progress(name)
         except BrokenProcessPool:
@@ -84,15 +84,15 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
 
 
-def _answers(study: Study, files: Sequence[TaskFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+def _answers(study: Study, files: Sequence[TaskFile], workers: int, mapper: Mapper | None) -> Iterator[Answer]:
     """Answers as they come, in the order of the flights.
 
     Local processes read the logs themselves: if a process dies while a log is written to its pipe, Python 3.11 waits
     for ever (CPython issue 94777). A file's name fits into the pipe.
     """
-    if spread is not None or workers == 1:
+    if mapper is not None or workers == 1:
         logs = ((name, without, read(path)) for name, without, path in files)
-        yield from (spread or map)(partial(_diagnosed, study), logs)
+        yield from (mapper or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
         yield from in_order(lambda case: pool.submit(with_study, case), files, AHEAD * workers)

@@ -27,7 +27,7 @@ from scipy.ndimage import gaussian_filter1d
 from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
 from airtouch.gap.signals.channels import TORQUE
-from airtouch.gap.signals.spectra import squared
+from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
 QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
@@ -37,7 +37,6 @@ STEPPED_TORQUE = 2.0
 CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
 ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
 FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
-SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages over frequency; chosen
 #: Relative error of the loop model in that change of the transfer function which the command's limits make. It is the
 #: error in pairs of simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each.
 CUT_DOUBT = 0.3

@@ -29,7 +29,7 @@ FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
 LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
 LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
-SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages the floor over frequency; chosen
+SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 
 
 def starts(flight: Flight, regime: str) -> np.ndarray:

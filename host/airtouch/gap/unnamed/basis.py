@@ -15,8 +15,8 @@ TIME_S = 20.0  #: s, unit of time
 HEIGHT_M = 0.05  #: height of a rotor, m, at which its ground effect is one unit; the column is the same below
 LOW_M = 0.2  #: m above the floor, at which a force that fades slowly has half its strength
 BASIS = ("one", "in_air", "thrust", "roll", "pitch", "yaw", "d_thrust", "d_roll", "d_pitch", "d_yaw", "vx", "vy",
-         "vz", "speed", "world_x", "world_y", "tilt", "time", "time_thrust", "height",
-         "height_roll", "height_pitch", "low", "high")
+         "vz", "speed", "world_x", "world_y", "world_z", "time", "time_thrust", "near",
+         "near_roll", "near_pitch", "low", "height")
 
 
 def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:

@@ -19,7 +19,7 @@ from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, allowe
 from airtouch.gap.unnamed.powers import power_floor, power_gain
 from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, column_floor, linear_gain
 
-LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
+LIFT, OF_HEIGHT = 2, ("near", "low", "height")  #: channel of the force along the thrust; columns of the height
 
 
 def nameless_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
