@@ -66,8 +66,10 @@ def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
         over, before = zip(*filter(None, map(pieces, _evenly_spaced(close, MOST_PASSES))), strict=True)
         craft = vehicle.load(VEHICLE)
         whole, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
+        calibration = near.calibrated[1] if near.calibrated else None
         write_bytes(json.dumps({"all": whole.plain(), "close": near.plain(), "calibration": [
-            [a.effect.name, dict(a.values)] for a in near.calibrated[1].active]}, indent=1).encode(), store, force=True)
+            [a.effect.name, dict(a.values)] for a in (calibration.active if calibration else ())]}, indent=1).encode(),
+            store, force=True)
     return json.loads(store.read_text())
 
 

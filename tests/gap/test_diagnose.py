@@ -1,9 +1,25 @@
-"""Which of many flights are judged."""
+"""Which of many flights are judged, and which effects recorded flights may name beside others."""
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from airtouch.gap import diagnosis
 from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
+from airtouch.gap.result import Quantity
+from airtouch.gap.signatures.candidates import terms
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """As much of a selection as is asked for here."""
+
+    named: list
+    chosen: SimpleNamespace
+    singles: dict
+    parts: tuple = field(default=())
 
 
 @pytest.mark.parametrize(("count", "seconds", "chosen"), [
@@ -14,3 +30,23 @@ def test_flights_of_210_s_are_judged_and_no_fewer_than_four(count, seconds, chos
     judged = flights_to_judge(flights)
     assert [int(f[0]) for f in judged] == chosen
     assert sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS or len(judged) <= 4
+
+
+@pytest.mark.parametrize(("alone", "names"), [(0.5, ["downwash"]), (0.2, ["motor_lag", "downwash"])])
+def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_left_out(monkeypatch, alone, names):
+    """With slow motors 0.6 of the gap closes; without them as much as `alone`."""
+    def of(*effects):
+        steps = [SimpleNamespace(name=n, key=n) for n in effects]
+        chosen = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
+                                             for n in effects))
+        return Chosen(steps, chosen, dict.fromkeys(effects))
+
+    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without: of(
+        *(n for n in ("motor_lag", "downwash") if n not in without)))
+    monkeypatch.setattr(diagnosis, "gap_of", lambda data, parts, chosen: SimpleNamespace(named=SimpleNamespace(
+        before=1.4, share=Quantity(0.6 if len(chosen.terms) == 2 else alone))))
+    law = SimpleNamespace(changes_loop=lambda active: True)
+    data = SimpleNamespace(study=SimpleNamespace(recorded=True, controller=law))
+    selection, _ = diagnosis.selected(data, ())
+    assert [s.name for s in selection.named] == names
+    assert set(selection.singles) >= {"motor_lag"}, "the ranking lists every candidate tried"

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
@@ -25,7 +27,7 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     known = [f for f in own if f is not None]
     if len(known) < len(own):
         return None
-    return infer(library.without(library.effects - set(names)), library.coordinates(known))
+    return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
 def related(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
