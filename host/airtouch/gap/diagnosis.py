@@ -202,7 +202,8 @@ def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = la
         left = gap_of(data, others.parts, others.chosen)
         if gap.named.share.value - left.named.share.value < recorded.LEAST_CLOSED:
             without, gap = (*without, name), left
-            selection = replace(others, singles={**selection.singles, **others.singles})
+            selection = replace(others, singles={**selection.singles, **others.singles},
+                                least={**selection.least, **others.least})
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
         selection = recorded.without_names(selection)
