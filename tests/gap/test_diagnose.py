@@ -43,7 +43,7 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
         return Chosen(steps, chosen, dict.fromkeys(effects), dict.fromkeys(effects))
 
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without: of(
-        *(n for n in ("motor_lag", "downwash") if n not in without)))
+        *(n for n in ("motor_lag", "downwash") if n in candidates)))
     monkeypatch.setattr(diagnosis, "gap_of", lambda data, parts, chosen: SimpleNamespace(named=SimpleNamespace(
         before=1.4, share=Quantity(0.6 if len(chosen.terms) == 2 else alone))))
     law = SimpleNamespace(changes_loop=lambda active: True)

@@ -193,17 +193,18 @@ def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = la
     """What is chosen among the candidates, and the gap that it closes.
 
     In recorded flights some effects must close a part of the gap to be named, those of the loop also beside others: see
-    `naming.recorded`. One that does not is left out, and the others are chosen anew.
+    `naming.recorded`. Where they do not, the others are judged without them.
     """
-    selection = select(data, candidates.all_candidates(without), say, without)
+    variants = candidates.all_candidates(without)
+    selection = select(data, variants, say, without)
     gap = gap_of(data, selection.parts, selection.chosen)
-    for name in recorded.loop_effects_beside_others(data, selection):
-        others = select(data, candidates.all_candidates((*without, name)), say, (*without, name))
-        left = gap_of(data, others.parts, others.chosen)
+    others = recorded.named_beside_the_loop(data, selection)
+    if others:
+        rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
+        left = gap_of(data, rest.parts, rest.chosen)
         if gap.named.share.value - left.named.share.value < recorded.LEAST_CLOSED:
-            without, gap = (*without, name), left
-            selection = replace(others, singles={**selection.singles, **others.singles},
-                                least={**selection.least, **others.least})
+            selection = replace(rest, singles={**selection.singles, **rest.singles}, least=selection.least)
+            gap = left
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
         selection = recorded.without_names(selection)

@@ -9,8 +9,8 @@ from airtouch.gap.naming.recorded import (
     LEAST_CLOSED,
     STANDS_OUT,
     closes_too_little,
-    loop_effects_beside_others,
     must_close_the_gap,
+    named_beside_the_loop,
 )
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import terms
@@ -45,11 +45,15 @@ def test_what_passes_must_close_a_gap_only_where_one_stands_out():
     assert not closes_too_little(data, loop, 2.0, enough)
 
 
-def test_beside_others_every_effect_of_the_loop_is_held_against_the_gap():
+def test_beside_others_effects_of_the_loop_are_held_against_the_gap():
     wake = replace(terms("downwash")[0], gate=((0, 1),))
     several = [SimpleNamespace(name=n) for n in ("actuator_delay", "downwash", "mass")]
     both = SimpleNamespace(chosen=SimpleNamespace(terms=(terms("actuator_delay")[0], wake, terms("mass")[0])),
                            named=several)
-    assert loop_effects_beside_others(flights(recorded=True), both) == ["actuator_delay"]
-    assert loop_effects_beside_others(flights(recorded=False), both) == []
-    assert loop_effects_beside_others(flights(recorded=True), named("actuator_delay")) == [], "alone"
+    assert named_beside_the_loop(flights(recorded=True), both) == ["downwash", "mass"]
+    assert named_beside_the_loop(flights(recorded=False), both) == []
+    alone = named("actuator_delay")
+    alone.named[0].name = "actuator_delay"
+    assert named_beside_the_loop(flights(recorded=True), alone) == [], "it has a rule of its own"
+    no_loop = SimpleNamespace(chosen=SimpleNamespace(terms=(wake, terms("mass")[0])), named=several[1:])
+    assert named_beside_the_loop(flights(recorded=True), no_loop) == []

@@ -56,12 +56,17 @@ def changes_the_loop(data: Data, selection: Selection) -> bool:
     return chosen is not None and len(selection.named) == 1 and _of_the_loop(data, chosen.terms)
 
 
-def loop_effects_beside_others(data: Data, selection: Selection) -> list[str]:
-    """Effects of the control loop that recorded flights name beside others: each must close LEAST_CLOSED more."""
+def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
+    """Effects that recorded flights name beside some of the control loop, which must close LEAST_CLOSED more.
+
+    None where no effect of the loop is named, or nothing else.
+    """
     chosen = selection.chosen
-    if not data.study.recorded or chosen is None or len(selection.named) < 2:
+    if not data.study.recorded or chosen is None:
         return []
-    return [s.name for s in selection.named if _of_the_loop(data, [t for t in chosen.terms if t.name == s.name])]
+    names = [s.name for s in selection.named]
+    others = [n for n in names if not _of_the_loop(data, [t for t in chosen.terms if t.name == n])]
+    return others if len(others) < len(names) else []
 
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:
