@@ -14,11 +14,18 @@ build: days 19 and 20.
 
 Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
 vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
+
+    python tools/gap_wakes.py [FLIGHTS] --untold    # what a test has that is not told the seconds, 5 min
+
+Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
+the two apart.
 """
 
 import argparse
 import json
 import os
+import sys
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,9 +41,14 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.naming.passing_effect import news
 from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing import gates, overhead
+from airtouch.gap.passing.bursts import UNSTEADY_YAW
+from airtouch.gap.passing.one_sided import DOWNWARD
 from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.study import Study
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import read
 
 LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number
@@ -47,6 +59,7 @@ FALSE_ALARMS = 0.01  #: of nominal flights that may be beyond a limit, all MEASU
 FORCE_HZ, YAW_HZ = 1.0, (2.0, 20.0)
 #: names of what `measures` gives
 MEASURES = ("mean force", "its shaking", "yaw torque")
+DRAWS = 2000  #: of flights, for an interval
 
 
 @dataclass(frozen=True)
@@ -143,6 +156,44 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
           f"{share['high']:.1%}], in {len(set(alarms))} flights")
 
 
+def show_untold(flights: Path) -> None:
+    """Print how well each measure of a wake tells wakes from nominal flights, by vehicle."""
+    studies: dict[tuple[str, ...], Study] = {}
+    of_truth: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
+    nominal = [c for c in gap_real.nominal(flights, "build") if "neuralswarm" in Path(c.flight).parts]
+    for case in [*gap_real.swarm(flights, "build"), *nominal]:
+        if case.truth == "ground_effect":
+            continue
+        vehicle = vehicles.load(case.vehicle)
+        if case.baseline not in studies:
+            base = [ready(read(b), vehicle) for b in case.baseline]
+            studies[case.baseline] = calibrate.calibrated(vehicle, base, scatter=False)[0]
+        data = Data(studies[case.baseline], [ready(read(case.flight), vehicle)])
+        of_truth[vehicle.name, case.truth].append(passing_sizes(data))
+        print(f"{Path(case.flight).name}", file=sys.stderr, flush=True)
+    print("| vehicle | measure | AUROC, 95 % interval | wakes beyond every nominal flight |\n|---|---|---|---|")
+    for vehicle_name in sorted({name for name, _ in of_truth}):
+        for measure in (OVERHEAD, UNSTEADY_YAW, DOWNWARD):
+            wakes, calm = (np.array([sizes[measure] for sizes in of_truth[vehicle_name, truth]])
+                           for truth in ("downwash", "none"))
+            low, high = _interval(wakes, calm)
+            print(f"| {vehicle_name} | {measure} | {auroc(wakes, calm):.2f} [{low:.2f}, {high:.2f}] | "
+                  f"{(wakes > calm.max()).sum()} of {len(wakes)}, of {len(calm)} |")
+
+
+def auroc(wakes: np.ndarray, calm: np.ndarray) -> float:
+    """Chance that a measure of a wake (n,) is larger than one of a nominal flight (m,) (Mann and Whitney 1947)."""
+    return float((wakes[:, None] > calm).mean() + 0.5 * (wakes[:, None] == calm).mean())
+
+
+def _interval(wakes: np.ndarray, calm: np.ndarray) -> tuple[float, float]:
+    """95 % interval of the AUROC by a bootstrap over flights."""
+    rng = np.random.default_rng(0)
+    draws = [auroc(rng.choice(wakes, len(wakes)), rng.choice(calm, len(calm))) for _ in range(DRAWS)]
+    low, high = np.quantile(draws, (0.025, 0.975))
+    return float(low), float(high)
+
+
 def show_seen(tracks: list[Track], answers: Path | None) -> None:
     """Print a line for each flight under another vehicle, and for each vehicle how many the test sees."""
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
@@ -184,7 +235,11 @@ def main() -> None:
     parser.add_argument("--part", choices=("build", "all"), default="build")
     parser.add_argument("--answers", type=Path)
     parser.add_argument("--false-alarms", action="store_true")
+    parser.add_argument("--untold", action="store_true")
     options = parser.parse_args()
+    if options.untold:
+        show_untold(options.flights)
+        return
     folder = options.flights / "neuralswarm"
     all_days = options.part == "all" and not options.false_alarms
     rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in gap_real.BUILD_DAYS]
