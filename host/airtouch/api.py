@@ -257,7 +257,7 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
     if named is None:
         craft, warning = vehicles.of_log(logs[0].meta if logs else {})
         if warning:
-            warnings.warn(python_words(warning), stacklevel=5)  # the caller of at.gap.diagnose
+            warnings.warn(python_words(warning), stacklevel=4)  # the caller of at.gap.diagnose
         return craft
     return vehicles.load(named) if isinstance(named, (str, Path)) else named
 

@@ -34,7 +34,7 @@ def test_the_app_has_the_names_and_types_of_the_firmware():
         name: kind.removesuffix("_t").upper() for name, (kind, _, _) in app.LOGS.items()}
     assert {name: (field, int(element or -1)) for _, name, field, element in logs if field} == {
         name: (field, element) for name, (_, field, element) in app.LOGS.items() if name != "health"}
-    params = re.findall(r"PARAM_ADD\(PARAM_(\w+), (\w+), &wanted\.(\w+)\)", text)
+    params = re.findall(r"PARAM_ADD\(PARAM_(\w+), (\w+), &wantedParams\.(\w+)\)", text)
     assert {name: field for _, name, field in params} == app.PARAMS
     assert {field: kind for kind, _, field in params} == {
         field: kind.removesuffix("_t").upper() for field, kind in PARAM_TYPES.items()}
