@@ -13,6 +13,12 @@ from airtouch.simulation import effects
 forks = pytest.mark.skipif(not spare_core(), reason="one core, or a platform that does not fork safely")
 
 
+@pytest.fixture(autouse=True)
+def forking(monkeypatch):
+    """Here a diagnosis forks whoever runs beside it."""
+    monkeypatch.setattr(second_process, "spare_core", spare_core)
+
+
 def _slow(x):
     import time
 
