@@ -15,7 +15,7 @@ build: days 19 and 20.
 Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
 vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
 
-    python tools/gap_wakes.py [FLIGHTS] --untold    # what a test has that is not told the seconds, 5 min
+    python tools/gap_wakes.py [FLIGHTS] --without-seconds    # what a test has that is not told the seconds, 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
 the two apart.
@@ -156,7 +156,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
           f"{share['high']:.1%}], in {len(set(alarms))} flights")
 
 
-def show_untold(flights: Path) -> None:
+def show_without_seconds(flights: Path) -> None:
     """Print how well each measure of a wake tells wakes from nominal flights, by vehicle."""
     studies: dict[tuple[str, ...], Study] = {}
     of_truth: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
@@ -235,10 +235,10 @@ def main() -> None:
     parser.add_argument("--part", choices=("build", "all"), default="build")
     parser.add_argument("--answers", type=Path)
     parser.add_argument("--false-alarms", action="store_true")
-    parser.add_argument("--untold", action="store_true")
+    parser.add_argument("--without-seconds", action="store_true")
     options = parser.parse_args()
-    if options.untold:
-        show_untold(options.flights)
+    if options.without_seconds:
+        show_without_seconds(options.flights)
         return
     folder = options.flights / "neuralswarm"
     all_days = options.part == "all" and not options.false_alarms

@@ -5,8 +5,8 @@
         [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
-other groups, and a network trained on the same K alone. Prints a Markdown table: means over all
-draws and seeds, 95 % intervals by bootstrap over flights, and missed edges by height. --help explains the options.
+other groups, and a network trained on the same K alone. Prints a Markdown table: means over all draws and seeds, 95 %
+intervals by bootstrap over flights, and missed edges by height. --help explains the options.
 """
 
 import argparse

@@ -138,8 +138,8 @@ def _passing_of(i: int) -> list[ApparentStrengths]:
 def with_passing(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
     """The classes of the table that is shipped, with what comes and goes in their flights measured anew."""
     flights = defaultdict(list)
-    for (of, *_), group in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
-        flights[of] += group
+    for (of, *_), sizes in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
+        flights[of] += sizes
     return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
 
 

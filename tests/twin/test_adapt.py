@@ -1,4 +1,4 @@
-"""`airtouch adapt`: stages, resuming, hold-out by flight, outlook. Training is cut to a few steps."""
+"""`airtouch adapt`: stages, resuming, hold-out by flight, expected error. Training is cut to a few steps."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -249,14 +249,14 @@ def score(error_m):
     return FlightScore("a", Condition(speed_mps=0.3), edges, (), 2, 20.0)
 
 
-def test_outlook_is_a_power_law_that_never_promises_worse_or_a_miracle():
+def test_the_expected_error_is_a_power_law_that_never_promises_worse_or_a_miracle():
     def of(now, before):
-        return adapt_report.outlook(adapt.Adapted(None, [score(now)] * 4, [score(before)] * 4, []), 10, 5)
+        return adapt_report.expected_error(adapt.Adapted(None, [score(now)] * 4, [score(before)] * 4, []), 10, 5)
     assert of(0.02, 0.04)["then_m"] == pytest.approx(0.02 * 10 / 15)  # halved by twice the flights: exponent 1
     assert of(0.02, 0.02 * 2**0.5)["then_m"] == pytest.approx(0.02 * (10 / 15) ** 0.5)
     assert of(0.02, 0.01)["then_m"] == pytest.approx(0.02)
     assert of(0.02, 0.2)["exponent"] == 1.0
-    assert adapt_report.outlook(adapt.Adapted(None, [], [], []), 10) is None
+    assert adapt_report.expected_error(adapt.Adapted(None, [], [], []), 10) is None
 
 
 def test_readable_takes_the_speed_from_the_log(sweeps, tmp_path):

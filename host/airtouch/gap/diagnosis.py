@@ -201,10 +201,10 @@ def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = la
     others = recorded.named_beside_the_loop(data, selection)
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
-        left = gap_of(data, rest.parts, rest.chosen)
-        if gap.named.share.value - left.named.share.value < recorded.LEAST_CLOSED:
+        gap_of_rest = gap_of(data, rest.parts, rest.chosen)
+        if gap.named.share.value - gap_of_rest.named.share.value < recorded.LEAST_CLOSED:
             selection = replace(rest, singles={**selection.singles, **rest.singles}, least=selection.least)
-            gap = left
+            gap = gap_of_rest
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
         selection = recorded.without_names(selection)

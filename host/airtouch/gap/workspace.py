@@ -22,9 +22,9 @@ class Workspace:
 
     def cached(self, kind: str, key: Hashable, compute: Callable[[], Kept], most: int = MOST) -> Kept:
         """The value of a kind and key, made when it is not there; at most so many of the kind are kept."""
-        kept = self._kept.setdefault(kind, {})
-        value = kept.pop(key) if key in kept else compute()
-        kept[key] = value
-        if len(kept) > most:
-            kept.pop(next(iter(kept)))
+        values = self._kept.setdefault(kind, {})
+        value = values.pop(key) if key in values else compute()
+        values[key] = value
+        if len(values) > most:
+            values.pop(next(iter(values)))
         return value

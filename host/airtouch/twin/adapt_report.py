@@ -39,7 +39,7 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
     return usable, left_out
 
 
-def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
+def expected_error(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
     """Estimated mean error, m, with the present flights and with `more`, and the exponent p of error ~ flights^-p.
 
     Extrapolated from the errors with all and with half of the training flights; p is limited to 0 to 1. None without

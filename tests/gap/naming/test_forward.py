@@ -33,8 +33,8 @@ def select(monkeypatch):
         rounds, added, original = [], [], module._best_of
         monkeypatch.setattr(module, "round_of", round_of)
         monkeypatch.setattr(module, "_best_of", best_of)
-        monkeypatch.setattr(module, "least_further_gain", lambda on, held, more: LEAST_GAIN)
-        monkeypatch.setattr(module, "is_random_misfit", lambda on, held, more: more.name in left)
+        monkeypatch.setattr(module, "least_further_gain", lambda trial, last, candidate: LEAST_GAIN)
+        monkeypatch.setattr(module, "is_random_misfit", lambda trial, last, candidate: candidate.name in left)
         monkeypatch.setattr(module, "with_shares", lambda on, steps: steps)
         alone = {n: judged(n) for n in candidates}
         search = Search(None, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, FIRST_GAIN),

@@ -9,7 +9,7 @@ from scipy.stats import skew
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.passing.one_sided import PUSHES_HZ, downward
+from airtouch.gap.passing.one_sided import PUSH_BAND_HZ, downward
 from airtouch.gap.passing.stretches import ENDS
 from airtouch.gap.signals.channels import residual
 from gap_flights import fly
@@ -34,7 +34,7 @@ def test_it_is_the_skewness_of_the_filtered_force(study, nominal_flight, force_m
     force = residual(flight, study.vehicle, study.calibration)[:, 2]
     samples = np.arange(len(force))
     force = np.interp(samples, samples[counts], force[counts])
-    for hertz, kind in zip(PUSHES_HZ, ("highpass", "lowpass"), strict=True):
+    for hertz, kind in zip(PUSH_BAND_HZ, ("highpass", "lowpass"), strict=True):
         force = sosfiltfilt(butter(2, hertz * 2.0 * PERIOD_S, kind, output="sos"), force)
     assert downward(Data(study, [flight])) == pytest.approx(-skew(force[counts]), rel=0.01, abs=0.01)
 

@@ -117,7 +117,7 @@ def _say(adapted: Any, labelled: int, hold_out: bool) -> None:
         click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.MIN_LABELLED} are needed to say "
                    "what to expect")
         return
-    ahead = adapt_report.outlook(adapted, labelled, MORE)
+    ahead = adapt_report.expected_error(adapted, labelled, MORE)
     if ahead:
         click.echo(f"the next {MORE} flights: {ahead['now_m']:.3f} m would become about {ahead['then_m']:.3f} m "
                    f"(from {ahead['half_m']:.3f} m with half of the flights; a guess, see the intervals)")

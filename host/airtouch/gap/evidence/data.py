@@ -23,10 +23,10 @@ KEPT, KEPT_SAMPLES = 96, 20000
 class Data:
     """Flights with their blocks and the spectra of the gap before any effect is added.
 
-    By flight, and the first two by regime:
-    first (blocks,): first sample of each block; base (blocks, bins, COUNT): spectra of the gap, unit/sqrt(Hz);
-    measured_torque (blocks, bins, 3): those in the air of the measured angular acceleration; quiet (blocks, 3): blocks
-    in the air and axes in which no set-point stepped; bridging (blocks, bins, COUNT): power that lost rows add there.
+    By flight, and the first two by regime: first (blocks,): first sample of each block; base (blocks, bins, COUNT):
+    spectra of the gap, unit/sqrt(Hz); measured_torque (blocks, bins, 3): those in the air of the measured angular
+    acceleration; quiet (blocks, 3): blocks in the air and axes in which no set-point stepped; bridging (blocks, bins,
+    COUNT): power that lost rows add there.
     """
 
     study: Study

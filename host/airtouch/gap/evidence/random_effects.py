@@ -36,7 +36,7 @@ def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     of_unit = data.workspace.cached("random", unit.active().key,
-                                  lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
+                                    lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
     (name, *_) = term.free
     neutral = neutral_of(parameter_of(term.effect, name))
     scale = growth(term, (term.values[name] - neutral) / (unit.values[name] - neutral))

@@ -12,6 +12,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, price_of_stretches
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.study import Study
@@ -37,7 +38,7 @@ class Signal:
 #: no number of the force has a source: all were chosen
 FORCE = Signal(2, (1.0, 50.0), 0.16, 3.0)
 #: band and length of the pieces were chosen among six and two on wakes of recorded flights (host/docs/looks.md,
-#: 2026-11-25 21:00); freedom: twice the band's width times the piece's length
+#: 2026-11-25 20:55); freedom: twice the band's width times the piece's length
 YAW = Signal(5, (15.0, 40.0), 0.32, 16.0)
 LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is sought; chosen
 
@@ -65,8 +66,9 @@ def unsteady_yaw(data: Data) -> float:
     It is 0 where the torque is equally strong all along (Wiener entropy, in time), and grows with bursts. Each flight's
     powers are over their geometric mean; 0 where nothing is known.
     """
-    powers = [p[p > 0.0] for flight in data.flights for p in (_powers(data.study, flight, YAW),)]
-    over = [p / np.exp(np.log(p).mean()) for p in powers if len(p) >= LEAST_PIECES]
+    powers = [_powers(data.study, flight, YAW) for flight in data.flights]
+    known = [p[p > 0.0] for p in powers if np.count_nonzero(p) >= LEAST_PIECES]
+    over = [p / np.exp(np.log(p).mean()) for p in known]
     return float(np.log(np.concatenate(over).mean())) if over else 0.0
 
 
@@ -77,12 +79,8 @@ def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, flo
     """
     values = residual(flight, study.vehicle, study.calibration)[:, column]
     counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS)) & np.isfinite(values)
-    if not counts.any():
-        return np.zeros(len(values)), counts
-    samples = np.arange(len(values))
-    out = np.interp(samples, samples[counts], values[counts])
     low, high = (2.0 * hertz * PERIOD_S for hertz in band_hz)
-    out = both_ways(highpass(low), out)
+    out = both_ways(highpass(low), interpolate_missing(np.where(counts, values, np.nan)))
     return (both_ways(lowpass(high), out) if high < 1.0 else out), counts
 
 

@@ -9,18 +9,18 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.passing.bursts import FORCE, in_band
 
 DOWNWARD = "downward"  #: of `Scatter.passing`, what nominal flights have of `downward`
-PUSHES_HZ = (1.0, 8.0)  #: band in which pushes are seen: a wake is passed in a tenth of a second or more; chosen
+PUSH_BAND_HZ = (1.0, 8.0)  #: band in which pushes are seen: a wake is passed in a tenth of a second or more; chosen
 
 
 def downward(data: Data) -> float:
-    """Skewness of the force along the thrust in PUSHES_HZ, with its sign changed.
+    """Skewness of the force along the thrust in PUSH_BAND_HZ, with its sign changed.
 
     Above 0 where the strongest pushes point down. What `in_band` leaves out does not count, nor does the mean of each
     flight; 0 where nothing is left.
     """
     deviations = []
     for flight in data.flights:
-        force, counts = in_band(data.study, flight, FORCE.column, PUSHES_HZ)
+        force, counts = in_band(data.study, flight, FORCE.column, PUSH_BAND_HZ)
         pushes = force[counts]
         deviations.append(pushes - pushes.mean() if len(pushes) else pushes)
     pushes = np.concatenate(deviations)

@@ -1,9 +1,8 @@
 """The gap's channels: what was measured minus what the model says, sample by sample.
 
-Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3),
-judged below 0.3 Hz. Command
-view: the controller's command (4), filtered to have the spectrum of nominal flights where
-the effects in the model are all that changed it.
+Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3), judged below 0.3 Hz. Command view:
+the controller's command (4), filtered to have the spectrum of nominal flights where the effects in the model are all
+that changed it.
 """
 
 from collections.abc import Sequence
@@ -82,7 +81,7 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     def of(some: Sequence[Active]) -> np.ndarray:
         """Residual of effects that always act; cached."""
         return cache.cached("residual", tuple(a.key for a in some),
-                          lambda: _ungated_residual(flight, vehicle, some, controller, seed), KEPT)
+                            lambda: _ungated_residual(flight, vehicle, some, controller, seed), KEPT)
 
     out = of(always).copy()
     for a in gated:

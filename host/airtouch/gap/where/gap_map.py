@@ -167,9 +167,8 @@ def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
 def visible(phase: int, baseline: bool, no_gyro: bool) -> np.ndarray:
     """Mask (bands, COUNT) of the cells that mean something in a phase, a place in KINDS.
 
-    Rates hold turns that were flown, so in the air they are only held against baseline
-    flights; without a gyro torque is known at low frequency only;
-    commands are judged in all bands but the lowest and the highest (0.6 to 30 Hz).
+    Rates hold turns that were flown, so in the air they are only held against baseline flights; without a gyro torque
+    is known at low frequency only; commands are judged in all bands but the lowest and the highest (0.6 to 30 Hz).
     """
     at_rest = phase == GROUND
     out = np.ones((len(MAP_BANDS_HZ), COUNT), bool)
