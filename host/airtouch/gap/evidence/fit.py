@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.gauss_newton import gauss_newton, start_of
+from airtouch.gap.evidence.gauss_newton import ITERATIONS, gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
 from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
@@ -25,6 +25,7 @@ from airtouch.simulation.effects import Active
 
 #: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
 TURNS, SETTLED = 6, 0.3
+BRIEF = 2  #: steps of a brief fit; chosen
 ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps; chosen: it says next to nothing
 CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
@@ -56,11 +57,12 @@ def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
 
 
 def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
-        prior: np.ndarray | float = PRIOR_UNITS) -> FittedTerms:
+        prior: np.ndarray | float = PRIOR_UNITS, brief: bool = False) -> FittedTerms:
     """Fit of effects to the blocks of `part`; the residual is judged elsewhere.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior: standard deviation of
-    these around neutral. Mean and random effects are fitted in turn until neither moves.
+    these around neutral. Mean and random effects are fitted in turn until neither moves; brief: once, mean ones by
+    BRIEF steps.
     """
     problem = problem_of(data, part)
     mean, random = mean_of(terms), random_of(terms)
@@ -69,8 +71,8 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     if random and mean and start is not None:
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
-    for _ in range(TURNS):
-        solution = gauss_newton(problem, mean, x, random_power, prior, bool(random))
+    for _ in range(1 if brief else TURNS):
+        solution = gauss_newton(problem, mean, x, random_power, prior, bool(random), BRIEF if brief else ITERATIONS)
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             break

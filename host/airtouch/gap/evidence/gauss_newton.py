@@ -68,8 +68,8 @@ class _Posterior:
 
 
 def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
-                 spread: np.ndarray | float, wide: bool) -> MeanFit:
-    """Mean effects of highest posterior, from scaled parameters x (k,) on.
+                 spread: np.ndarray | float, wide: bool, most: int = ITERATIONS) -> MeanFit:
+    """Mean effects of highest posterior, from scaled parameters x (k,) on, in so many steps at most.
 
     added (n,): power of random effects; spread: standard deviation of the parameters' prior; wide: `_Posterior`. The
     slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far from
@@ -82,7 +82,7 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
     posterior = _Posterior(problem, mean, added, spread, wide)
     now = posterior.at(x, offsets)
     slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
-    for _ in range(ITERATIONS):
+    for _ in range(most):
         slopes.take(now.x, stuck)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)

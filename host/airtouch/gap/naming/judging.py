@@ -75,10 +75,12 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float) -> Candidate:
+def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
+                    brief: bool = False) -> Candidate:
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
-    name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs. Its gain is
+    name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs; brief: the
+    fits are cut short, to see whether whole ones promise anything. Its gain is
     that of all effects over none, less what their parameters and the choice of their variants cost. Effects that are
     seen in the commands alone gain less beside the first random one; it is not charged with that
     (`_lost_to_uncertainty`).
@@ -90,7 +92,7 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
         gain, fits = chosen.gain, chosen.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
-        fits = tuple(_fit_on(trial, half, spectral, chosen) for half in (0, 1))
+        fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
         gain = clock_gains(trial.data, before)
         for train, test in ROUND_TRIP:
             gain += gain_of(trial, test, fits[train].terms) if spectral else 0.0
@@ -98,8 +100,8 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, choice_cost=paid, strength=strength,
-                     covariance=covariance, apart=apart, gained_while_certain=certain)
+    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, strength,
+                     covariance, apart)
 
 
 def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
@@ -113,10 +115,16 @@ def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None) -> FittedTerms:
-    """Effects fitted on a half, from where those that are chosen ended there."""
-    part = trial.parts[half]
-    return _refined(trial.data, part, fit(trial.data, part, terms, _start(chosen, terms, half)))
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None, brief: bool) -> FittedTerms:
+    """Effects fitted on a half, from where those that are chosen ended there.
+
+    It is made once: an effect of the clock beside those that are chosen changes nothing of it, nor does a second
+    search among fewer effects.
+    """
+    start, part = _start(chosen, terms, half), trial.parts[half]
+    key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
+    return trial.data.workspace.cached(
+        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
 
 
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:

@@ -5,6 +5,7 @@ A first look at every candidate costs little; the most promising are fitted in f
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -40,11 +41,23 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     waiting = [*looks.unseen, *random, *means_to_fit]
     if thorough:
         waiting = [v for v in waiting if not _is_tried_alone(v)]
-    fitted = map_on_two_cores(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
+    fitted = map_on_two_cores(lambda v: _fitted(on, v, chosen, thorough), waiting)
     best = best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
         best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, start.gain)
+
+
+def _fitted(on: Trial, variant: PricedVariant, chosen: Candidate | None, surely: bool) -> Candidate:
+    """A variant fitted on top of what is chosen; one of the loop alone in full only where a brief fit is promising.
+
+    surely: it is fitted in full whatever it promises. Each step of such a fit works out loops anew.
+    """
+    fit = partial(cross_validated, on, variant.name, variant.terms, chosen, variant.choice_cost)
+    if surely or not all(t.signature.loop_only for t in variant.terms):
+        return fit()
+    briefly, before = fit(brief=True), chosen.gain if chosen else 0.0
+    return fit() if briefly.gain - before > PROMISING * FIRST_GAIN else briefly
 
 
 def _best_variants(looked: Sequence[Candidate]) -> list[Candidate]:

@@ -1,7 +1,7 @@
 """A term of a hypothesis: one effect with its parameters, scaled so that 0 is neutral and 1 a natural step."""
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -44,6 +44,11 @@ class Term:
     def identity(self) -> tuple[str, float | None]:
         """Name of the effect, and of one of which several may act together which of them this is."""
         return self.name, self.values.get(self.signature.several_by)
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for terms that are equal."""
+        return (self.name, self.shows_in, self.free, *sorted(self.values.items()), self.companion, self.gate)
 
     def active(self, x: np.ndarray | None = None) -> Active:
         """The effect at scaled parameters x (k,), clipped to its bounds; None: at the values of the term."""
