@@ -14,10 +14,11 @@ from airtouch.detector.trace import Detection
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.vision import lines
 from airtouch.vision.camera import Camera
-from airtouch.vision.crossings import Film, Sight, detections, frames, sight
+from airtouch.vision.crossings import GROUP_S, Film, Sight, detections, frames, sight
 
-THRESHOLDS = 30  #: candidates for the threshold: quantiles of the strengths in the training frames
-TOGETHER_S = 0.6  #: s, largest time between crossings of camera and AirTouch at one edge
+#: candidates for the threshold: quantiles of the strengths in the training frames; no source: round number
+THRESHOLDS = 30
+TOGETHER_S = GROUP_S  #: s, largest time between crossings of camera and AirTouch at one edge
 ROUNDING = 1.0 / 12.0  #: variance of rounding to a sample, samples squared
 Sights = Sequence[Sequence[Sight]]  #: one sequence a film
 

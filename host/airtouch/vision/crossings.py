@@ -15,8 +15,8 @@ from airtouch.vision import scene as scenes
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.lines import Line
 
-MARGIN_S = 0.8  #: s of film before the first edge and after the last
-GROUP_S = 0.6  #: s, longest time between two frames of one edge
+MARGIN_S = 0.8  #: s of film before the first edge and after the last; no source: a little more than GROUP_S
+GROUP_S = 0.6  #: s, longest time between two frames of one edge; no source: round number, 0.18 m at 0.3 m/s
 
 
 @dataclass(frozen=True)

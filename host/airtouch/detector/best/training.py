@@ -16,9 +16,11 @@ from airtouch.detector.best.recipe import STRIDE, Recipe
 from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.logs.files import write_bytes
 
-PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
-KEEP_EVERY = 100  #: steps between two saved states
-RANK_EVERY = 20  #: steps between two rankings of the weights
+#: shares of the steps between which the zeros grow; no source: after the rise of the learning rate, and early enough
+#: that the last quarter mends what pruning costs
+PRUNE_FROM, PRUNE_TO = 0.3, 0.75
+KEEP_EVERY = 100  #: steps between two saved states; no source: round number, no effect on the weights
+RANK_EVERY = 20  #: steps between two rankings of the weights; no source: round number
 #: fields of a recipe that the compiled training step depends on; the others are of crops and pruning
 COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "peak_rate", "weight_decay", "event_weight")
 

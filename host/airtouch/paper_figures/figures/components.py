@@ -14,8 +14,9 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
 
+HALF = 0.5  #: fraction of the paper's gain from which a claim is reproduced; no source: half counts, less does not
 FEW = 10  #: flights of the small training set, on which the paper says that its loss helps most
-EPOCHS, QUICK_EPOCHS = 6, 3
+EPOCHS, QUICK_EPOCHS = 6, 3  #: epochs of every training here, and with --quick; no source: chosen for time
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,13 @@ def df_loss(job: Job) -> Figure:
     gains = {on: 1.0 - (rows[on]["mean_abs_error_m"] or np.nan) / (rows[off]["mean_abs_error_m"] or np.nan)
              for on, off in pairs}
     text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
-    helps = any(words.worse(rows[on], rows[off]) and gains[on] >= 0.5 * CLAIMS["df-loss"].values[2]
+    helps = any(words.worse(rows[on], rows[off]) and gains[on] >= HALF * CLAIMS["df-loss"].values[2]
                 for on, off in pairs)
     sooner = [1.0 - epochs[on] / epochs[off] for on, off in pairs]
     verdicts = {
         "df-loss": words.judged(helps, f"{text}; error less by "
                                 + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
-        "df-epochs": words.judged(max(sooner) >= 0.5 * CLAIMS["df-epochs"].values[2],
+        "df-epochs": words.judged(max(sooner) >= HALF * CLAIMS["df-epochs"].values[2],
                                   "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
     if job.quick:

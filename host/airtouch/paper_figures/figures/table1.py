@@ -9,6 +9,8 @@ from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.power import ina219, stages
 
+NEGLIGIBLE = 0.05  #: fraction of the propellers' power; no source: round number, the paper finds 0.014 negligible
+
 
 def power(job: Job) -> Figure:
     """The paper's Table 1 beside a measurement or an estimate."""
@@ -60,7 +62,7 @@ def estimated() -> Figure:
 
 def _negligible(mw: float, source: str) -> Verdict:
     share = mw / CLAIMS["negligible"].values[0]
-    return words.judged(share < 0.05, f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the "
+    return words.judged(share < NEGLIGIBLE, f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the "
                                       "paper's own 43 mW are 1.4 %. The propellers' power was not measured here")
 
 
