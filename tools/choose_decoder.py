@@ -131,10 +131,10 @@ def main() -> None:
         raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
     settings = candidates(options.count, np.random.default_rng(0), options.hold)
     results = [outcomes(flights, config) for config in track(settings, "settings")]
-    show("as shipped", flights, outcomes(flights, best.DECODER))
-    show("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
+    print_figures("as shipped", flights, outcomes(flights, best.DECODER))
+    print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
     winner = int(np.argmin([cost(flights, f) for f in results]))
-    show("one setting, best over all folds", flights, results[winner])
+    print_figures("one setting, best over all folds", flights, results[winner])
     print(json.dumps(asdict(settings[winner])))
     nested: list[FlightScore] = []
     for fold in {flight.fold for flight in flights}:
@@ -150,7 +150,7 @@ def main() -> None:
         show_scores.write_json(options.json, result, force=True)
 
 
-def show(title: str, flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
+def print_figures(title: str, flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
     """One line of figures."""
     lag = lag_of(outcomes_of)
     print(f"{title}: {_text(figures(flights, outcomes_of, lag))}, lag {lag:.2f} s")

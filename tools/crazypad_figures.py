@@ -105,7 +105,7 @@ FIGURES: dict[str, Callable[[list[dict]], float]] = {
     "severity, Spearman": severity}
 
 
-def show(table: list[dict]) -> None:
+def print_answers(table: list[dict]) -> None:
     """Print answers by family and by condition, and FIGURES with their intervals."""
     columns = (*FAMILIES, "unknown", "other")
     print(f"\n{'true family':14s} " + " ".join(f"{c:>13s}" for c in columns))

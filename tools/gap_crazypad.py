@@ -31,7 +31,7 @@ from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_corrections import show_corrections
-from crazypad_figures import balanced, exact_rotors, show
+from crazypad_figures import balanced, exact_rotors, print_answers
 from crazypad_labels import VEHICLE, family, manifest
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
@@ -122,10 +122,10 @@ def main() -> None:
         show_corrections(options.folder)
         return
     start = time.time()
-    show(cases(options.folder, options.json))
+    print_answers(cases(options.folder, options.json))
     if options.leave_one_out:
         print("\nPriors chosen without the condition judged:")
-        show(cross_validated(options.folder))
+        print_answers(cross_validated(options.folder))
     print(f"{time.time() - start:.0f} s")
 
 

@@ -41,7 +41,7 @@ from crazypad_labels import building, family, manifest
 from gap_authors import VEHICLE as AUTHORS_VEHICLE
 from gap_authors import questions
 from gap_peers import NAMES
-from gap_real_table import answer, show
+from gap_real_table import answer, print_table
 
 OTHERS = 5  #: most baseline flights of one; as tools/nominal_scatter.py, whose table the diagnosis uses
 PER_GROUP = 4  #: flights tested of a day and condition; no source: enough for a count, few enough for time
@@ -246,7 +246,7 @@ def main(arguments: list[str] | None = None) -> int:
     if args.partner:
         cases = with_partners(cases, args.flights)
     answers = diagnoses(cases, args.keep, args.jobs)
-    show(answers, args.flights)
+    print_table(answers, args.flights)
     wrong = [c["flight"] for c in answers if answer(c) != c["truth"]]
     if args.quick and len(wrong) > QUICK_WRONG:
         print(f"gap_real: {len(wrong)} of {len(answers)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",

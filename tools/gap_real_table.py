@@ -30,7 +30,7 @@ def answer(case: dict) -> str:
     return first["name"]
 
 
-def show(cases: list[dict], folder: Path) -> None:
+def print_table(cases: list[dict], folder: Path) -> None:
     """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
     table = defaultdict(lambda: defaultdict(int))
     for c in cases:

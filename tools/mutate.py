@@ -116,7 +116,7 @@ def table(codes: dict[str, int | None]) -> float:
     return share
 
 
-def show(place: Path, codes: dict[str, int | None]) -> None:
+def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
     """Print the mutants that no test noticed."""
     for mutant, code in codes.items():
         if code in SURVIVED + UNSEEN:
@@ -137,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:
-            show(BUILD / name, results(BUILD / name))
+            print_mutants(BUILD / name, results(BUILD / name))
             continue
         place = staged(name, args.force)
         if args.sample:

@@ -55,7 +55,7 @@ def later(log: FlightLog, begin: int) -> FlightLog:
     return FlightLog({name: values[begin:] for name, values in log.columns.items()}, log.meta)
 
 
-def show(what: str, seconds: float, result: Replay) -> None:
+def print_replay(what: str, seconds: float, result: Replay) -> None:
     """A line of the table, and what differed."""
     task, words = result.least_left
     print(f"{what}: {result.steps} steps, {result.different} differ, prob within {result.prob_off:.1g}; edges "
@@ -170,7 +170,7 @@ def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
         result = replay(elf, log, steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
-        show(name, time.monotonic() - start_s, result)
+        print_replay(name, time.monotonic() - start_s, result)
         different += result.different
     return different
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, printable
-from airtouch.logs.checks.readings import checked
+from airtouch.logs.checks.readings import without_impossible_values
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
 from airtouch.logs.table import Sheet, names_of, sheet
@@ -29,21 +29,21 @@ def read(path: str | Path) -> FlightLog:
         from airtouch.logs.formats import rosbag
 
         if rosbag.is_bag(path):
-            return checked(rosbag.read(path))
+            return without_impossible_values(rosbag.read(path))
     return parse(_bytes(path), str(path))
 
 
 def parse(data: bytes, source: str) -> FlightLog:
     """The flight log in a file's bytes. `source` is its name in messages.
 
-    Impossible values and times become NaN, with a warning (`readings.checked`).
+    Impossible values and times become NaN, with a warning (`readings.without_impossible_values`).
     """
     notes: list[str] = []
     data = unzipped(data, source, notes)
-    with np.errstate(invalid="ignore", over="ignore"):  # `checked` handles the infinities
+    with np.errstate(invalid="ignore", over="ignore"):  # `without_impossible_values` handles the infinities
         log = _by_content(data, source)
     log.meta["warnings"] = notes + log.meta["warnings"]
-    return checked(log)
+    return without_impossible_values(log)
 
 
 def load_bytes(path: str | Path) -> bytes:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
+from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
 LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN
@@ -28,7 +28,7 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
         raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; "
                             f"give {1 / SLOWEST_S:g} to {1 / FASTEST_S:g} Hz")
     time_s, gaps = regular_time(log) if len(log) else (np.empty(0), [])
-    order = rising(time_s)
+    order = rising_subsequence(time_s)
     time_s = time_s[order]
     period = true_period(time_s)
     if period is None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError, printable
-from airtouch.logs.checks.channel_faults import duplicates, saturated, spikes, stuck
+from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, spikes, stuck_intervals
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
@@ -75,8 +75,8 @@ def check(log: FlightLog) -> Quality:
         "clock_backwards": int((steps < 0).sum()),
         "missing": {name: count for name, count in missing.items() if count},
         "duplicated": duplicates(log),
-        "stuck": stuck(log, flying),
-        "saturated": saturated(log),
+        "stuck": stuck_intervals(log, flying),
+        "saturated": saturation_counts(log),
         "spikes": spikes(log),
     }
     warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, faults, phases, period)
