@@ -24,7 +24,7 @@ def outcomes(folder, **environment):
     """{passed, failed, skipped, error: count} of the files above, in a project with the guard; and what was printed."""
     tests = folder / "project" / "tests"
     tests.mkdir(parents=True)
-    shutil.copy(Path(__file__).parent / "skips.py", tests)
+    shutil.copy(Path(__file__).parent / "support/skips.py", tests)
     (tests / "conftest.py").write_text(
         "from skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401\n")
     for name, text in FILES.items():
