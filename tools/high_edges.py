@@ -136,7 +136,7 @@ def main() -> None:
     if models:
         print_logits(head("over logit; muted", ["whole", *CHANNELS]), groups, models, muted)
         print_logits(head("over logit; replaced", REPLACED), hovers, models, approach)
-    print(head("standard deviation, usual swings", CHANNELS))
+    print(head("standard deviation, nominal amplitudes", CHANNELS))
     for name, group in hovers.items():
         pairs = [calm(log, path) for log, path in group]
         for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):

@@ -71,7 +71,7 @@ def silent_in_all(flights: Sequence[FlightLog]) -> tuple[int, ...]:
 
 
 def silenced(motion: MotionConfig, absent: tuple[str, ...]) -> MotionConfig:
-    """The same settings with the channels of missing sensors held at 0: no bounds to their nominal swing."""
+    """The same settings with the channels of missing sensors held at 0: no bounds to their nominal amplitude."""
     silent = {channel for sensor in absent for channel in CHANNELS_OF[sensor]}
     return replace(motion, scale=tuple(np.inf if i in silent else s for i, s in enumerate(motion.scale)))
 
