@@ -70,7 +70,7 @@ def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
                        sum(s.airborne_s for s in scores), (a, b, c, d), np.sum([s.bins for s in scores], axis=0))
 
 
-def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
+def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
     """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
     for file in held:
         if training_set.contains(model.metadata, readable[file.path]):
@@ -119,11 +119,12 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
     sample = draw_flights(pool, count, draw)
+    trainer = adapt.Trainer(start if options.beside else None, beside, seed, COMMAND) if beside else None
 
     def labelled() -> BestModel:
         """A detector of the sample, of the flights beside it, and of the model to start from."""
-        if start is not None and beside:
-            return adapt.together(start if options.beside else None, start, sample, beside, seed, None, COMMAND)
+        if start is not None and trainer:
+            return trainer.fit_all(start, sample)
         return best.fit([f.log for f in sample], seed=seed, start=start, steps=options.steps, command=COMMAND)
 
     if row == "start":
@@ -135,12 +136,11 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     else:
         file = f"labelled_{count}_draw{draw}_seed{seed}_{digest(settings[1:])}.npz"
         model = cache.model(options.out / file, labelled)
-    if row == "unlabelled" and beside:
+    if row == "unlabelled" and trainer:
         names = {f.log.source for f in sample}
         unlabelled = [adapt.without_range(f) for f in pool if f.log.source not in names]
-        model = adapt.self_trained(start if options.beside else None, model, sample, unlabelled, beside, seed, None,
-                                   COMMAND)
-    scores = scored(model, held, readable)
+        model = trainer.self_train(model, sample, unlabelled)
+    scores = held_out_scores(model, held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
 

@@ -82,13 +82,13 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
                         lambda folder, pool: adapt.SimulatedFlights([made_flight(20)], [None]))
     taught, begun = [], []
 
-    def self_trained(start, teacher, labelled, unlabelled, *rest):
+    def self_train(trainer, teacher, labelled, unlabelled, progress=None):
         taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in unlabelled]))
-        begun.append(start)
+        begun.append(trainer.start)
         assert all(not f.labelled for f in unlabelled)
         return teacher
 
-    monkeypatch.setattr(adapt, "self_trained", self_trained)
+    monkeypatch.setattr(adapt.Trainer, "self_train", self_train)
     trained = []
     monkeypatch.setattr(best, "fit", lambda flights, *_, **__: trained.append(len(flights)) or start)
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
