@@ -104,7 +104,7 @@ def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
     return out
 
 
-def _later(path: str, seconds: float) -> FlightLog:
+def _delay_clock(path: str, seconds: float) -> FlightLog:
     """A log whose clock begins later by so many seconds."""
     log = read(path)
     return FlightLog({**log.columns, "t_s": log["t_s"] + seconds}, log.meta)
@@ -180,7 +180,7 @@ ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "p
 DEFAULT_ROWS = [row for row in ROWS if row != "nominal"]  #: without the one that takes 25 min
 
 
-def answered(case: Case) -> dict:
+def diagnose_case(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
     out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
@@ -188,7 +188,7 @@ def answered(case: Case) -> dict:
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
                              before=_LAST.get((case.vehicle, case.baseline)),
-                             partner=[_later(*p) for p in case.partner])
+                             partner=[_delay_clock(*p) for p in case.partner])
     except AirTouchError as error:
         return {**out, "verdict": "refused", "why": str(error)}
     _LAST.clear()
@@ -215,7 +215,7 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in answer_of),
                   key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
-        for i, case in enumerate(pool.map(answered, todo)):
+        for i, case in enumerate(pool.map(diagnose_case, todo)):
             answer_of[case["row"], case["flight"]] = case
             if store:
                 with store.open("a") as out:

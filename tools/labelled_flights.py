@@ -54,7 +54,7 @@ def draw_flights(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[ad
     return [pool[i] for i in np.random.default_rng(draw).permutation(len(pool))[:count]]
 
 
-def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
+def merge(scores: Iterable[FlightScore]) -> list[FlightScore]:
     """One score a flight, with the edges, false detections and minutes of all its draws."""
     flights: dict[str, list[FlightScore]] = {}
     for score in scores:
@@ -79,7 +79,7 @@ def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
-def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
+def twin_flights(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
     """Edges of the twin in this folder, laid over the free air of these flights."""
     craft = vehicle.load(str(folder / files.VEHICLE))
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
@@ -169,7 +169,7 @@ def false_by_place(scores: Sequence[FlightScore]) -> str:
 
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
-    figures: dict[str, Any] = summarise(merged(scores))
+    figures: dict[str, Any] = summarise(merge(scores))
 
     def text(name: str, scale: float, digits: int) -> str:
         """A figure times `scale` with its interval."""
@@ -242,7 +242,7 @@ def main() -> None:
     starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
     twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))
     pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in groups}
-    beside = {g: simulated(twins[g], pools[g]) for g in twins}
+    beside = {g: twin_flights(twins[g], pools[g]) for g in twins}
     if options.beside:
         beside = dict.fromkeys(groups, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
 

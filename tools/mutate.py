@@ -61,7 +61,7 @@ pytest_add_cli_args_test_selection = {tests}
 """
 
 
-def staged(name: str, force: bool) -> Path:
+def stage(name: str, force: bool) -> Path:
     """The copy of the project in which a group is mutated; the one that is there, unless `force`."""
     place, group = BUILD / name, GROUPS[name]
     if force and place.exists():
@@ -139,7 +139,7 @@ def main(arguments: list[str] | None = None) -> int:
         if args.show:
             print_mutants(BUILD / name, results(BUILD / name))
             continue
-        place = staged(name, args.force)
+        place = stage(name, args.force)
         if args.sample:
             if not results(place):
                 run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants and runs none

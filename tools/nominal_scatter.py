@@ -114,7 +114,7 @@ def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
         yield name, look(Data(study, [flight]))
 
 
-def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
+def _compare(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
     """A group's flights held against each other, or against those of other groups of the same drone; JSON-ready."""
     i, others = task
     *_, vehicle, files = _GROUPS[i]
@@ -210,7 +210,7 @@ def main() -> None:
             and (not others or len(_rest(all_groups, i)) > 1)]
     _GROUPS[:] = all_groups  # which the processes inherit: logs and ways to them need not travel
     with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
-        for i, others, rows in pool.map(_compared, todo):
+        for i, others, rows in pool.map(_compare, todo):
             row_of |= {row["file"]: row for row in rows}
             if args.keep:
                 with args.keep.open("a") as out:

@@ -170,7 +170,7 @@ def trainings(monkeypatch):
 
     def fit(flights, seed, **options):
         calls.append({**options, "flights": flights})
-        return best.timed(trained(len(calls)), options["lag_of"])
+        return best.with_lag(trained(len(calls)), options["lag_of"])
 
     def labels(flights, model):
         if flights:
@@ -238,10 +238,10 @@ def test_the_lag_is_that_of_recorded_flights(sweeps, trainings):
     log = sweeps[0][1]
     edges = logs.true_edges(log)
     early = [replace(e, sample=e.sample - 10) for e in edges]
-    assert best.timed(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
-    assert best.timed(trained(0), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
-    assert best.timed(trained(0, 0.7), ([log], [[]])).metadata["lag_s"] == 0.7
-    assert best.timed(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
+    assert best.with_lag(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
+    assert best.with_lag(trained(0), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
+    assert best.with_lag(trained(0, 0.7), ([log], [[]])).metadata["lag_s"] == 0.7
+    assert best.with_lag(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
 
 
 def score(error_m):

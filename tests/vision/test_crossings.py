@@ -20,10 +20,10 @@ def test_a_straight_edge_is_found_where_it_crosses_the_middle_row(column, tilt_d
     rows, columns = np.mgrid[0:244, 0:324]
     image = np.where(columns > column + np.tan(np.radians(tilt_deg)) * (rows - 121.5), 200, 60).astype(np.uint8)
     image = np.clip(image + np.random.default_rng(4).normal(0, 20, image.shape), 0, 255).astype(np.uint8)
-    line = lines.strongest(lines.classical(lines.binned(image)), CAMERA)
+    line = lines.strongest(lines.classical(lines.shrink(image)), CAMERA)
     assert line.column == pytest.approx(column + 0.5, abs=1.0)
     empty = np.full((244, 324), 120) + np.random.default_rng(5).normal(0, 20, (244, 324))
-    assert lines.strongest(lines.classical(lines.binned(empty)), CAMERA).strength < 0.3 * line.strength
+    assert lines.strongest(lines.classical(lines.shrink(empty)), CAMERA).strength < 0.3 * line.strength
 
 
 def level_flight(speed=0.3, clearance=0.04):

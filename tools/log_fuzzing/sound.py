@@ -133,10 +133,10 @@ def usd(flight: Motion, version: int) -> bytes:
         if i % 5 == 0:
             records.append((9, tick, [1.5]))
     events = [(7, "fixedFrequency", list(zip(table, kinds, strict=True))), (9, "estTDOA", [("distance", "f")])]
-    return packed(version, events, records)
+    return pack_log(version, events, records)
 
 
-def packed(version: int, events: list, records: list) -> bytes:
+def pack_log(version: int, events: list, records: list) -> bytes:
     """The bytes of a uSD log: events (id, name, [(variable, type)]), records (id, time, values), CRC-32."""
     out = [b"\xbc", struct.pack("<HH", version, len(events))]
     for number, name, variables in events:

@@ -3,7 +3,7 @@
 import struct
 from random import Random
 
-from log_fuzzing.mutations import any_bytes, cut, zipped
+from log_fuzzing.mutations import any_bytes, cut, zip_again
 from log_fuzzing.sound import packed_old
 from log_fuzzing.usd_mutations import NAMES, PAYLOADS, SIZES, TIMES
 
@@ -97,4 +97,4 @@ def usd_old(data: bytes, r: Random) -> bytes:
 
     data = packed_old(log.variables, log.rows, r.choice((1, 7, 255)), other)
     data = cut(data, r) if r.random() < 0.1 else data
-    return zipped(data, r) if r.random() < 0.02 else data
+    return zip_again(data, r) if r.random() < 0.02 else data

@@ -39,7 +39,7 @@ def parse(data: bytes, source: str) -> FlightLog:
     Impossible values and times become NaN, with a warning (`readings.without_impossible_values`).
     """
     notes: list[str] = []
-    data = unzipped(data, source, notes)
+    data = unzip(data, source, notes)
     with np.errstate(invalid="ignore", over="ignore"):  # `without_impossible_values` handles the infinities
         log = _by_content(data, source)
     log.meta["warnings"] = notes + log.meta["warnings"]
@@ -48,7 +48,7 @@ def parse(data: bytes, source: str) -> FlightLog:
 
 def load_bytes(path: str | Path) -> bytes:
     """A file's bytes, unpacked if it is gzipped. Raises AirTouchError as `read` does."""
-    return unzipped(_bytes(path), str(path), [])
+    return unzip(_bytes(path), str(path), [])
 
 
 def load_text(path: str | Path) -> bytes:
@@ -200,7 +200,7 @@ def _numeric(cell: str) -> bool:
     return True
 
 
-def unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
+def unzip(data: bytes, source: str, notes: list[str]) -> bytes:
     """The data, unpacked if it is gzipped. Of a truncated file it is what can be unpacked, with a warning in `notes`.
 
     Raises AirTouchError for damaged data and for more than 1 GiB unpacked.

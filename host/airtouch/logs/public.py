@@ -105,11 +105,11 @@ def _write_manifest(path: Path, present: set[str]) -> None:
     rows = [row for row in registry() if row["file"] in present]
     columns = [name for name in registry()[0] if name != "sha256"]
     lines = [",".join(columns)]
-    lines += [",".join(_quoted(row[name]) for name in columns) for row in rows]
+    lines += [",".join(_quote(row[name]) for name in columns) for row in rows]
     _replace(path, ("\n".join(lines) + "\n").encode())
 
 
-def _quoted(cell: str) -> str:
+def _quote(cell: str) -> str:
     return f'"{cell}"' if "," in cell else cell
 
 

@@ -101,7 +101,7 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
         if hold:
             new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
         else:
-            t, v = _smoothed(t, v, period, *low_pass) if low_pass else (t, v)
+            t, v = _smooth(t, v, period, *low_pass) if low_pass else (t, v)
             for row, one in zip(new, v, strict=True):
                 row[first:last] = np.interp(at, t, one)
     return new
@@ -114,8 +114,8 @@ def _low_pass(period: float, rate_hz: float) -> tuple[np.ndarray, int]:
     return butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos"), int(3.0 / (CUTOFF * rate_hz * period)) + 1
 
 
-def _smoothed(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
-              padding: int) -> tuple[np.ndarray, np.ndarray]:
+def _smooth(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
+            padding: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (m,) of an even grid at the old rate, and channels (k, m) low-passed on it.
 
     Intervals that are too short for the filter stay unfiltered.

@@ -160,7 +160,7 @@ def canonical(name: str, known: Sequence[str]) -> str:
     return plain.get(re.sub(r"[^a-z0-9]", "", name.lower()), name)
 
 
-def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
+def added_power(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
     """Stage -> (mW added to the stage before it, half width of the 95 % interval). The first stage counts in full."""
     result, before = {}, None
     for name, power in stages.items():

@@ -138,7 +138,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
 
 def absent_sensors(flights: Sequence[Flight]) -> tuple[str, ...]:
     """The sensors that all of the flights lack."""
-    return tuple(s for s in sensors.SENSORS if all(s in sensors.missing(f.log) for f in flights))
+    return tuple(s for s in sensors.SENSORS if all(s in sensors.missing_sensors(f.log) for f in flights))
 
 
 def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,

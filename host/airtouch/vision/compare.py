@@ -44,7 +44,7 @@ def sights_of_films(films: Sequence[Film], lux: float, mappers: Mapping[str, lin
     for number, shot in enumerate(films, start=1):
         of_film: dict[str, list[Sight]] = {name: [] for name in mappers}
         for time_s, image in frames(camera, shot, lux, seed):
-            small = lines.binned(image)
+            small = lines.shrink(image)
             for name, mapper in mappers.items():
                 of_film[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
         for name, of_mapper in of_film.items():

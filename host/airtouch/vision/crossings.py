@@ -66,7 +66,7 @@ def frames(camera: Camera, shot: Film, lux: float, seed: int) -> Iterator[tuple[
     shares = scenes.subposes(camera, shot.speed_mps, seconds, shot.clearance_m)
     for time_s in np.arange(shot.first_s + rng.uniform(0.0, 1.0 / camera.frame_hz), shot.last_s, 1.0 / camera.frame_hz):
         inside = [pose(shot.log, time_s + share * seconds) for share in shares]
-        yield float(time_s), expose(camera, scenes.blurred(camera, inside, shot.scene), lux, seconds, rng)
+        yield float(time_s), expose(camera, scenes.blur(camera, inside, shot.scene), lux, seconds, rng)
 
 
 def pose(log: FlightLog, time_s: float) -> scenes.Pose:

@@ -42,7 +42,7 @@ def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.
     """
     logged = sensors.signals(log)
     return kernels.motion_channels(logged.acc, logged.gyro, logged.pwm,
-                                   sensors.silenced(motion or MotionConfig(), logged.missing))
+                                   sensors.silence(motion or MotionConfig(), logged.missing))
 
 
 def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None = None) -> Flight:
@@ -53,7 +53,7 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
     x, airborne = channels_of(log, recipe.motion)
     edges = logs.true_edges(log) if edges is None else edges
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
-    silent = {channel for sensor in sensors.missing(log) for channel in sensors.CHANNELS_OF[sensor]}
+    silent = {channel for sensor in sensors.missing_sensors(log) for channel in sensors.CHANNELS_OF[sensor]}
     return Flight(x, goals(over_platform(edges, len(log)), edges, recipe),
                   np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
                   tuple(sorted(silent)))

@@ -46,15 +46,15 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
     model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
         start[name].reshape(value.shape) for name, value in zip(names, drawn, strict=True)])
     for name, variable, mask in zip(names, model.trainable_variables, masks, strict=True):
-        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
+        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned_names(recipe)))
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
     state = [*model.trainable_variables, *optimizer.variables, *masks]
-    first = _resumed(resume, state, rng) if resume else 0
+    first = _resume(resume, state, rng) if resume else 0
     for step in range(first, recipe.steps):
         losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
         if start is None and (step % RANK_EVERY == 0 or step == last_rank):
-            _rank(model, masks, recipe, step / recipe.steps)
+            _prune(model, masks, recipe, step / recipe.steps)
         if resume and (step + 1) % KEEP_EVERY == 0:
             _save_state(resume, state, rng, step + 1)
         if (step + 1) % 50 == 0:
@@ -119,7 +119,7 @@ def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int
     write_bytes(buffer.getvalue(), path, force=True)
 
 
-def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
+def _resume(path: Path, state: Sequence, rng: np.random.Generator) -> int:
     """Set variables and random numbers to the saved state; the next step, 0 without a saved state."""
     if not path.is_file():
         return 0
@@ -130,13 +130,13 @@ def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
         return int(saved["step"])
 
 
-def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
+def _prune(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
     """Set the masks of the inner layers to the sparsity that the schedule wants now."""
     part = np.clip((position - PRUNE_FROM) / (PRUNE_TO - PRUNE_FROM), 0.0, 1.0)
     sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
     if sparsity == 0.0 or position >= PRUNE_TO + 1.0 / recipe.steps:
         return
-    pruned = _pruned(recipe)
+    pruned = _pruned_names(recipe)
     for name, variable, mask in zip(weight_names(recipe.graph), model.trainable_variables, masks, strict=True):
         if name in pruned:
             values = variable.numpy()
@@ -144,7 +144,7 @@ def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa:
             mask.assign(keep_mask(flat, sparsity).reshape(values.shape))
 
 
-def _pruned(recipe: Recipe) -> list[str]:
+def _pruned_names(recipe: Recipe) -> list[str]:
     """The names of the weights of which pruning sets blocks to zero."""
     return [f"{layer.name}.kernel" for layer in recipe.graph if layer.pruned]
 

@@ -68,7 +68,7 @@ def _camera(job: Job, films: list[Any], training_count: int, lux: float, name: s
         stored = json.loads(path.read_text())
     except (OSError, ValueError):
         sizes = weights.SIZES if lux == SIZE_LUX else ("teed",)
-        mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in sizes}}
+        mappers = {"classical": lines.classical, **{n: lines.learned_mapper(weights.load(n)[0]) for n in sizes}}
         stored = {}
         for method, sights in compare.sights_of_films(films, lux, mappers, SEED, job.tell).items():
             least = compare.threshold(films[:training_count], sights[:training_count])

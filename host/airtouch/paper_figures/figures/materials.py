@@ -46,7 +46,7 @@ def _pair_scores(quick: bool, tell: Callable[[str], None]) -> dict[tuple[str, st
 
 
 def _flights(scene: str, count: int, seed: int) -> list[FlightLog]:
-    return [simulated.labelled(log) for log in simulated.flights(scene, count, seed=seed)]
+    return [simulated.with_truth(log) for log in simulated.flights(scene, count, seed=seed)]
 
 
 def overall(job: Job) -> Figure:

@@ -74,7 +74,7 @@ def _flops(n: _Counts) -> Verdict:
     theirs, said = CLAIMS["flops"].values
     vision = n.vision_multiplications
     side = np.sqrt(theirs / FLOPS_A_MAC / (vision / np.prod(PAPER_CAMERA)))
-    return words.judged(
+    return words.verdict(
         _near(n.dense_multiplications, said) and _near(FLOPS_A_MAC * vision, theirs),
         f"paper's network {n.dense_multiplications / 1e6:.2f} million multiply-accumulates without zeros (the paper's "
         f"0.28 counts these), {n.multiplications / 1e6:.2f} as shipped; TEED at 320 x 320 "
@@ -85,18 +85,18 @@ def _flops(n: _Counts) -> Verdict:
 
 def _parameters(n: _Counts) -> Verdict:
     theirs, said = CLAIMS["parameters"].values
-    return words.judged(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
-                        f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
-                        f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float")
+    return words.verdict(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
+                         f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
+                         f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float")
 
 
 def _memory() -> Verdict:
     camera, ring_bits = Camera(), 32 * 9 * DEFAULT.band_window
     frame_bits = 8 * camera.width * camera.height
-    return words.judged(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
-                        f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band power; "
-                        f"a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less than a "
-                        "million, not millions")
+    return words.verdict(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
+                         f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band "
+                         f"power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less "
+                         "than a million, not millions")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:

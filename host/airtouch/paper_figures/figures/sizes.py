@@ -34,9 +34,9 @@ def sizes(job: Job) -> Figure:
     before, after = CLAIMS["size"].values
     ours = rows[1]["bytes"]
     verdicts = {
-        "size": words.judged(abs(FLOAT_BYTES * weights - before) < 0.1 * before and ours <= after,
-                             f"{FLOAT_BYTES * weights:,} bytes in float ({weights:,} weights and biases), {ours:,} "
-                             f"bytes shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
+        "size": words.verdict(abs(FLOAT_BYTES * weights - before) < 0.1 * before and ours <= after,
+                              f"{FLOAT_BYTES * weights:,} bytes in float ({weights:,} weights and biases), {ours:,} "
+                              f"bytes shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
         "speed": Verdict(UNTESTABLE, f"no GAP8 here; on this machine float {times['float']:.3f} ms and int8 "
                          f"{times['int8']:.3f} ms a window ({times['float'] / times['int8']:.1f} times), plain C, one "
                          "thread"),

@@ -45,25 +45,25 @@ def _summaries(found: Crossings) -> Summaries:
 
 def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dict[str, Verdict]:
     def text(value: float) -> str:
-        return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.missed(rows[n, value])}"
+        return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.misses(rows[n, value])}"
                          for n in ("teed", "classical") if (n, value) in rows)
 
     claimed_m = CLAIMS["light-airtouch"].values[0]
     bright, bright_m = CLAIMS["light-bright"].values
     dark = [v for v in CLAIMS["light-dark"].values if ("teed", v) in rows]
-    flights = "; ".join(f"{n} {words.metres(r)}, {words.missed(r)}" for n, r in ours.items())
+    flights = "; ".join(f"{n} {words.metres(r)}, {words.misses(r)}" for n, r in ours.items())
     best = words.metres(ours["best"])
     return {
-        "light-airtouch": words.judged(
+        "light-airtouch": words.verdict(
             words.reaches(ours["paper"], claimed_m),
             f"light plays no part in its signals; simulated, shipped networks: {flights}"
             + (f"; best reaches {claimed_m:g} m" if words.reaches(ours["best"], claimed_m) else "")),
-        "light-bright": words.judged(
+        "light-bright": words.verdict(
             words.worse(rows["teed", bright], ours["best"]) and words.reaches(rows["teed", bright], bright_m),
             f"{text(bright)}; best {best}"),
-        "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
-                                   "; ".join(text(v) for v in dark) + f"; best {best}. "
-                                   + _crossing(rows, ours["best"], lux))}
+        "light-dark": words.verdict(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
+                                    "; ".join(text(v) for v in dark) + f"; best {best}. "
+                                    + _crossing(rows, ours["best"], lux))}
 
 
 def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float]) -> None:
@@ -80,7 +80,7 @@ def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float
         axes.set(ylim=(0, None))
     left.plot(*CLAIMS["light-bright"].values, "k*", ms=8, label="paper: TEED")
     left.plot([20, 50, 100], [CLAIMS["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
-    _labelled(canvas, left, right)
+    _label_axes(canvas, left, right)
 
 
 def network_size(job: Job) -> Figure:
@@ -91,13 +91,13 @@ def network_size(job: Job) -> Figure:
     table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
              for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
-    text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
+    text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.misses(r)}"
                      for n, r in rows.items())
     ours = _summaries(found)
     by_bytes, airtouch = _airtouch_sizes(job)
     table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
               for size, r in by_bytes.items()]
-    verdicts = {"network-vision": words.judged(words.worse(full, least), f"at 100 lux {text}"),
+    verdicts = {"network-vision": words.verdict(words.worse(full, least), f"at 100 lux {text}"),
                 "network-airtouch": airtouch}
 
     def draw(canvas):
@@ -112,7 +112,7 @@ def network_size(job: Job) -> Figure:
             axes.axvline(CLAIMS["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
             pictures.logarithmic(axes, sizes, "parameters (of best: bytes)")
             axes.set(ylim=(0, None))
-        _labelled(canvas, left, right)
+        _label_axes(canvas, left, right)
 
     caption = (f"Simulated: the {len(found.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
                f"and 8; each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
@@ -130,9 +130,9 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
             rows[folds[0]["parameters"]["parameter_bytes"]] = summary.summarise(scores)
     except Missing as missing:
         return {}, Verdict(UNTESTABLE, str(missing))
-    text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
+    text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())
     small, large = rows.values()
-    return rows, words.judged(not words.worse(large, small), f"best on recorded flights: {text}")
+    return rows, words.verdict(not words.worse(large, small), f"best on recorded flights: {text}")
 
 
 def fusion(job: Job) -> Figure:
@@ -152,7 +152,7 @@ def fusion(job: Job) -> Figure:
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
     never_worse, outcome = _outcome([r for r in table if r["detector"] == "both"])
-    verdict = words.judged(never_worse, f"timed F1, {sum(len(f.edges) for f in found.films)} edges: {text}; {outcome}")
+    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in found.films)} edges: {text}; {outcome}")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -210,7 +210,7 @@ def _airtouch(axes: Any, ours: Summaries, key: str, factor: float) -> None:
             axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
 
 
-def _labelled(canvas: Any, left: Any, right: Any) -> None:
+def _label_axes(canvas: Any, left: Any, right: Any) -> None:
     """Label the axes of errors and of misses, and draw one legend below them."""
     left.set_ylabel("mean error of edges found, m")
     right.set_ylabel("missed edges, %")

@@ -132,7 +132,7 @@ def _round(state: State, target: Target, vehicle: Vehicle, levers: Sequence[Leve
     start_s = time.process_time()
     rng = np.random.default_rng([seed, number, 13])
     steps = np.array([lever.step for lever in levers])
-    values = lever_set.clipped(levers, state.values + steps * rng.standard_normal((flights, len(levers))))
+    values = lever_set.clip(levers, state.values + steps * rng.standard_normal((flights, len(levers))))
     passes = flights // len(target.courses) + 1
     chosen = np.concatenate([rng.permutation(len(target.courses)) for _ in range(passes)])[:flights]
     simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers, values, seed,
@@ -152,7 +152,7 @@ def _round(state: State, target: Target, vehicle: Vehicle, levers: Sequence[Leve
     step *= 1.0 if number < rounds - LAST_ROUNDS else LAST_FACTOR
     state.history.append({"values": state.values.tolist(), "misfit": before, "lost": diverged,
                           "cpu_s": round(time.process_time() - start_s, 1)})
-    state.values = lever_set.clipped(levers, state.values + steps * step)
+    state.values = lever_set.clip(levers, state.values + steps * step)
 
 
 def regression(samples: np.ndarray, differences: np.ndarray, centre: np.ndarray, steps: np.ndarray,
