@@ -130,6 +130,7 @@ def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
+    """The log in a file's bytes; the first of them tell the format."""
     if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
     if data[:4] == b"PAR1":
@@ -172,6 +173,7 @@ def _bytes(path: str | Path) -> bytes:
 
 
 def _by_header(text: Sheet, source: str) -> FlightLog:
+    """The log in a CSV; the header line tells the format. Raises AirTouchError for an unknown one."""
     if not text.first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
     names = names_of(text.first)

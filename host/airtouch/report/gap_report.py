@@ -71,6 +71,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
 
 def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], pictures: Pictures | None,
           **context: Any) -> str:
+    """The HTML of a page: what diagnosis and measurement share, and `context`; what it lacks is left out."""
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "gap.html").read_text("utf-8"))
     absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],
