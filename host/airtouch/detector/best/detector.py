@@ -133,18 +133,13 @@ def fit(
     labels = list(pseudo_labels) if pseudo_labels is not None else [None] * len(flights)
     if len(labels) != len(flights):
         raise AirTouchError(f"training: {len(labels)} pseudo-labels for {len(flights)} flights; give one a flight")
-    if recipe is None:
-        recipe = replace(start.recipe, **FINE_TUNING) if start else Recipe()
-    recipe = _with_changes(recipe, changes)
+    recipe = _recipe(recipe, changes, start)
     use_tensorflow(seed)
     if most_flights is not None and most_flights < len(flights):
         drawn = sorted(np.random.default_rng(seed).permutation(len(flights))[:most_flights])
         flights, labels = [flights[i] for i in drawn], [labels[i] for i in drawn]
         emphasis = emphasis if emphasis is None else [emphasis[i] for i in drawn]
     recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
-    if start is not None and start.recipe.graph != recipe.graph:
-        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
-                            "alone")
     examples = _examples(flights, labels, emphasis, recipe, report)
     weights = training.fit(examples, recipe, seed, lambda done, total, note: report("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
@@ -217,11 +212,21 @@ def _decoders(decoder: DecoderConfig | None, start: BestModel | None) -> dict[st
     return {"decoder": asdict(DECODER), "decoder_without": {name: asdict(c) for name, c in DECODER_WITHOUT.items()}}
 
 
-def _with_changes(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
+def _recipe(recipe: Recipe | None, changes: dict[str, Any], start: BestModel | None) -> Recipe:
+    """The recipe to train by: the given one, else that of FINE_TUNING of `start`, else the default; with the changes.
+
+    Raises AirTouchError for an unknown field, and for another shape than that of `start`.
+    """
+    if recipe is None:
+        recipe = replace(start.recipe, **FINE_TUNING) if start else Recipe()
     try:
-        return replace(recipe, **changes)
+        recipe = replace(recipe, **changes)
     except TypeError as error:
         raise AirTouchError(f"training: {str(error).split(') ')[-1]}; known: {', '.join(asdict(recipe))}") from None
+    if start is not None and start.recipe.graph != recipe.graph:
+        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
+                            "alone")
+    return recipe
 
 
 def load(path: Path | None) -> BestModel:

@@ -16,7 +16,9 @@ STRIDE = 2  #: samples between two rows that are computed: 50 Hz
 class Recipe:
     """The settings of a trained network: with the flights and the seed they give its bits.
 
-    Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch.
+    Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch. Width, steps, delay
+    and the choice of crops come from 13 trainings over the five folds, the missing sensors and free air from two more
+    (host/docs/looks.md, 2026-11-21 and 22); the other numbers have no source.
     """
 
     # Shape

@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
     rng, names = np.random.default_rng(seed), weight_names(recipe.graph)
     drawn = keras_model(recipe.graph).get_weights()
-    model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
+    model, optimizer, _, masks, learn = _learner(recipe, drawn if start is None else [
         start[name].reshape(value.shape) for name, value in zip(names, drawn, strict=True)])
     for name, variable, mask in zip(names, model.trainable_variables, masks, strict=True):
         mask.assign(_mask(variable.numpy(), start is not None and name in _pruned_names(recipe)))
@@ -67,23 +67,29 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
     return {name: v.numpy().reshape(shapes[name]) for name, v in zip(names, model.trainable_variables, strict=True)}
 
 
-def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
-    """(model with these weights, optimizer, masks, learn(x, y) -> loss), before the first step."""
-    alike = Recipe(**{name: getattr(recipe, name) for name in COMPILED})
-    model, optimizer, untouched, masks, learn = compiled_step(alike)
-    model.set_weights(weights)
-    for variable, value in zip(optimizer.variables, untouched, strict=True):
+class Learner(NamedTuple):
+    """A Keras model with what trains it; all of one recipe share it."""
+
+    model: Any
+    optimizer: Any
+    optimizer_start: list[np.ndarray]  #: values of the optimizer's variables before the first step
+    masks: list  #: TensorFlow variables, one a weight: 0 where it is pruned, 1 elsewhere
+    learn: Callable  #: learn(x, y) takes one step on a batch and returns its loss
+
+
+def _learner(recipe: Recipe, weights: list[np.ndarray]) -> Learner:
+    """The learner of a recipe with these weights, before the first step."""
+    learner = compiled_step(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
+    learner.model.set_weights(weights)
+    for variable, value in zip(learner.optimizer.variables, learner.optimizer_start, strict=True):
         variable.assign(value)
-    return model, optimizer, masks, learn
+    return learner
 
 
 # all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
 @lru_cache(maxsize=4)
-def compiled_step(recipe: Recipe) -> tuple:
-    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
-
-    recipe: with nothing of its own but COMPILED.
-    """
+def compiled_step(recipe: Recipe) -> Learner:
+    """The learner of a recipe that differs from the default in COMPILED alone, with a compiled step."""
     import keras
     import tensorflow as tf
 
@@ -108,7 +114,7 @@ def compiled_step(recipe: Recipe) -> tuple:
             variable.assign(variable * mask)
         return loss
 
-    return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
+    return Learner(model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn)
 
 
 def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
