@@ -23,6 +23,7 @@ def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]
 
 
 def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
+    """The int8 TFLite file of a network, with scales from the windows (n, rows, columns)."""
     import tensorflow as tf
 
     def network(x):

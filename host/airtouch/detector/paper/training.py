@@ -219,6 +219,7 @@ def fit_keras(train: Windows, validation: Windows, epochs: int, sparsity: float,
 
 
 def _rate_table(steps: int):
+    """A Keras schedule of the learning rate: one cycle over the steps."""
     import keras
     from keras import ops
 
@@ -245,6 +246,7 @@ def _batches(windows: Windows, shuffle: bool):
 
 
 def _check(epochs: int, sparsity: float, block: int, df_lambda: float, conv_sparsity: float) -> None:
+    """Raise AirTouchError for settings out of range."""
     if epochs < 1:
         raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
     for share in (sparsity, conv_sparsity):

@@ -69,6 +69,7 @@ def _height_verdicts(rows: dict[tuple[str, str, str], dict[str, Any]], edges: in
 
 
 def _draw_heights(canvas: Any, groups: Groups) -> None:
+    """Draw the share of edges within each distance, by height, beside the paper's two claims."""
     for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
         pictures.hit_curves(axes, {f"{h}, {kind}": scores for (n, h, kind), scores in groups.items() if n == name},
                             legend=False)
@@ -156,6 +157,7 @@ def wind(job: Job) -> Figure:
         verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {text}")
 
     def draw(canvas):
+        """Draw error and misses against the wind's speed."""
         left, right = canvas.subplots(1, 2)
         for name in DETECTORS:
             by_speed = [rows[name, v] for v in WINDS_MPS]

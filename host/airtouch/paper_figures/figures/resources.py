@@ -56,6 +56,7 @@ def _count() -> _Counts:
 
 
 def _rows(n: _Counts) -> list[dict[str, Any]]:
+    """The table's rows: the vision network, the paper's without and with zeros, and `best`."""
     step = n.best["mac_per_sample"]
     return [
         {"what": "TEED's structure, 320 x 320", "mac": n.vision_multiplications,
@@ -71,6 +72,7 @@ def _rows(n: _Counts) -> list[dict[str, Any]]:
 
 
 def _flops(n: _Counts) -> Verdict:
+    """The verdict on the multiply-accumulates of the paper's network and of the vision network."""
     theirs, said = CLAIMS["flops"].values
     vision = n.vision_multiplications
     side = np.sqrt(theirs / FLOPS_A_MAC / (vision / np.prod(PAPER_CAMERA)))
@@ -100,6 +102,7 @@ def _memory() -> Verdict:
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw work, parameters and memory of each row as bars."""
     paper_colour, best_colour = pictures.COLOURS["paper"], pictures.COLOURS["best"]
     for axes, key, label in zip(canvas.subplots(1, 3), ("mac", "parameter_bytes", "frame_bits"),
                                 ("multiply-accumulates", "bytes of parameters", "bits a frame or window"),

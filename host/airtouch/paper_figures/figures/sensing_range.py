@@ -129,6 +129,7 @@ def _small(rows: list[dict[str, Any]]) -> Verdict:
 
 
 def _draw(canvas: Any, craft: list[Craft], claimed_m: float) -> None:
+    """Draw the gain of lift against height for each craft and curve, with the noise of the force."""
     axes = canvas.subplots()
     for one, colour in zip(craft, pictures.COLOURS.values(), strict=False):
         for (source, curve), style in zip(curves(one.radius_m, one.arm_m).items(), (":", "--", "-"), strict=True):

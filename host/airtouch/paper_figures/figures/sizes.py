@@ -58,6 +58,7 @@ def _accuracy_falls(rows: list[dict[str, Any]]) -> str:
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw bytes, and balanced accuracy against the share of zeros."""
     left, right = canvas.subplots(1, 2)
     left.barh([r["what"] for r in rows], [r["bytes"] / 1000 for r in rows], color=pictures.COLOURS["paper"])
     for value in CLAIMS["size"].values:

@@ -68,6 +68,7 @@ def _negligible(mw: float, source: str) -> Verdict:
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw the power of each stage beside the paper's."""
     axes = canvas.subplots()
     places = range(len(rows))
     axes.barh([p - 0.2 for p in places], [r["mw"] for r in rows], height=0.38, color=pictures.COLOURS["best"],

@@ -44,6 +44,7 @@ def _summaries(found: Crossings) -> Summaries:
 
 
 def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dict[str, Verdict]:
+    """The verdicts on the claims about light. rows: the camera's by method and lux. ours: AirTouch's by detector."""
     def text(value: float) -> str:
         return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.misses(rows[n, value])}"
                          for n in ("teed", "classical") if (n, value) in rows)
@@ -67,6 +68,7 @@ def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dic
 
 
 def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float]) -> None:
+    """Draw error and misses of camera and AirTouch against the light."""
     left, right = canvas.subplots(1, 2)
     for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
         for name in ("classical", "teed"):

@@ -58,18 +58,17 @@ def refine(target: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np
         simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers,
                                            np.tile(trial, (len(chosen), 1)), seed, FIRST_NUMBER, fixed, workers)
         progress(comparisons := comparisons + 1, total)
-        return np.clip((simulated - target.features[chosen]) / target.scatter, -fit.CLIP, fit.CLIP)
+        return target.differences(simulated, chosen)
 
     values = lever_set.clip(levers, values)
     present = difference(values)
     jacobian = np.column_stack([
         _mean(difference(_step(values, k, levers[k])) - present) / _sign(values[k], levers[k])
         for k in edge_indices])
-    recorded = np.maximum(np.isfinite(target.features).sum(axis=0), 1)
     history = [_cost(_mean(present))]
     factor = 1.0
     for _ in range(STEPS):
-        variance = _variance(present) + 1.0 / recorded
+        variance = _variance(present) + 1.0 / target.counts
         step = factor * fit.least_squares_step(np.nan_to_num(jacobian), _mean(present), variance, edge_levers,
                                                values[edge_indices], steps)
         trial = values.copy()

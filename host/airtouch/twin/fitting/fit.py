@@ -54,6 +54,15 @@ class Target:
     features: np.ndarray
     scatter: np.ndarray
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Flights that have each feature, (features,), at least 1."""
+        return np.maximum(np.isfinite(self.features).sum(axis=0), 1)
+
+    def differences(self, simulated: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Simulated features (k, features) less those of the `chosen` flights (k,), in scatters, clipped to CLIP."""
+        return np.clip((simulated - self.features[chosen]) / self.scatter, -CLIP, CLIP)
+
 
 @dataclass
 class State:
@@ -137,7 +146,7 @@ def _round(state: State, target: Target, vehicle: Vehicle, levers: Sequence[Leve
     chosen = np.concatenate([rng.permutation(len(target.courses)) for _ in range(passes)])[:flights]
     simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers, values, seed,
                                        number * flights, fixed, workers)
-    differences = np.clip((simulated - target.features[chosen]) / target.scatter, -CLIP, CLIP)
+    differences = target.differences(simulated, chosen)
     diverged = int((~np.isfinite(simulated[:, 0])).sum())
     if diverged > MAX_DIVERGED * flights:
         raise AirTouchError(f"{diverged} of {flights} simulated flights did not end well; give a vehicle file nearer "
@@ -147,8 +156,7 @@ def _round(state: State, target: Target, vehicle: Vehicle, levers: Sequence[Leve
     jacobian, mean, variance = regression(np.vstack(state.samples), np.vstack(state.differences), state.values, steps,
                                           len(values))
     before = misfit(mean)
-    recorded = np.maximum(np.isfinite(target.features).sum(axis=0), 1)
-    step = least_squares_step(jacobian, mean, variance + 1.0 / recorded, levers, state.values, steps)
+    step = least_squares_step(jacobian, mean, variance + 1.0 / target.counts, levers, state.values, steps)
     step *= 1.0 if number < rounds - LAST_ROUNDS else LAST_FACTOR
     state.history.append({"values": state.values.tolist(), "misfit": before, "lost": diverged,
                           "cpu_s": round(time.process_time() - start_s, 1)})
