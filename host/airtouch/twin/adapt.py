@@ -96,7 +96,7 @@ class Adapted:
         """
         scores = {name: getattr(self, name) for name in ("twin_only", "held_out_half", "held_out")}
         return {**self.model.metadata.get("adapted", {}), "left_out": [list(pair) for pair in self.left_out],
-                **{name: summary.summarise(given) if given else None for name, given in scores.items()}}
+                **{name: summary.summarise(of_flights) if of_flights else None for name, of_flights in scores.items()}}
 
     def __repr__(self) -> str:
         training = self.model.metadata.get("adapted", {})

@@ -109,7 +109,7 @@ def input_size(job: Job) -> Figure:
 
 def _curves(canvas: Any, rows: dict[int, dict[str, Any]], label: str) -> None:
     left, right = canvas.subplots(1, 2)
-    for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of edges found, m"),
+    for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of detected edges, m"),
                                     (right, "missed", 100.0, "missed edges, %")):
         sizes = [s for s, r in rows.items() if r[key] is not None]
         pictures.curve(axes, sizes, [rows[s] for s in sizes], key, factor, pictures.COLOURS["paper"])

@@ -164,7 +164,7 @@ def wind(job: Job) -> Figure:
             for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
                 pictures.curve(axes, WINDS_MPS, by_speed, key, factor, pictures.colour(name), name)
                 axes.set_xlabel("wind, m/s")
-        left.set(ylabel="mean error of edges found, m", ylim=(0, None))
+        left.set(ylabel="mean error of detected edges, m", ylim=(0, None))
         right.set(ylabel="missed edges, %", ylim=(0, 100))
         left.legend(fontsize=7, frameon=False)
 

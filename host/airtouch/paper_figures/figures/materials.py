@@ -101,7 +101,7 @@ def by_pair(job: Job) -> Figure:
         median, greatest = CLAIMS["mat-cement"].values
         canvas.axes[1].plot([1, 1], [median, greatest], "k*", ms=7, label="paper: mat, cement: median, greatest")
         canvas.axes[1].legend(fontsize=7, frameon=False)
-        canvas.axes[0].set_ylabel("|error| of edges found, m")
+        canvas.axes[0].set_ylabel("|error| of detected edges, m")
 
     return Figure("Errors by pair of materials", table, _caption(scores), verdicts, draw)
 

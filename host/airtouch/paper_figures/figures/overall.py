@@ -48,7 +48,7 @@ def against_baseline(job: Job) -> Figure:
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
-        pictures.bars(left, table, "mean_abs_error_m", "error_low_m", "error_high_m", "mean error of edges found, m")
+        pictures.bars(left, table, "mean_abs_error_m", "error_low_m", "error_high_m", "mean error of detected edges, m")
         pictures.paper_stars(left, {1: ours, 2: theirs})
         pictures.bars(right, table, "missed", "missed_low", "missed_high", "missed edges, %", factor=100.0)
 

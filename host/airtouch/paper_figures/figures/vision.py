@@ -26,21 +26,21 @@ LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate mov
 
 def light(job: Job) -> Figure:
     """Performance:3b: errors of the camera and of AirTouch from 500 to 5 lux."""
-    found = crossings(job)
+    data = crossings(job)
     lux = lux_of(job)
-    rows = {(name, v): summary.summarise(film_scores(found.films, found.camera[name, v]))
+    rows = {(name, v): summary.summarise(film_scores(data.films, data.camera[name, v]))
             for v in lux for name in ("classical", "teed")}
-    ours = _summaries(found)
+    ours = _summaries(data)
     table = [words.table_row(f"{name}, {v:g} lux", row, detector=name, lux=v) for (name, v), row in rows.items()]
     table += [words.table_row(f"{name}, any light", row, detector=name) for name, row in ours.items()]
-    caption = (f"Simulated: {len(found.films)} flights, 4 cm over the platform, camera and AirTouch on the same "
+    caption = (f"Simulated: {len(data.films)} flights, 4 cm over the platform, camera and AirTouch on the same "
                f"flights; frames of 324 x 244 rendered at 6 a second. {LIMITS}")
     return Figure("Errors against light", table, caption, _light_verdicts(rows, ours, lux),
                   lambda canvas: _draw_light(canvas, rows, ours, lux))
 
 
-def _summaries(found: Crossings) -> Summaries:
-    return {name: summary.summarise(film_scores(found.films, found.airtouch[name])) for name in AIRTOUCH}
+def _summaries(data: Crossings) -> Summaries:
+    return {name: summary.summarise(film_scores(data.films, data.airtouch[name])) for name in AIRTOUCH}
 
 
 def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dict[str, Verdict]:
@@ -87,15 +87,15 @@ def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float
 
 def network_size(job: Job) -> Figure:
     """Performance:3c: the camera's errors against the size of its network, AirTouch's against the size of its own."""
-    found = crossings(job)
+    data = crossings(job)
     lux = SIZE_LUX
-    rows = {name: summary.summarise(film_scores(found.films, found.camera[name, lux])) for name in weights.SIZES}
+    rows = {name: summary.summarise(film_scores(data.films, data.camera[name, lux])) for name in weights.SIZES}
     table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
              for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
     text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.misses(r)}"
                      for n, r in rows.items())
-    ours = _summaries(found)
+    ours = _summaries(data)
     by_bytes, airtouch = _airtouch_sizes(job)
     table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
               for size, r in by_bytes.items()]
@@ -116,7 +116,7 @@ def network_size(job: Job) -> Figure:
             axes.set(ylim=(0, None))
         _label_axes(canvas, left, right)
 
-    caption = (f"Simulated: the {len(found.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
+    caption = (f"Simulated: the {len(data.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
                f"and 8; each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
     return Figure("Errors against the size of the network", table, caption, verdicts, draw)
 
@@ -139,22 +139,22 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
 
 def fusion(job: Job) -> Figure:
     """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
-    found = crossings(job)
+    data = crossings(job)
     table: list[dict[str, Any]] = []
     scores: dict[tuple[str, float], float] = {}
     for lux in lux_of(job):
-        detections = {"camera": found.camera["teed", lux], "AirTouch": found.airtouch["best"],
-                      "both": found.camera["fusion", lux]}
+        detections = {"camera": data.camera["teed", lux], "AirTouch": data.airtouch["best"],
+                      "both": data.camera["fusion", lux]}
         for name, by_film in detections.items():
-            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(found.films, by_film, strict=True)])
-            row = summary.summarise(film_scores(found.films, by_film))
+            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(data.films, by_film, strict=True)])
+            row = summary.summarise(film_scores(data.films, by_film))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux,
                                          timed_f1=scores[name, lux]))
-        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(found.films, detections)
+        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(data.films, detections)
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
     never_worse, outcome = _outcome([r for r in table if r["detector"] == "both"])
-    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in found.films)} edges: {text}; {outcome}")
+    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in data.films)} edges: {text}; {outcome}")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -165,7 +165,7 @@ def fusion(job: Job) -> Figure:
         axes.set(ylabel="timed F1 (1: every edge, no error)", ylim=(0.5, 1.02))
         axes.legend(fontsize=7, frameon=False)
 
-    caption = (f"Simulated: {len(found.films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 "
+    caption = (f"Simulated: {len(data.films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 "
                "s are one edge, at a time weighted by the inverse squared errors; errors, and whether edges of one "
                f"sense alone count, are learnt at each light on {films_of(job)[0]} other flights. Timed F1 counts a "
                f"match 1 - |error| / 1.5 s. {LIMITS}")
@@ -214,7 +214,7 @@ def _airtouch(axes: Any, ours: Summaries, key: str, factor: float) -> None:
 
 def _label_axes(canvas: Any, left: Any, right: Any) -> None:
     """Label the axes of errors and of misses, and draw one legend below them."""
-    left.set_ylabel("mean error of edges found, m")
+    left.set_ylabel("mean error of detected edges, m")
     right.set_ylabel("missed edges, %")
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
 
