@@ -163,7 +163,7 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
     for learner in LEARNERS:
         cases = cross_validate(table, folds, learner)
         cells = []
-        for figure in (pad.balanced, _damage_right, pad.exact_rotors, pad.severity):
+        for figure in (pad.balanced_accuracy, _damage_right, pad.exact_rotors, pad.severity):
             low, high = pad.interval(cases, figure)
             cells.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
