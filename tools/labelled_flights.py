@@ -48,7 +48,7 @@ def group_of(file: FlightFile, by: str) -> str:
     return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
 
 
-def draw_flights(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[adapt.Flight]:
+def draw_flights(pool: Sequence[adapt.LoadedFlight], count: int, draw: int) -> list[adapt.LoadedFlight]:
     """`count` flights of the pool; a draw's smaller sets lie within its larger ones."""
     if count > len(pool):
         raise AirTouchError(f"{count} labelled flights wanted, {len(pool)} are not held out; ask for fewer")
@@ -80,14 +80,14 @@ def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
-def twin_flights(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
+def twin_flights(folder: Path, pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Edges of the twin in this folder, laid over the free air of these flights."""
     craft = vehicle.load(str(folder / files.VEHICLE))
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
 
 
 def recorded_beside(folders: Sequence[Path], speed: float | None,
-                    pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
+                    pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Flights of other folders to learn beside the pool's, without the sensors that the pool lacks."""
     listed = dataset.collect(folders, speed)
     readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
@@ -112,7 +112,7 @@ class Group:
 
     name: str
     held: list[FlightFile]
-    pool: list[adapt.Flight]
+    pool: list[adapt.LoadedFlight]
     start: BestModel | None
     beside: adapt.SimulatedFlights | None
 
@@ -262,7 +262,8 @@ def main() -> None:
     models = [best.load(path) for path in options.start]
     starts = dict(zip(names, models if len(models) > 1 else models * len(names), strict=False))
     twins = dict(zip(names, options.twin if len(options.twin) > 1 else options.twin * len(names), strict=False))
-    pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in names}
+    pools = {g: [adapt.LoadedFlight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g]
+             for g in names}
     beside = {g: twin_flights(twins[g], pools[g]) for g in twins}
     if options.beside:
         beside = dict.fromkeys(names, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))

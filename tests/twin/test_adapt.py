@@ -37,7 +37,7 @@ def quick(monkeypatch):
 def flights_of(sweeps, count, down=True):
     def of(log):
         return log if down else FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
-    return [adapt.Flight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
+    return [adapt.LoadedFlight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
             for i, (_, log, _) in enumerate(sweeps[:count])]
 
 

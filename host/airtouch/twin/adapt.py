@@ -54,7 +54,7 @@ Progress = Callable[[str, int, int, str], None]
 
 
 @dataclass(frozen=True)
-class Flight:
+class LoadedFlight:
     """A log and the condition (speed, fold) of its file."""
 
     file: FlightFile
@@ -104,7 +104,7 @@ class Adapted:
                 f"{training.get('pseudo_labelled')} by the detector, {len(self.left_out)} left out; plain() says more)")
 
 
-def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
+def adapt(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, work: Path, *,
           start: BestModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
           progress: Progress | None = None, command: str = "airtouch adapt") -> Adapted:
     """Train a detector on flights and their twin. The same arguments give the same bits.
@@ -136,12 +136,12 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     return Adapted(replace(model, metadata={**model.metadata, "adapted": training}), held_out, held_out_half, twin_only)
 
 
-def absent_sensors(flights: Sequence[Flight]) -> tuple[str, ...]:
+def absent_sensors(flights: Sequence[LoadedFlight]) -> tuple[str, ...]:
     """The sensors that all of the flights lack."""
     return tuple(s for s in sensors.SENSORS if all(s in sensors.missing_sensors(f.log) for f in flights))
 
 
-def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
+def simulated_flights(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, seed: int,
                       progress: Progress | None, work: Path | None = None) -> tuple[SimulatedFlights, dict[str, Any]]:
     """Flights of the twin, added to the recorded flights' free air if there is any, and a description for metadata.
 
@@ -178,12 +178,12 @@ class Trainer:
     seed: int
     command: str
 
-    def fit_simulated(self, lag_of: Sequence[Flight], progress: Progress | None = None) -> BestModel:
+    def fit_simulated(self, lag_of: Sequence[LoadedFlight], progress: Progress | None = None) -> BestModel:
         """A detector trained on the simulated flights alone, with its lag on the recorded flights `lag_of`."""
         return best.fit(self.simulated.logs, self.seed, start=self.start, pseudo_labels=self.simulated.edges,
                         lag_of=([f.log for f in lag_of], [None] * len(lag_of)), progress=progress, **self._settings())
 
-    def fit(self, labelled: Sequence[Flight], pupils: Sequence[Flight] = (),
+    def fit(self, labelled: Sequence[LoadedFlight], pupils: Sequence[LoadedFlight] = (),
             pseudo_edges: Sequence[list[Edge] | None] = (), progress: Progress | None = None) -> BestModel:
         """One training on labelled flights, flights `pupils` with pseudo-labels, and simulated ones, of equal weight.
 
@@ -197,7 +197,7 @@ class Trainer:
                         pseudo_labels=[*labels, *self.simulated.edges], emphasis=weights, lag_of=(recorded, labels),
                         progress=progress, **self._settings(), **({} if self.start else AUGMENTATION))
 
-    def self_train(self, teacher: BestModel, labelled: Sequence[Flight], unlabelled: Sequence[Flight],
+    def self_train(self, teacher: BestModel, labelled: Sequence[LoadedFlight], unlabelled: Sequence[LoadedFlight],
                    progress: Progress | None = None) -> BestModel:
         """A detector trained on labelled flights, flights that the teacher labels, and simulated ones.
 
@@ -215,7 +215,7 @@ class Trainer:
             teacher = self.fit(labelled, pupils, pseudo_edges, progress)
         return teacher
 
-    def fit_all(self, twin: BestModel, flights: Sequence[Flight], progress: Progress | None = None) -> BestModel:
+    def fit_all(self, twin: BestModel, flights: Sequence[LoadedFlight], progress: Progress | None = None) -> BestModel:
         """A detector trained on flights with and without labels and on simulated ones; `twin` itself without flights.
 
         It is trained from `start` on both kinds, each with half of the crops: a network that is trained further on a
@@ -233,7 +233,7 @@ class Trainer:
                 "command": self.command}
 
 
-def held_out_scores(trainer: Trainer, twin: BestModel, flights: Sequence[Flight], work: Path, key: str,
+def held_out_scores(trainer: Trainer, twin: BestModel, flights: Sequence[LoadedFlight], work: Path, key: str,
                     progress: Progress | None = None) -> tuple[list[FlightScore], list[FlightScore]]:
     """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
 
@@ -259,13 +259,13 @@ def held_out_scores(trainer: Trainer, twin: BestModel, flights: Sequence[Flight]
     return scores, scores_half
 
 
-def without_range(flight: Flight) -> Flight:
+def without_range(flight: LoadedFlight) -> LoadedFlight:
     """The flight without its down range."""
     log = flight.log
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
-def score_flights(flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
+def score_flights(flights: Sequence[LoadedFlight], model: BestModel) -> list[FlightScore]:
     """The flights' scores by a model."""
     return [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
 
@@ -277,7 +277,7 @@ def _with_name(progress: Progress | None, name: str) -> Progress | None:
     return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)
 
 
-def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
+def _key(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
     settings = (STAGE_VERSION, scene.table, vehicle, seed, TWIN_FLIGHTS, STEPS, AUGMENTATION, ROUNDS, DECODER,
                 *edge_strength.BOUNDS)

@@ -16,7 +16,7 @@ import numpy as np
 from airtouch import __version__, kernels, logs
 from airtouch.detector.best import model as model_file
 from airtouch.detector.best import sensor_note
-from airtouch.detector.best.batches import Flight, channels_of, flight_of
+from airtouch.detector.best.batches import TrainingFlight, channels_of, flight_of
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
 from airtouch.detector.best.recipe import STRIDE, Recipe
@@ -168,7 +168,7 @@ def with_lag(model: BestModel, *groups: Labelled) -> BestModel:
 
 
 def _examples(flights: Sequence[FlightLog], labels: Sequence[Sequence[logs.Edge] | None],
-              emphasis: Sequence[float] | None, recipe: Recipe, report: Progress) -> list[Flight]:
+              emphasis: Sequence[float] | None, recipe: Recipe, report: Progress) -> list[TrainingFlight]:
     """The flights as the trainer takes them; AirTouchError where none has an edge."""
     examples = []
     for i, (log, edges) in enumerate(zip(flights, labels, strict=True)):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airtouch.detector.best.batches import Flight, batch
+from airtouch.detector.best.batches import TrainingFlight, batch
 from airtouch.detector.best.network import keras_model, weight_names, weight_shapes
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.detector.best.recipe import STRIDE, Recipe
@@ -27,9 +27,9 @@ COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "pea
 Weights = dict[str, np.ndarray]
 
 
-def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
+def fit(flights: Sequence[TrainingFlight], recipe: Recipe, seed: int,
         progress: Callable[[int, int, str], None] = lambda *_: None, *,
-        free_air: Sequence[Flight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
+        free_air: Sequence[TrainingFlight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
     """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
 
     The order of TensorFlow's sums, and so the bits, depends on how many threads it has: all processors, or
