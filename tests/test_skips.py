@@ -23,8 +23,9 @@ FILES = {
 def outcomes(folder, **environment):
     """{passed, failed, skipped, error: count} of the files above, in a project with the guard; and what was printed."""
     tests = folder / "project" / "tests"
-    tests.mkdir(parents=True)
-    shutil.copy(Path(__file__).parent / "skips.py", tests)
+    support = tests / "support"
+    support.mkdir(parents=True)
+    shutil.copy(Path(__file__).parent / "support/skips.py", support)
     (tests / "conftest.py").write_text(
         "from skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401\n")
     for name, text in FILES.items():
@@ -33,7 +34,7 @@ def outcomes(folder, **environment):
     process = subprocess.run([sys.executable, "-m", "pytest", "-p", "no:cacheprovider",
                               "--continue-on-collection-errors", "--rootdir", tests, tests],
                              capture_output=True, text=True, cwd=tests,
-                             env=clean | {"PYTHONPATH": str(tests)} | environment)
+                             env=clean | {"PYTHONPATH": str(support)} | environment)
     counts = {name: int(n) for n, name in re.findall(r"(\d+) (passed|failed|skipped|error|xfailed)", process.stdout)}
     return counts, process.stdout
 

@@ -32,7 +32,7 @@ MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: rou
 FALSE_M = 0.02  #: m of mean error, cost of one false edge a minute; no source: round number
 
 
-class Flight:
+class HeldOutFlight:
     """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
 
     def __init__(self, file: dataset.FlightFile, fold: int, model, silent: tuple[str, ...]) -> None:
@@ -46,7 +46,7 @@ class Flight:
         self.minutes = float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60
 
 
-def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[Flight]:
+def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[HeldOutFlight]:
     """Every flight with the model of its own fold in `out`, by what `airtouch crossval` wrote of that fold."""
     files = {file.path.name: file for file in dataset.collect([folder])}
     entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
@@ -57,11 +57,11 @@ def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[Fl
         model = best.load(out / entry["model"])
         for name in (score["file"] for score in entry["per_flight"]):
             file = files[name]
-            flights.append(Flight(file, entry["fold"], model, silent))
+            flights.append(HeldOutFlight(file, entry["fold"], model, silent))
     return flights
 
 
-def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
+def outcomes(flights: list[HeldOutFlight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
     """For each flight the delays of the detected edges, s, and the number of false detections."""
     out = []
     for flight in flights:
@@ -72,7 +72,7 @@ def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndar
     return out
 
 
-def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
+def score(flight: HeldOutFlight, config: DecoderConfig, lag: float) -> FlightScore:
     """The flight's score, as `airtouch evaluate` has it, with these settings and this lag."""
     edges = kernels.edge_decoder(flight.logits, flight.airborne, config)
     detections = [Detection(int(i) * STRIDE, best.KINDS[int(edges[i])]) for i in np.flatnonzero(edges)]
@@ -80,7 +80,7 @@ def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
                         detections, lag)
 
 
-def figures(flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
+def figures(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
     """Mean error of the edges found, share missed, false a minute."""
     errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, outcomes_of, strict=True)])
     edges = sum(len(f.edges) for f in flights)
@@ -96,7 +96,7 @@ def lag_of(outcomes_of: list[tuple[np.ndarray, int]]) -> float:
     return float(np.median(delays)) if len(delays) else 0.0
 
 
-def cost(flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> float:
+def cost(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> float:
     """Metres: mean error with misses at MISS_M, and FALSE_M for each false edge a minute."""
     f = figures(flights, outcomes_of, lag_of(outcomes_of))
     return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
@@ -131,10 +131,10 @@ def main() -> None:
         raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
     settings = candidates(options.count, np.random.default_rng(0), options.hold)
     results = [outcomes(flights, config) for config in track(settings, "settings")]
-    show("as shipped", flights, outcomes(flights, best.DECODER))
-    show("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
+    print_figures("as shipped", flights, outcomes(flights, best.DECODER))
+    print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
     winner = int(np.argmin([cost(flights, f) for f in results]))
-    show("one setting, best over all folds", flights, results[winner])
+    print_figures("one setting, best over all folds", flights, results[winner])
     print(json.dumps(asdict(settings[winner])))
     nested: list[FlightScore] = []
     for fold in {flight.fold for flight in flights}:
@@ -150,7 +150,7 @@ def main() -> None:
         show_scores.write_json(options.json, result, force=True)
 
 
-def show(title: str, flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
+def print_figures(title: str, flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
     """One line of figures."""
     lag = lag_of(outcomes_of)
     print(f"{title}: {_text(figures(flights, outcomes_of, lag))}, lag {lag:.2f} s")

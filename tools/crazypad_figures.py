@@ -29,7 +29,7 @@ def answer(case: dict) -> tuple[str, list[int], float]:
         sum(p["thrust_loss"]["value"] for p in weak)
 
 
-def balanced(table: list[dict]) -> float:
+def balanced_accuracy(table: list[dict]) -> float:
     """Mean over families of the share named right; families without flights are left out."""
     shares = []
     for f in FAMILIES:
@@ -57,12 +57,13 @@ def interval(table: list[dict], figure: Callable[[list[dict]], float]) -> tuple[
 
 
 def forgiven(table: list[dict]) -> float:
-    """`balanced`, where a cut of less than LEAST_MM may be called normal."""
-    def excused(c: dict) -> bool:
+    """`balanced_accuracy`, where a cut of less than LEAST_MM may be called normal."""
+    def is_excused(c: dict) -> bool:
         """Whether a small cut was called normal."""
         return bool(millimetres(c["condition"])) and not large(c["condition"]) and answer(c)[0] == "normal"
 
-    return balanced([c for c in table if not excused(c)] + [{**c, **ROTOR_DAMAGE} for c in table if excused(c)])
+    return balanced_accuracy([c for c in table if not is_excused(c)]
+                             + [{**c, **ROTOR_DAMAGE} for c in table if is_excused(c)])
 
 
 def exact_rotors(table: list[dict]) -> float:
@@ -97,7 +98,7 @@ def severity(table: list[dict]) -> float:
 FEWEST = 6  #: flights from which the severity of a drone's rotor is printed: two conditions of three flights
 #: figure's name -> function of the cases
 FIGURES: dict[str, Callable[[list[dict]], float]] = {
-    "balanced accuracy of the family": balanced,
+    "balanced accuracy of the family": balanced_accuracy,
     f"the same, a cut under {LEAST_MM} mm may be normal": forgiven,
     "damaged rotors named exactly": exact_rotors, "only damaged rotors named": only_damaged_rotors,
     f"exactly, of at least {LEAST_MM} mm off a rotor": large_exact_rotors,
@@ -105,7 +106,7 @@ FIGURES: dict[str, Callable[[list[dict]], float]] = {
     "severity, Spearman": severity}
 
 
-def show(table: list[dict]) -> None:
+def print_answers(table: list[dict]) -> None:
     """Print answers by family and by condition, and FIGURES with their intervals."""
     columns = (*FAMILIES, "unknown", "other")
     print(f"\n{'true family':14s} " + " ".join(f"{c:>13s}" for c in columns))

@@ -28,7 +28,7 @@ SPEED_MPS = 0.3  #: m/s, of flights whose manifest states none: what most of the
 FlightData = tuple[np.ndarray, Course, int]
 
 
-def read(folders: Sequence[Path]) -> dict[str, list[FlightData]]:
+def read_days(folders: Sequence[Path]) -> dict[str, list[FlightData]]:
     """Day -> (channels, course, number) of each of its flights that has a course."""
     listed = dataset.collect(folders, None)
     readable, _ = crossval.readable_flights(listed, best.SPARE_SENSORS)
@@ -55,7 +55,7 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--fewest", type=int, default=MIN_FLIGHTS, help="flights of a day (default %(default)s)")
     options = parser.parse_args()
-    days = read(options.folders)
+    days = read_days(options.folders)
     large = {day: flights for day, flights in sorted(days.items()) if len(flights) >= options.fewest}
     if len(large) < 2:
         raise SystemExit(f"two days with {options.fewest} flights or more are needed, here: " +

@@ -137,7 +137,7 @@ def simulated_passes(folder: Path, courses: Sequence[Course]) -> Iterable[tuple[
             continue
 
 
-def show(name: str, passes: Passes) -> None:
+def print_tables(name: str, passes: Passes) -> None:
     """Print the three tables of some flights."""
     print(f"\n## {name}: {len(passes)} flights")
     for kind in ("entry", "exit"):
@@ -166,9 +166,9 @@ def main() -> None:
     parser.add_argument("--twin", type=Path)
     options = parser.parse_args()
     recorded = flights.read([options.folder], folds=options.fold)
-    show("recorded", list(zip(recorded.courses, recorded.channels, strict=True)))
+    print_tables("recorded", list(zip(recorded.courses, recorded.channels, strict=True)))
     if options.twin:
-        show("twin", list(simulated_passes(options.twin, recorded.courses)))
+        print_tables("twin", list(simulated_passes(options.twin, recorded.courses)))
 
 
 if __name__ == "__main__":

@@ -119,10 +119,10 @@ def run_batches(name: str, program: Path, runs: int, seed: int, resume: bool, fo
     return replace(result, inputs=inputs, cpu=cpu)
 
 
-def keep(name: str, program: Path) -> tuple[int, int]:
-    """Makes the corpus small and its smallest inputs the kept seeds; returns their number and bytes.
+def keep_seeds(name: str, program: Path) -> tuple[int, int]:
+    """Merge the corpus and store its smallest inputs as the seeds in git; returns their number and bytes.
 
-    What was found stays a seed for good: the findings, and those that the seeds hold already.
+    Inputs that once failed stay seeds for good: new findings, and those that the seeds hold already.
     """
     inputs = corpus(name)
     permanent = {path.name: path.read_bytes() for path in inputs.glob("found-*")}
@@ -146,8 +146,8 @@ def keep(name: str, program: Path) -> tuple[int, int]:
     return count, (SEEDS / f"{name}.zip").stat().st_size
 
 
-def cover(names: list[str]) -> None:
-    """Prints the share of lines of each source that the corpora reach, and the functions that none does."""
+def print_coverage(names: list[str]) -> None:
+    """Print the share of lines of each source that the corpora reach, and the functions that none does."""
     made_by = engine("libfuzzer")
     profiler, reporter = (shutil.which(name) for name in ("llvm-profdata", "llvm-cov"))
     if made_by is None or profiler is None or reporter is None:
@@ -180,7 +180,7 @@ def main() -> None:
     if unknown := set(names) - set(targets()):
         parser.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(targets())}")
     if options.coverage:
-        return cover(names)
+        return print_coverage(names)
     made_by = engine(options.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
@@ -190,7 +190,7 @@ def main() -> None:
         sys.exit(max(subprocess.run([programs[name], *options.replay]).returncode for name in names))
     if options.keep:
         for name in names:
-            print("{}: {} seeds, {} bytes".format(name, *keep(name, programs[name])))
+            print("{}: {} seeds, {} bytes".format(name, *keep_seeds(name, programs[name])))
         return None
     print(f"{made_by.name}, {made_by.compiler}, mutations of seed {options.seed}\n"
           f"{'target':16} {'inputs':>9} {'edges':>6} {'features':>8} {'CPU s':>6}  result", flush=True)

@@ -44,7 +44,7 @@ class Count:
     failures: dict[str, list[int]] = field(default_factory=dict)
 
 
-def mutated(name: str, seed: int, number: int) -> tuple[bytes, Random]:
+def mutate(name: str, seed: int, number: int) -> tuple[bytes, Random]:
     """One input, and the generator for what the walk chooses."""
     r = Random(f"{seed} {name} {number}")
     base = r.choice(files_of(name))
@@ -73,7 +73,7 @@ def files_of(name: str) -> list[bytes]:
 def one(name: str, seed: int, number: int, folder: Path,
         command_every: int = COMMAND_EVERY) -> tuple[str, float, float]:
     """One input through readers and commands: outcome, seconds of processor time, MB of memory."""
-    data, r = mutated(name, seed, number)
+    data, r = mutate(name, seed, number)
 
     def act(path: Path) -> str:
         """Walk the input, and call the commands on some."""
@@ -86,10 +86,10 @@ def one(name: str, seed: int, number: int, folder: Path,
             walk.command([*convert, "--rate", "100"], path)
         return walk.stand(path) if name == "thrust-stand" else outcome
 
-    return measured(act, folder / "flight.log", len(data))
+    return measure(act, folder / "flight.log", len(data))
 
 
-def measured(act: Callable[[Path], str], path: Path, size: int) -> tuple[str, float, float]:
+def measure(act: Callable[[Path], str], path: Path, size: int) -> tuple[str, float, float]:
     """What an act on a file of this size gives, its seconds of processor time and MB of memory, both within limits."""
     clear_peak()
     held, start = memory_mb("VmRSS"), time.process_time()
@@ -146,7 +146,7 @@ def shapes(length: int, folder: Path) -> int:
             """Walk the file."""
             return walk.walk(data, str(path), Random(0))
 
-        outcome, seconds, mb = measured(act, folder / "shape", len(data))
+        outcome, seconds, mb = measure(act, folder / "shape", len(data))
         print(f"{name:16}{len(data):11}{seconds:9.2f}{mb:8.0f}  {outcome}", flush=True)
     return 0
 
@@ -165,7 +165,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         if options.only is not None:
             Path("out").mkdir(exist_ok=True)
-            Path("out/fuzzed.log").write_bytes(mutated(options.format[0], options.seed, options.only)[0])
+            Path("out/fuzzed.log").write_bytes(mutate(options.format[0], options.seed, options.only)[0])
             print(one(options.format[0], options.seed, options.only, Path(folder), 1))
             return 0
         if options.shapes:

@@ -31,7 +31,7 @@ from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_corrections import show_corrections
-from crazypad_figures import balanced, exact_rotors, show
+from crazypad_figures import balanced_accuracy, exact_rotors, print_answers
 from crazypad_labels import VEHICLE, family, manifest
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
@@ -70,22 +70,23 @@ def cases(folder: Path, store: Path | None) -> list[dict]:
     return out
 
 
-def cross_validated(folder: Path) -> list[dict]:
+def cross_validate(folder: Path) -> list[dict]:
     """Cases of all flights, each condition with the priors of GRID that do best on the other conditions."""
     rows = manifest(folder, "all")
     vehicle = vehicles.load(VEHICLE)
     patterns = [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
-    tables = [_diagnosed(rows, patterns, vehicle, priors) for priors in GRID]
+    tables = [_diagnose(rows, patterns, vehicle, priors) for priors in GRID]
     out = []
     for condition in sorted({r["condition"] for r in rows}):
         others = [[c for c in table if c["condition"] != condition] for table in tables]
-        best = max(range(len(GRID)), key=lambda i: balanced(others[i]) + ROTOR_WEIGHT * exact_rotors(others[i]))
+        scores = [balanced_accuracy(cases) + ROTOR_WEIGHT * exact_rotors(cases) for cases in others]
+        best = scores.index(max(scores))
         out += [c for c in tables[best] if c["condition"] == condition]
     return out
 
 
-def _diagnosed(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles.Vehicle,
-               priors: Priors) -> list[dict]:
+def _diagnose(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles.Vehicle,
+              priors: Priors) -> list[dict]:
     """Cases of all flights with these priors, by `hover_balance` alone. patterns: of each flight."""
     candidates, out = hypotheses(vehicle, priors), []
     for row, pattern in zip(rows, patterns, strict=True):
@@ -122,10 +123,10 @@ def main() -> None:
         show_corrections(options.folder)
         return
     start = time.time()
-    show(cases(options.folder, options.json))
+    print_answers(cases(options.folder, options.json))
     if options.leave_one_out:
         print("\nPriors chosen without the condition judged:")
-        show(cross_validated(options.folder))
+        print_answers(cross_validate(options.folder))
     print(f"{time.time() - start:.0f} s")
 
 

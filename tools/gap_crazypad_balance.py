@@ -54,7 +54,7 @@ def change(cut: dict[int, float], slope: float, yaw: float) -> np.ndarray:
     return commanded_change(command[None])[0] * (1.0, 1.0, 1.0, yaw)
 
 
-def fitted(means: np.ndarray, cuts: list[dict[int, float]]) -> tuple[np.ndarray, np.ndarray]:
+def fit(means: np.ndarray, cuts: list[dict[int, float]]) -> tuple[np.ndarray, np.ndarray]:
     """Slope and yaw ratio (2,) that fit the balances (conditions, 4) best, and their residuals (conditions, 4)."""
     def residuals(x: np.ndarray) -> np.ndarray:
         """Residuals (conditions, 4) with slope and yaw ratio x."""
@@ -107,7 +107,7 @@ class Balances:
 
 def show_scatter(b: Balances) -> None:
     """Print the fit, the rms of its residuals, and the `maintenance` scatter that follows."""
-    (slope, yaw), residuals = fitted(b.means, b.cuts)
+    (slope, yaw), residuals = fit(b.means, b.cuts)
     each = [b.own(p) - b.own(p).mean(axis=0) for p in sorted(set(b.of))]
     within = np.sqrt((np.concatenate(each) ** 2).sum(axis=0) / sum(len(e) - 1 for e in each))
     print(f"{len(b.pairs)} conditions with cut blades: {100 * slope:.1f} % more told to a rotor for each mm, "
@@ -148,7 +148,7 @@ def rotor_tests(b: Balances) -> list[RotorTest]:
     out, generator = [], np.random.default_rng(0)
     for k, (pair, cut) in enumerate(zip(b.pairs, b.cuts, strict=True)):
         rest = np.arange(len(b.pairs)) != k
-        solution, residuals = fitted(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
+        solution, residuals = fit(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
         whiten = np.linalg.inv(np.linalg.cholesky(residuals.T @ residuals / (rest.sum() - 2))).T
         rivals = np.array([change(c, *solution) for c in _rivals(cut)]) @ whiten
         right = np.array([set(c) == set(cut) for c in _rivals(cut)])
@@ -204,7 +204,7 @@ def _nearest(balances: np.ndarray, rivals: np.ndarray) -> np.ndarray:
 def show_family(b: Balances) -> None:
     """Print how often the diagnosis is right on drawn flights of each family that are drawn from its priors."""
     generator, candidates = np.random.default_rng(0), hypotheses(b.vehicle)
-    solution, _ = fitted(b.means, b.cuts)
+    solution, _ = fit(b.means, b.cuts)
     cuts = np.array([change(c, *solution) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if labels.large(text)])
     kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
              "added weight": [h.change for h in candidates if h.name == "mass"],

@@ -78,7 +78,7 @@ class Table:
         return np.array([np.nan_to_num(labels.cut_mm(r["condition"])) for r in self.rows])
 
 
-def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
+def describe(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
     """Numbers (k,) of one flight: its `HoverPattern`, voltage, thrust of each rotor, log10 of band powers."""
     weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
     thrust, voltage = vehicle.thrust(flight.pwm) / weight, flight.log["vbat_V"]
@@ -100,7 +100,7 @@ def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
     rows = labels.manifest(folder, part)
     vehicle = vehicles.load(labels.VEHICLE)
-    raw = np.array([described(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
+    raw = np.array([describe(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
     drone = np.array([r["drone"] for r in rows])
     normal = np.array([labels.family(r["condition"]) == "normal" for r in rows])
     own = np.arange(len(rows))
@@ -124,7 +124,7 @@ MEASURES: dict[str, Callable] = {
     "nearest flight, all numbers": lambda: KNeighborsRegressor(1)}
 
 
-def judged(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
+def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
     """Cases of all flights, each with the answer of a learner that has the labels of all flights outside its fold."""
     x = table.numbers[:, BALANCE] if learner.endswith("the balance") else table.numbers
     out: list[dict] = [{} for _ in table.rows]
@@ -161,9 +161,9 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
     print(f"\n{part}\n| test | family, balanced | of damage, right | exact rotors | severity, Spearman |\n"
           "|---|---|---|---|---|")
     for learner in LEARNERS:
-        cases = judged(table, folds, learner)
+        cases = cross_validate(table, folds, learner)
         cells = []
-        for figure in (pad.balanced, _damage_right, pad.exact_rotors, pad.severity):
+        for figure in (pad.balanced_accuracy, _damage_right, pad.exact_rotors, pad.severity):
             low, high = pad.interval(cases, figure)
             cells.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)

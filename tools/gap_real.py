@@ -41,7 +41,7 @@ from crazypad_labels import building, family, manifest
 from gap_authors import VEHICLE as AUTHORS_VEHICLE
 from gap_authors import questions
 from gap_peers import NAMES
-from gap_real_table import answer, show
+from gap_real_table import answer, print_table
 
 OTHERS = 5  #: most baseline flights of one; as tools/nominal_scatter.py, whose table the diagnosis uses
 PER_GROUP = 4  #: flights tested of a day and condition; no source: enough for a count, few enough for time
@@ -104,7 +104,7 @@ def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
     return out
 
 
-def _later(path: str, seconds: float) -> FlightLog:
+def _delay_clock(path: str, seconds: float) -> FlightLog:
     """A log whose clock begins later by so many seconds."""
     log = read(path)
     return FlightLog({**log.columns, "t_s": log["t_s"] + seconds}, log.meta)
@@ -180,7 +180,7 @@ ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "p
 DEFAULT_ROWS = [row for row in ROWS if row != "nominal"]  #: without the one that takes 25 min
 
 
-def answered(case: Case) -> dict:
+def diagnose_case(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
     out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
@@ -188,7 +188,7 @@ def answered(case: Case) -> dict:
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
                              before=_LAST.get((case.vehicle, case.baseline)),
-                             partner=[_later(*p) for p in case.partner])
+                             partner=[_delay_clock(*p) for p in case.partner])
     except AirTouchError as error:
         return {**out, "verdict": "refused", "why": str(error)}
     _LAST.clear()
@@ -215,7 +215,7 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in answer_of),
                   key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
-        for i, case in enumerate(pool.map(answered, todo)):
+        for i, case in enumerate(pool.map(diagnose_case, todo)):
             answer_of[case["row"], case["flight"]] = case
             if store:
                 with store.open("a") as out:
@@ -246,7 +246,7 @@ def main(arguments: list[str] | None = None) -> int:
     if args.partner:
         cases = with_partners(cases, args.flights)
     answers = diagnoses(cases, args.keep, args.jobs)
-    show(answers, args.flights)
+    print_table(answers, args.flights)
     wrong = [c["flight"] for c in answers if answer(c) != c["truth"]]
     if args.quick and len(wrong) > QUICK_WRONG:
         print(f"gap_real: {len(wrong)} of {len(answers)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",

@@ -30,7 +30,7 @@ def answer(case: dict) -> str:
     return first["name"]
 
 
-def show(cases: list[dict], folder: Path) -> None:
+def print_table(cases: list[dict], folder: Path) -> None:
     """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
     table = defaultdict(lambda: defaultdict(int))
     for c in cases:
@@ -56,7 +56,7 @@ def show(cases: list[dict], folder: Path) -> None:
         print(f"{len(seconds)} diagnoses: {middle:.0f} s in the middle, {most:.0f} s at most in nine of ten")
     pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
     if pads:
-        figures = {"family, balanced": pad.balanced, "only damaged rotors named": pad.only_damaged_rotors,
+        figures = {"family, balanced": pad.balanced_accuracy, "only damaged rotors named": pad.only_damaged_rotors,
                    "severity, Spearman": pad.severity}
         for text, figure in figures.items():
             low, high = pad.interval(pads, figure)

@@ -117,7 +117,7 @@ def training_flights(text: str, count: int, seed: int, folder: Path) -> list[Fli
     return simulated.training_flights(count, name, seed=seed)[0]
 
 
-def trained(text: str, seed: int, options: argparse.Namespace) -> Any:
+def train(text: str, seed: int, options: argparse.Namespace) -> Any:
     """`best` trained on flights of that scenario: from OUT/models where these very flights were trained on."""
     flights = training_flights(text, options.flights, seed, options.out)
     key = hashlib.sha256(f"{seed} {options.steps}".encode())
@@ -144,7 +144,7 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
     for seed in range(options.seeds):
         run: list[FlightScore] = []
         for text, flights in zip(texts, tested, strict=True):
-            model = trained(text, seed, options)
+            model = train(text, seed, options)
             run += [evaluate.evaluate_flight(f, log, best, model).score for f, log in flights.items()]
             differences.append(apart_db(training_flights(text, options.flights, seed, options.out),
                                         list(flights.values())))

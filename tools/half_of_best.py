@@ -19,12 +19,12 @@ FOLDS = ("0", "1", "2")  #: of the manifest, on which numbers may be chosen
 CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same; no source: round number
 
 
-def later(log: FlightLog) -> FlightLog:
+def without_first_sample(log: FlightLog) -> FlightLog:
     """The log without its first sample."""
     return FlightLog({name: values[1:] for name, values in log.columns.items()}, log.meta)
 
 
-def turned(log: FlightLog) -> FlightLog:
+def turn(log: FlightLog) -> FlightLog:
     """The same flight at a heading of 90 degrees more, as a log of world axes would show it."""
     x, y, _ = ACC_WORLD
     return FlightLog({**log.columns, x: -log[y], y: log[x]}, log.meta)
@@ -44,9 +44,9 @@ def main(folder: Path) -> None:
     for name in chosen:
         log = logs.read(folder / name)
         edges = best.run(log).edges
-        halves.append(same(edges, best.run(later(log)).edges, 1))
+        halves.append(same(edges, best.run(without_first_sample(log)).edges, 1))
         if log.has(*ACC_WORLD):
-            headings.append(same(edges, best.run(turned(log)).edges))
+            headings.append(same(edges, best.run(turn(log)).edges))
     for what, results in (("a log one sample shorter at its start", halves),
                           ("a heading of 90 degrees more", headings)):
         print(f"{what}: the same edges within {CLOSE / 100:.1f} s in {np.sum(results)} of {len(results)} flights")

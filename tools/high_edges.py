@@ -56,7 +56,7 @@ def over(model: BestModel, values: np.ndarray, path: Course) -> float:
     return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
 
 
-def muted(log: FlightLog, path: Course, model: BestModel) -> np.ndarray:
+def mute_each_channel(log: FlightLog, path: Course, model: BestModel) -> np.ndarray:
     """(1 + channels,): median "over" logit over the platform, and its changes with each channel held at 0."""
     x, _ = channels_of(log, model.recipe.motion)
     whole = over(model, x, path)
@@ -134,9 +134,9 @@ def main() -> None:
     hovers = {name: [(log, path) for log, path in group if length(path.phases()["hover"]) > HOVER_S * RATE_HZ]
               for name, group in groups.items()}
     if models:
-        print_logits(head("over logit; muted", ["whole", *CHANNELS]), groups, models, muted)
+        print_logits(head("over logit; muted", ["whole", *CHANNELS]), groups, models, mute_each_channel)
         print_logits(head("over logit; replaced", REPLACED), hovers, models, approach)
-    print(head("standard deviation, usual swings", CHANNELS))
+    print(head("standard deviation, nominal amplitudes", CHANNELS))
     for name, group in hovers.items():
         pairs = [calm(log, path) for log, path in group]
         for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):

@@ -13,6 +13,7 @@ import argparse
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -47,14 +48,14 @@ def group_of(file: FlightFile, by: str) -> str:
     return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
 
 
-def draw_flights(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[adapt.Flight]:
+def draw_flights(pool: Sequence[adapt.LoadedFlight], count: int, draw: int) -> list[adapt.LoadedFlight]:
     """`count` flights of the pool; a draw's smaller sets lie within its larger ones."""
     if count > len(pool):
         raise AirTouchError(f"{count} labelled flights wanted, {len(pool)} are not held out; ask for fewer")
     return [pool[i] for i in np.random.default_rng(draw).permutation(len(pool))[:count]]
 
 
-def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
+def merge(scores: Iterable[FlightScore]) -> list[FlightScore]:
     """One score a flight, with the edges, false detections and minutes of all its draws."""
     flights: dict[str, list[FlightScore]] = {}
     for score in scores:
@@ -70,7 +71,7 @@ def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
                        sum(s.airborne_s for s in scores), (a, b, c, d), np.sum([s.bins for s in scores], axis=0))
 
 
-def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
+def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
     """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
     for file in held:
         if training_set.contains(model.metadata, readable[file.path]):
@@ -79,14 +80,14 @@ def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, Fl
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
-def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
+def twin_flights(folder: Path, pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Edges of the twin in this folder, laid over the free air of these flights."""
     craft = vehicle.load(str(folder / files.VEHICLE))
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
 
 
 def recorded_beside(folders: Sequence[Path], speed: float | None,
-                    pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
+                    pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Flights of other folders to learn beside the pool's, without the sensors that the pool lacks."""
     listed = dataset.collect(folders, speed)
     readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
@@ -101,48 +102,68 @@ def digest(settings: Sequence[Any]) -> str:
     return hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:12]
 
 
-def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
-         pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: BestModel | None,
-         beside: adapt.SimulatedFlights | None, options: argparse.Namespace) -> list[FlightScore]:
-    """Scores of one training on the held-out flights, from the file of an earlier run if there is one.
+@dataclass(frozen=True)
+class Group:
+    """Flights that are held out together, and what the models that score them may learn from.
 
-    row: "start", "labelled", "unlabelled" or "alone". beside: flights to learn with the sample.
+    held: the flights to score. pool: all others, to draw labelled ones from. start: the model to start from. beside:
+    flights to learn with the labelled ones.
+    """
+
+    name: str
+    held: list[FlightFile]
+    pool: list[adapt.LoadedFlight]
+    start: BestModel | None
+    beside: adapt.SimulatedFlights | None
+
+
+def cell(row: str, count: int, draw: int, seed: int, group: Group, readable: dict[Path, FlightLog],
+         options: argparse.Namespace) -> list[FlightScore]:
+    """Scores of one training on the group's held-out flights, from the file of an earlier run if there is one.
+
+    row: "start", "labelled", "unlabelled" or "alone".
     """
     steps = {"start": 0, "labelled": options.steps, "unlabelled": options.steps, "alone": options.alone_steps}[row]
-    settings = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
-                [f.path.name for f in held], [f.log.source for f in pool]]
-    if beside and row in ("labelled", "unlabelled"):
+    settings = [row, count, draw, seed, group.name, steps, group.start.digest if group.start and row != "alone" else "",
+                [f.path.name for f in group.held], [f.log.source for f in group.pool]]
+    if group.beside and row in ("labelled", "unlabelled"):
         settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
-                     [training_set.flight_hash(log) for log in beside.logs]]
+                     [training_set.flight_hash(log) for log in group.beside.logs]]
     rounds = [adapt.ROUNDS] if row == "unlabelled" else []
     path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{digest([*settings, *rounds])}.json"
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
-    sample = draw_flights(pool, count, draw)
-
-    def labelled() -> BestModel:
-        """A detector of the sample, of the flights beside it, and of the model to start from."""
-        if start is not None and beside:
-            return adapt.together(start if options.beside else None, start, sample, beside, seed, None, COMMAND)
-        return best.fit([f.log for f in sample], seed=seed, start=start, steps=options.steps, command=COMMAND)
-
     if row == "start":
-        if start is None:
+        if group.start is None:
             raise AirTouchError("no model to start from: give --start")
-        model = start
+        model = group.start
     elif row == "alone":
+        sample = draw_flights(group.pool, count, draw)
         model = best.fit([f.log for f in sample], seed=seed, steps=steps, command=COMMAND)
     else:
-        file = f"labelled_{count}_draw{draw}_seed{seed}_{digest(settings[1:])}.npz"
-        model = cache.model(options.out / file, labelled)
-    if row == "unlabelled" and beside:
-        names = {f.log.source for f in sample}
-        unlabelled = [adapt.without_range(f) for f in pool if f.log.source not in names]
-        model = adapt.self_trained(start if options.beside else None, model, sample, unlabelled, beside, seed, None,
-                                   COMMAND)
-    scores = scored(model, held, readable)
+        file = options.out / f"labelled_{count}_draw{draw}_seed{seed}_{digest(settings[1:])}.npz"
+        model = learn(group, count, draw, seed, file, row == "unlabelled", options)
+    scores = held_out_scores(model, group.held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
+
+
+def learn(group: Group, count: int, draw: int, seed: int, file: Path, unlabelled: bool,
+          options: argparse.Namespace) -> BestModel:
+    """A detector of `count` labelled flights, of the flights beside them, and of the model to start from.
+
+    file: where that detector is stored. unlabelled: the pool's other flights are learnt after it, without their labels.
+    """
+    start, sample = group.start, draw_flights(group.pool, count, draw)
+    if group.beside is None or start is None:
+        return cache.model(file, lambda: best.fit([f.log for f in sample], seed=seed, start=start, steps=options.steps,
+                                                  command=COMMAND))
+    trainer = adapt.Trainer(start if options.beside else None, group.beside, seed, COMMAND)
+    model = cache.model(file, lambda: trainer.fit_all(start, sample))
+    if not unlabelled:
+        return model
+    names = {f.log.source for f in sample}
+    return trainer.self_train(model, sample, [adapt.without_range(f) for f in group.pool if f.log.source not in names])
 
 
 def missed_by_height(scores: Sequence[FlightScore]) -> str:
@@ -169,7 +190,7 @@ def false_by_place(scores: Sequence[FlightScore]) -> str:
 
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
-    figures: dict[str, Any] = summarise(merged(scores))
+    figures: dict[str, Any] = summarise(merge(scores))
 
     def text(name: str, scale: float, digits: int) -> str:
         """A figure times `scale` with its interval."""
@@ -236,24 +257,26 @@ def main() -> None:
     readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
-    groups = sorted({group_of(file, options.by) for file in listed})
-    check(options, groups)
+    names = sorted({group_of(file, options.by) for file in listed})
+    check(options, names)
     models = [best.load(path) for path in options.start]
-    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
-    twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))
-    pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in groups}
-    beside = {g: simulated(twins[g], pools[g]) for g in twins}
+    starts = dict(zip(names, models if len(models) > 1 else models * len(names), strict=False))
+    twins = dict(zip(names, options.twin if len(options.twin) > 1 else options.twin * len(names), strict=False))
+    pools = {g: [adapt.LoadedFlight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g]
+             for g in names}
+    beside = {g: twin_flights(twins[g], pools[g]) for g in twins}
     if options.beside:
-        beside = dict.fromkeys(groups, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
+        beside = dict.fromkeys(names, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
+
+    groups = [Group(name, [f for f in listed if group_of(f, options.by) == name], pools[name], starts.get(name),
+                    beside.get(name)) for name in names]
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
         """Print the row of a kind of training, over pairs of draw and seed."""
         scores: list[FlightScore] = []
         for draw, seed in draws:
             for group in groups:
-                held = [f for f in listed if group_of(f, options.by) == group]
-                scores += cell(kind, count, draw, seed, group, held, pools[group], readable, starts.get(group),
-                               beside.get(group), options)
+                scores += cell(kind, count, draw, seed, group, readable, options)
         print(line(title, scores, len(draws)), flush=True)
 
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "

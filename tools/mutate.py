@@ -61,7 +61,7 @@ pytest_add_cli_args_test_selection = {tests}
 """
 
 
-def staged(name: str, force: bool) -> Path:
+def stage(name: str, force: bool) -> Path:
     """The copy of the project in which a group is mutated; the one that is there, unless `force`."""
     place, group = BUILD / name, GROUPS[name]
     if force and place.exists():
@@ -116,7 +116,7 @@ def table(codes: dict[str, int | None]) -> float:
     return share
 
 
-def show(place: Path, codes: dict[str, int | None]) -> None:
+def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
     """Print the mutants that no test noticed."""
     for mutant, code in codes.items():
         if code in SURVIVED + UNSEEN:
@@ -137,9 +137,9 @@ def main(arguments: list[str] | None = None) -> int:
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:
-            show(BUILD / name, results(BUILD / name))
+            print_mutants(BUILD / name, results(BUILD / name))
             continue
-        place = staged(name, args.force)
+        place = stage(name, args.force)
         if args.sample:
             if not results(place):
                 run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants and runs none

@@ -27,6 +27,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
@@ -54,13 +55,23 @@ OWN_TRIM, OWN_TRIM_FLIGHTS = ("paper-low", "paper-9cm", "paper-mixed", "steps"),
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
 #: a log's name, and a function that reads it
 Log = tuple[str, Callable[[], FlightLog]]
-#: class, drone, group, vehicle, logs
-Group = tuple[str, str, str, Vehicle, list[Log]]
+
+
+class Group(NamedTuple):
+    """Nominal flights of one drone on one day, in one condition."""
+
+    of: str  #: class of the table: vehicle and kind of log
+    drone: str
+    name: str
+    vehicle: Vehicle
+    logs: list[Log]
+
+
 _GROUPS: list[Group] = []  #: all groups of this run, for its processes
 
 
 def groups(folder: Path) -> Iterator[Group]:
-    """Class, drone, group, vehicle and nominal flights, each a name and a way to its log, that belong together."""
+    """The groups of nominal flights, recorded and simulated."""
     by_group = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in BUILD_FOLDS:
@@ -68,7 +79,7 @@ def groups(folder: Path) -> Iterator[Group]:
             by_group[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
     vehicle = vehicles.load("crazyflie-2.1-flow")
     for key, files in by_group.items():
-        yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle, files
+        yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle, files)
     swarm = folder / "neuralswarm"
     by_group = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):
@@ -76,18 +87,18 @@ def groups(folder: Path) -> Iterator[Group]:
             if r["day"] in BUILD_DAYS and r.get("truth", "none") == "none":
                 by_group[r["cf"], r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
     for (drone, group, of), files in by_group.items():
-        yield f"motion capture, uSD log, {of}", drone, group, vehicles.load(swarm / f"{of}.toml"), files
+        yield Group(f"motion capture, uSD log, {of}", drone, group, vehicles.load(swarm / f"{of}.toml"), files)
     vehicle = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(vehicle, blind.CAL_FIRST, blind.CAL, seed)
         simulated_logs: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log))
                                      for i, log in enumerate(logs)]
-        yield scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs
+        yield Group(scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs)
     for scene in OWN_TRIM:
         every = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
         logs = [blind.stripped(log) for log in every if isinstance(log, FlightLog)]
-        yield scatter_estimates.OWN_TRIM, scene, scene, vehicle, [(f"{scene} {i}", partial(nothing_done, log))
-                                                                  for i, log in enumerate(logs)]
+        named_logs: list[Log] = [(f"{scene} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
+        yield Group(scatter_estimates.OWN_TRIM, scene, scene, vehicle, named_logs)
 
 
 def nothing_done(log: FlightLog) -> FlightLog:
@@ -114,11 +125,10 @@ def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
         yield name, look(Data(study, [flight]))
 
 
-def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
+def _compare(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
     """A group's flights held against each other, or against those of other groups of the same drone; JSON-ready."""
     i, others = task
-    *_, vehicle, files = _GROUPS[i]
-    comparisons = held_out(files, vehicle, _rest(_GROUPS, i) if others else None)
+    comparisons = held_out(_GROUPS[i].logs, _GROUPS[i].vehicle, _rest(_GROUPS, i) if others else None)
     return i, others, [{"file": _name(name, others), "rate": one.rate, "passing": dict(one.passing),
                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
                         "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in comparisons]
@@ -131,15 +141,14 @@ def passing_alone(data: Data) -> ApparentStrengths:
 
 def _passing_of(i: int) -> list[ApparentStrengths]:
     """The same of every flight of a group."""
-    *_, vehicle, files = _GROUPS[i]
-    return [one for _, one in held_out(files, vehicle, look=passing_alone)]
+    return [one for _, one in held_out(_GROUPS[i].logs, _GROUPS[i].vehicle, look=passing_alone)]
 
 
 def with_passing(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
     """The classes of the table that is shipped, with what comes and goes in their flights measured anew."""
     flights = defaultdict(list)
-    for (of, *_), sizes in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
-        flights[of] += sizes
+    for group, sizes in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
+        flights[group.of] += sizes
     return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
 
 
@@ -150,7 +159,8 @@ def counts_of(text: str) -> dict[str, str]:
 
 def _rest(groups: list[Group], i: int) -> list[Log]:
     """Flights of the same drone in other groups."""
-    return [f for _, drone, group, _, files in groups if drone == groups[i][1] and group != groups[i][2] for f in files]
+    own = groups[i]
+    return [log for group in groups if group.drone == own.drone and group.name != own.name for log in group.logs]
 
 
 def _name(name: str, others: bool) -> str:
@@ -185,6 +195,43 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     return "\n".join(lines)
 
 
+def compare_all(keep: Path | None, jobs: int) -> dict[str, dict]:
+    """Name of a comparison -> its row, of all groups; rows in the file `keep` are taken from there, new ones added."""
+    row_of = {}
+    if keep and keep.exists():
+        row_of = {r["file"]: r for r in map(json.loads, keep.read_text().splitlines())}
+    todo = [(i, others) for i, group in enumerate(_GROUPS) for others in (False, True)
+            if any(_name(name, others) not in row_of for name, _ in group.logs)
+            and (not others or len(_rest(_GROUPS, i)) > 1)]
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
+        for i, others, rows in pool.map(_compare, todo):
+            row_of |= {row["file"]: row for row in rows}
+            if keep:
+                with keep.open("a") as out:
+                    out.writelines(json.dumps(row) + "\n" for row in rows)
+            print(f"{_GROUPS[i].of}, {_GROUPS[i].name}{', other groups' if others else ''}: {len(rows)} flights",
+                  file=sys.stderr, flush=True)
+    return row_of
+
+
+def scatter_of_classes(row_of: dict[str, dict]) -> tuple[dict[str, Scatter], dict[str, str]]:
+    """Class -> its scatter, and class -> on how many flights it was measured, from the rows of `compare_all`."""
+    cases, alike, names, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
+    for group in _GROUPS:
+        names[group.of].add(group.name)
+        flown_by[group.of] = group.vehicle.name
+        for others in (False, True):
+            for row in (row_of[key] for name, _ in group.logs if (key := _name(name, others)) in row_of):
+                strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
+                cases[group.of].append(ApparentStrengths(strengths, errors, row["rate"], row["passing"]))
+                if not others:
+                    alike[group.of].append(cases[group.of][-1])
+    classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
+    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(names[of])} groups"
+              for of, flights in cases.items()}
+    return classes, counts
+
+
 def main() -> None:
     """Measure the nominal scatter of every class and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -195,42 +242,13 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--passing", action="store_true")
     args = parser.parse_args()
+    _GROUPS[:] = [g for g in groups(args.flights) if len(g.logs) >= LEAST]  # the processes inherit it: no log travels
     if args.passing:
-        _GROUPS[:] = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
         with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
             shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
             write(args.out, text_of(with_passing(pool, _GROUPS), counts_of(shipped.read_text(encoding="utf-8"))))
-        return
-    row_of = {}
-    if args.keep and args.keep.exists():
-        row_of = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
-    all_groups = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
-    todo = [(i, others) for i, (*_, files) in enumerate(all_groups) for others in (False, True)
-            if any(_name(name, others) not in row_of for name, _ in files)
-            and (not others or len(_rest(all_groups, i)) > 1)]
-    _GROUPS[:] = all_groups  # which the processes inherit: logs and ways to them need not travel
-    with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
-        for i, others, rows in pool.map(_compared, todo):
-            row_of |= {row["file"]: row for row in rows}
-            if args.keep:
-                with args.keep.open("a") as out:
-                    out.writelines(json.dumps(row) + "\n" for row in rows)
-            print(f"{all_groups[i][0]}, {all_groups[i][2]}{', other groups' if others else ''}: {len(rows)} flights",
-                  file=sys.stderr, flush=True)
-    cases, alike, groups_of, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
-    for of, _, group, vehicle, files in all_groups:
-        groups_of[of].add(group)
-        flown_by[of] = vehicle.name
-        for others in (False, True):
-            for row in (row_of[key] for name, _ in files if (key := _name(name, others)) in row_of):
-                strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
-                cases[of].append(ApparentStrengths(strengths, errors, row["rate"], row["passing"]))
-                if not others:
-                    alike[of].append(cases[of][-1])
-    classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
-    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups"
-              for of, flights in cases.items()}
-    write(args.out, text_of(classes, counts))
+    else:
+        write(args.out, text_of(*scatter_of_classes(compare_all(args.keep, args.jobs))))
 
 
 def write(path: Path, text: str) -> None:

@@ -25,7 +25,7 @@ from airtouch.report.figures import reliability
 from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
 
 CHANNELS = ("motor mean", "gyro x", "ax")  #: that are drawn
-OFFSET = 5  #: usual swings between two channels
+OFFSET = 5  #: nominal amplitudes between two channels
 MARGIN_S = (6, 5)  #: s before the first edge and after the last
 
 
@@ -60,7 +60,7 @@ def draw(log, model, name: str) -> bytes:
         for i, channel in enumerate(CHANNELS):
             axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=GREY)
         axes[0].set_yticks([OFFSET * (len(CHANNELS) - 1 - i) for i in range(len(CHANNELS))], CHANNELS)
-        axes[0].set_title(f"{name}: what the drone feels, in units of its usual swing", loc="left")
+        axes[0].set_title(f"{name}: what the drone feels, in units of its nominal amplitude", loc="left")
         axes[1].plot(t, trace.probability, color=BLUE, lw=1)
         axes[1].set(ylim=(-0.05, 1.25), yticks=(0, 1), ylabel="P(over)")
         lag = best.lag_s(model)

@@ -31,7 +31,8 @@ COMMAND = "tools/train_without_acceleration.py"  #: in the model's metadata
 ABSENT = ("acceleration",)  #: sensors that the detector does without
 
 
-def fit(flights: Sequence[adapt.Flight], twin: Path, air: Sequence[FlightLog], least: float, seed: int) -> BestModel:
+def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightLog], least: float,
+        seed: int) -> BestModel:
     """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
     scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
     twin_flights, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
@@ -62,7 +63,8 @@ def main() -> None:
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
     air = free_air.read(options.free_air) if options.free_air else []
-    model = fit([adapt.Flight(f, readable[f.path]) for f in listed], options.twin, air, options.least, options.seed)
+    flights = [adapt.LoadedFlight(f, readable[f.path]) for f in listed]
+    model = fit(flights, options.twin, air, options.least, options.seed)
     model.save(options.out, options.force)
     print(f"written: {options.out}")
 

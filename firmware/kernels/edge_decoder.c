@@ -5,12 +5,12 @@
 // A magnitude: probabilities of 0.0003 and 0.9997. One wild logit moves the smoothed one no further than that.
 #define LOGIT_LIMIT 8.0f
 // The smoothed logit before anything is known: over a platform with a probability of 0.05.
-#define SLOW_AT_START (-3.0f)
+#define SMOOTHED_AT_START (-3.0f)
 // Steps at which the count since the last edge stops, 248 days at 50 Hz: "never yet", and far from wrapping.
 #define LONG_AGO 0x3fffffffu
 
 static void forget(edgeDecoder_t *decoder) {
-  decoder->smoothedOver = SLOW_AT_START;
+  decoder->smoothedOver = SMOOTHED_AT_START;
   decoder->since = LONG_AGO;
   decoder->over = false;
   decoder->waiting = 0;

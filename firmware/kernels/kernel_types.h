@@ -84,8 +84,8 @@ typedef struct {
 /** Settings of the motion channels (motion_channels.h). */
 typedef struct {
   airtouchVehicle_t vehicle;
-  float inverseScale[MOTION_CHANNELS - 1];  ///< 1 over each channel's nominal swing
-  float limit;                              ///< channels are clamped to this magnitude, in nominal swings
+  float inverseScale[MOTION_CHANNELS - 1];  ///< 1 over each channel's nominal amplitude
+  float limit;                              ///< channels are clamped to this magnitude, in nominal amplitudes
   float armPwm;                             ///< airborne while the mean PWM is above this
   float slowGain;                           ///< of the slow means, a sample
   float lagGain;                            ///< of the thrust's lag, a sample

@@ -1,7 +1,7 @@
 /**
  * @file motion_channels.h
  * What the streaming detector sees of a sample: twelve channels without the slow
- * drift of battery and trim, each in units of its own nominal swing.
+ * drift of battery and trim, each in units of its own nominal amplitude.
  *
  * 0-2   level acceleration x, y, z without gravity, m/s^2
  * 3-5   angular rate x, y, z, rad/s

@@ -106,9 +106,9 @@ static void putBody(writer_t *to, const edgeLinkPacket_t *packet) {
     default:
       put(to, beat->uptimeMs, 4);
       put(to, beat->expected, 4);
-      put(to, beat->taken, 4);
-      put(to, beat->lost, 4);
-      put(to, beat->refused, 4);
+      put(to, beat->samplesTaken, 4);
+      put(to, beat->samplesLost, 4);
+      put(to, beat->packetsRefused, 4);
       put(to, beat->algorithm, 1);
       put(to, beat->flags, 1);
       putBytes(to, beat->digest, EDGE_LINK_DIGEST_BYTES);
@@ -162,9 +162,9 @@ static bool getResult(reader_t *from, edgeLinkResult_t *result) {
 static void getHeartbeat(reader_t *from, edgeLinkHeartbeat_t *beat) {
   beat->uptimeMs = get(from, 4);
   beat->expected = get(from, 4);
-  beat->taken = get(from, 4);
-  beat->lost = get(from, 4);
-  beat->refused = get(from, 4);
+  beat->samplesTaken = get(from, 4);
+  beat->samplesLost = get(from, 4);
+  beat->packetsRefused = get(from, 4);
   beat->algorithm = (uint8_t)get(from, 1);
   beat->flags = (uint8_t)get(from, 1);
   getBytes(from, beat->digest, EDGE_LINK_DIGEST_BYTES);

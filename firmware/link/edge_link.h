@@ -49,7 +49,7 @@ typedef enum {
 /** Flags of a result. */
 enum {
   EDGE_LINK_UNKNOWN = 1,   ///< the session is not the GAP8's: it was reset, or never told
-  EDGE_LINK_GAP = 2,       ///< the samples begin after the one that is expected; nothing was taken
+  EDGE_LINK_GAP = 2,       ///< the samples begin after the expected one; none was used
   EDGE_LINK_FILLING = 4,   ///< the network has not seen a whole window of this stream yet
   EDGE_LINK_MISMATCH = 8,  ///< the GAP8 has another model, or none, for this algorithm
   EDGE_LINK_EMPTY = 16,    ///< no sample of this session has come yet; `expected` means nothing
@@ -57,7 +57,7 @@ enum {
 
 /** RESET: the header's session begins. */
 typedef struct {
-  uint32_t nonce;  ///< very likely other after each start of the STM32, so that session numbers may begin anew
+  uint32_t nonce;  ///< differs from start to start of the STM32, so that session numbers may begin anew
   uint8_t algorithm;
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];  ///< of the model whose answers the STM32 will understand
 } edgeLinkReset_t;
@@ -87,11 +87,11 @@ typedef struct {
 typedef struct {
   uint32_t uptimeMs;
   uint32_t expected;
-  uint32_t taken;     ///< samples used since start
-  uint32_t lost;      ///< samples that never came
-  uint32_t refused;   ///< packets that were not understood
-  uint8_t algorithm;  ///< 0 for none
-  uint8_t flags;      ///< as in a result
+  uint32_t samplesTaken;    ///< used since start
+  uint32_t samplesLost;     ///< that never came
+  uint32_t packetsRefused;  ///< that were not understood
+  uint8_t algorithm;        ///< 0 for none
+  uint8_t flags;            ///< as in a result
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
 } edgeLinkHeartbeat_t;
 

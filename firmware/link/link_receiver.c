@@ -151,9 +151,9 @@ uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint
   edgeLinkHeartbeat_t *beat = &packet.heartbeat;
   beat->uptimeMs = uptimeMs;
   beat->expected = receiver->expected;
-  beat->taken = receiver->samplesTaken;
-  beat->lost = receiver->samplesLost;
-  beat->refused = receiver->packetsRefused;
+  beat->samplesTaken = receiver->samplesTaken;
+  beat->samplesLost = receiver->samplesLost;
+  beat->packetsRefused = receiver->packetsRefused;
   beat->flags = flagsOf(receiver);
   if (receiver->network != NULL) {
     beat->algorithm = receiver->network->algorithm;

@@ -23,7 +23,8 @@ static uint8_t nextSession(const linkSender_t *sender) {
   return (uint8_t)(sender->session == 255 ? 1 : sender->session + 1);
 }
 
-static void restartAnew(linkSender_t *sender) { restart(sender, nextSession(sender)); }
+/** The stream begins again in a session of its own. */
+static void beginNextSession(linkSender_t *sender) { restart(sender, nextSession(sender)); }
 
 /** The next try is due. */
 static void makeRetryDue(linkSender_t *sender) { sender->sinceRetry = UINT16_MAX; }
@@ -172,7 +173,7 @@ bool linkSenderAccept(linkSender_t *sender, uint32_t sequence) {
 }
 
 static int newAnswers(linkSender_t *sender, const edgeLinkResult_t *result, linkAnswer_t *answers) {
-  int found = 0;
+  int fresh = 0;
   for (int i = 0; i < result->count; i++) {
     const edgeLinkAnswer_t *answer = &result->answer[i];
     const uint32_t sequence = result->expected - answer->back;
@@ -180,11 +181,11 @@ static int newAnswers(linkSender_t *sender, const edgeLinkResult_t *result, link
     if (!recent || !linkSenderAccept(sender, sequence)) {
       continue;
     }
-    answers[found].sequence = sequence;
-    memcpy(answers[found].output, answer->output, EDGE_LINK_OUTPUTS);
-    found++;
+    answers[fresh].sequence = sequence;
+    memcpy(answers[fresh].output, answer->output, EDGE_LINK_OUTPUTS);
+    fresh++;
   }
-  return found;
+  return fresh;
 }
 
 /** Confirms what the receiver has, and goes back where it lacks something. */
@@ -210,12 +211,12 @@ static int takeResult(linkSender_t *sender, const edgeLinkResult_t *result, link
   }
   if (result->flags & EDGE_LINK_UNKNOWN) {
     sender->counters.resets += sender->state == LINK_STARTING ? 0 : 1;
-    restartAnew(sender);
+    beginNextSession(sender);
     return 0;
   }
   const bool empty = (result->flags & EDGE_LINK_EMPTY) != 0;
   if (!empty && edgeLinkAfter(result->expected, sender->samples) > 0) {
-    restartAnew(sender);  // it confirms what was never sent: not our stream
+    beginNextSession(sender);  // it confirms what was never sent: not our stream
     return 0;
   }
   sender->state = result->flags & (EDGE_LINK_FILLING | EDGE_LINK_EMPTY) ? LINK_FILLING : LINK_UP;
@@ -231,7 +232,7 @@ static void takeHeartbeat(linkSender_t *sender, uint8_t session) {
   const bool ours = session == sender->session;
   if (!ours && sender->state != LINK_STARTING && sender->state != LINK_REFUSED) {
     sender->counters.resets++;
-    restartAnew(sender);
+    beginNextSession(sender);
   }
   if (!ours || sender->state != LINK_REFUSED) {
     makeRetryDue(sender);

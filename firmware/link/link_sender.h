@@ -90,7 +90,7 @@ typedef struct {
  * @param algorithm  an edgeLinkAlgorithm_t
  * @param digest     of the model that the GAP8 must have
  * @param refill     samples of the past that the network needs, at most LINK_HISTORY
- * @param nonce      very likely other after each start of this processor
+ * @param nonce      very likely differs from start to start of this processor, as its clock in us does
  * @param session    1 to 255, other than that of the stream before
  */
 void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t digest[EDGE_LINK_DIGEST_BYTES],
@@ -117,8 +117,8 @@ void linkSenderSent(linkSender_t *sender, bool taken);
 int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, linkAnswer_t *answers);
 
 /**
- * Whether an answer to this sample is news; it is none any more afterwards. For answers that
- * were found without the GAP8.
+ * Notes that the sample of this sequence is answered: for answers that were computed without the GAP8 (app_local.h).
+ * @return whether it lies behind the last one that was answered; if not, the answer is old and to be dropped
  */
 bool linkSenderAccept(linkSender_t *sender, uint32_t sequence);
 

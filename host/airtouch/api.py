@@ -252,6 +252,7 @@ def _several(flights: Any) -> list[Any]:
 
 
 def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
+    """The named vehicle, or that of the first log for None, with a warning where no file is known of it."""
     from airtouch import vehicle as vehicles
 
     if named is None:
@@ -263,6 +264,7 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
 
 
 def _pandas() -> Any:
+    """The module pandas. Raises AirTouchError where it is not installed."""
     try:
         import pandas
     except ImportError:

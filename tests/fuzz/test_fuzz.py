@@ -18,7 +18,7 @@ PLANTED = {
     "receiver": ("firmware/link/link_receiver.c", "if (edgeLinkAfter(first, receiver->expected) > 0) {",
                  "if (false) {"),
     "fr_cfar": ("firmware/kernels/fr_cfar.c", "self->oldest + 1u == self->lag ?", "self->oldest + 1u > self->lag ?"),
-    "edge_decoder": ("firmware/kernels/edge_decoder.c", "decoder->smoothedOver = SLOW_AT_START;\n", "\n"),
+    "edge_decoder": ("firmware/kernels/edge_decoder.c", "decoder->smoothedOver = SMOOTHED_AT_START;\n", "\n"),
     "networks": ("gap8/kernels/max_pool_int8.c", "value > most ? value : most", "value"),
 }
 

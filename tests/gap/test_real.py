@@ -16,7 +16,7 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, caps
         return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": case.flight.split("/")[-1],
                 "effects": [], "verdict": "none"}
 
-    monkeypatch.setattr(gap_real, "answered", blind)
+    monkeypatch.setattr(gap_real, "diagnose_case", blind)
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
     assert gap_real.main([str(flights), "--quick"]) == 1
     assert "wrong, more than" in capsys.readouterr().err

@@ -59,7 +59,7 @@ def test_channels_equal_the_reference_on_real_flights(flights):
         log = logs.read(path)
         parts = level_acceleration(log), log.stack(GYRO), log.stack(PWM)
         worst = max(worst, float(np.abs(c.motion_channels(*parts)[0] - motion_channels(*parts)[0]).max()))
-    print(f"largest difference of a channel: {worst:.1e} of its nominal swing")
+    print(f"largest difference of a channel: {worst:.1e} of its nominal amplitude")
     assert worst < 1e-4
 
 

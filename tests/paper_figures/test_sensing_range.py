@@ -16,7 +16,7 @@ def test_curves_are_the_published_ones():
 def test_the_measured_curve_is_what_neural_swarm_flew():
     """34 g: 9.0, 5.2, 2.0 and -0.1 % at 2, 4, 6 and 9 cm above standing, the rotors 29 mm higher."""
     heights = np.array([0.02, 0.04, 0.06, 0.09]) + 0.029
-    assert 100 * sensing_range.measured(heights, "crazyflie-34g") == pytest.approx([9.0, 5.2, 2.0, -0.1], abs=0.8)
+    assert 100 * sensing_range.measured_gain(heights, "crazyflie-34g") == pytest.approx([9.0, 5.2, 2.0, -0.1], abs=0.8)
 
 
 def test_reach_inverts_a_curve():

@@ -21,6 +21,6 @@ def test_labels_by_place_are_a_step_of_the_down_range_and_nothing_else():
     log = FlightLog({"t_s": 0.01 * np.arange(n), "zrange_m": np.full(n, 0.04), **{f"m{i}_pwm": np.full(n, 4e4)
                                                                              for i in range(1, 5)}},
                     {"source": "made", "sample_period_s": 0.01})
-    labelled = simulated.labelled(log, lambda _: [Edge(300, "entry", 0, 0), Edge(500, "exit", 0, 0)])
+    labelled = simulated.with_truth(log, lambda _: [Edge(300, "entry", 0, 0), Edge(500, "exit", 0, 0)])
     assert [(e.sample, e.kind) for e in true_edges(labelled)] == [(300, "entry"), (500, "exit")]
     assert all(np.array_equal(labelled[c], log[c]) for c in log.columns if c != "zrange_m")

@@ -132,7 +132,7 @@ def test_each_stage_is_what_it_adds(tmp_path):
     path.write_text(measured(LEVELS))
     powers = ina219.by_stage(ina219.parse(path.read_text(), "run.csv"), KNOWN)
     assert list(powers) == list(KNOWN)
-    for name, (mw, half) in ina219.added(powers).items():
+    for name, (mw, half) in ina219.added_power(powers).items():
         assert mw == pytest.approx(stages.PAPER_MW[name], abs=2 * half + 0.1) and 0.0 < half < 1.0
     table = stages.table(powers)
     assert re.search(r"Physical Knowledge-aided Network\s+3[23]\.\d \[.*\]\s+3[23]\d\s+33\s", table)

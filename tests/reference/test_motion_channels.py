@@ -29,7 +29,7 @@ def test_a_steady_hover_is_nothing():
     np.testing.assert_allclose(channels, 0.0, atol=1e-9)
 
 
-def test_each_signal_has_its_channel_and_its_swing():
+def test_each_signal_has_its_channel_and_its_amplitude():
     acc, rate, pwm = still(100)
     acc += [0.1, 0.2, 0.3]
     rate += [0.01, 0.02, 0.03]

@@ -31,7 +31,7 @@ def test_only_the_channel_that_is_read_matters_when_muted(name):
     span = SimpleNamespace(entry=int(edges[0]), exit=int(edges[-1]))
     channel = high_edges.CHANNELS.index(name)
     assert np.ptp(x[span.entry:span.exit, channel]) > 0.0
-    changes = high_edges.muted(log, span, one_channel(channel))[1:]
+    changes = high_edges.mute_each_channel(log, span, one_channel(channel))[1:]
     assert changes[channel] != 0.0
     np.testing.assert_array_equal(np.delete(changes, channel), 0.0)
 

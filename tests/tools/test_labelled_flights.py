@@ -78,17 +78,17 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     """One labelled flight, the other of its day without down range; the scored day is in neither training."""
     start = best.fit([made_flight(9)], recipe=SMALL)
     start.save(tmp_path / "start.npz")
-    monkeypatch.setattr(labelled_flights, "simulated",
+    monkeypatch.setattr(labelled_flights, "twin_flights",
                         lambda folder, pool: adapt.SimulatedFlights([made_flight(20)], [None]))
     taught, begun = [], []
 
-    def self_trained(start, teacher, labelled, unlabelled, *rest):
+    def self_train(trainer, teacher, labelled, unlabelled, progress=None):
         taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in unlabelled]))
-        begun.append(start)
+        begun.append(trainer.start)
         assert all(not f.labelled for f in unlabelled)
         return teacher
 
-    monkeypatch.setattr(adapt, "self_trained", self_trained)
+    monkeypatch.setattr(adapt.Trainer, "self_train", self_train)
     trained = []
     monkeypatch.setattr(best, "fit", lambda flights, *_, **__: trained.append(len(flights)) or start)
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
@@ -124,7 +124,7 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
 def test_draws_of_a_flight_add_up():
     edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
     score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
-    both = labelled_flights.merged([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
+    both = labelled_flights.merge([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
     assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
         ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
     assert both[0].windows == (2, 4, 6, 8)

@@ -59,7 +59,7 @@ def test_recorded_and_simulated_flights_have_half_each_and_no_acceleration(train
     assert scene == "twin/scenario.toml" and least == 0.3
     assert len(flights) == 2 + 6, "fold 1 is held out"
     assert sum(options["emphasis"][:2]) == pytest.approx(sum(options["emphasis"][2:]))
-    assert all("acceleration" in sensors.missing(log) for log in flights)
+    assert all("acceleration" in sensors.missing_sensors(log) for log in flights)
     assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
     log = made_flight(3)
     shaken = log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + np.sin(np.arange(len(log)))})

@@ -1,5 +1,6 @@
 """The top folder holds what a reader expects there, and nothing that a run left behind."""
 
+import re
 import shutil
 import subprocess
 from fnmatch import fnmatch
@@ -48,3 +49,10 @@ def test_a_folder_of_tests_is_named_as_the_folder_that_it_tests():
 def test_no_folder_of_tests_holds_more_than_a_reader_overlooks():
     folders = {path.parent for path in (ROOT / "tests").rglob("test_*.py")}
     assert {str(f.relative_to(ROOT)): n for f in folders if (n := len(list(f.glob("test_*.py")))) > 15} == {}
+
+
+def test_every_tool_is_in_the_list_of_tools():
+    tools = ROOT / "tools"
+    there = {p.name for p in tools.iterdir() if p.suffix == ".py" or (p.is_dir() and p.name != "__pycache__")}
+    listed = set(re.findall(r"`([\w.-]+)`", (tools / "README.md").read_text("utf-8")))
+    assert there - listed == set()

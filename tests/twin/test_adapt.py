@@ -37,7 +37,7 @@ def quick(monkeypatch):
 def flights_of(sweeps, count, down=True):
     def of(log):
         return log if down else FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
-    return [adapt.Flight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
+    return [adapt.LoadedFlight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
             for i, (_, log, _) in enumerate(sweeps[:count])]
 
 
@@ -143,14 +143,14 @@ def adapt_vehicle():
 def test_no_flight_is_in_training_and_held_out_at_once(sweeps, tmp_path, monkeypatch):
     """Each held-out flight is scored once, by a model whose training flights lack it."""
     scored = []
-    monkeypatch.setattr(adapt, "together",
-                        lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
+    monkeypatch.setattr(adapt.Trainer, "fit_all",
+                        lambda self, twin, flights, progress: frozenset(str(f.file.path) for f in flights))
     monkeypatch.setattr(adapt.cache, "model", lambda path, make: make())
     monkeypatch.setattr(adapt.cache, "scores", lambda path, make: make())
     monkeypatch.setattr(adapt, "score_flights", lambda flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(sweeps, 8)
-    scores, half_scores = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
+    scores, half_scores = adapt.held_out_scores(adapt.Trainer(None, None, 0, ""), None, flights, tmp_path, "key")
     assert sorted(scores) == sorted(half_scores) == sorted(str(f.file.path) for f in flights)
     for test, train in scored:
         assert not test & train and train
@@ -170,7 +170,7 @@ def trainings(monkeypatch):
 
     def fit(flights, seed, **options):
         calls.append({**options, "flights": flights})
-        return best.timed(trained(len(calls)), options["lag_of"])
+        return best.with_lag(trained(len(calls)), options["lag_of"])
 
     def labels(flights, model):
         if flights:
@@ -192,19 +192,19 @@ def test_labelled_flights_are_half_of_what_is_learnt(sweeps, trainings):
     """From `start`, with the twin's flights beside them, and with the lag of the recorded flights."""
     simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[3:8]], [None] * 5)
     labelled, start, twin = flights_of(sweeps, 2), object(), object()
-    model = adapt.together(start, twin, labelled, simulated, 0, None, "")
+    model = adapt.Trainer(start, simulated, 0, "").fit_all(twin, labelled)
     (training,) = trainings
     assert model.metadata == {"number": 1, "lag_s": pytest.approx(0.3)}
     assert training["start"] is start and len(training["flights"]) == 7 and training["pseudo_labels"] == [None] * 7
     assert sum(training["emphasis"][:2]) == pytest.approx(sum(training["emphasis"][2:]))
-    assert adapt.together(start, twin, [], simulated, 0, None, "") is twin
+    assert adapt.Trainer(start, simulated, 0, "").fit_all(twin, []) is twin
 
 
 def test_flights_without_labels_get_those_of_the_twins_detector(sweeps, trainings):
     """Three flights, the second without an edge that it sees, the third with an entry alone: the first is learnt."""
     simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[3:8]], [None] * 5)
     start, twin = object(), object()
-    adapt.together(start, twin, flights_of(sweeps, 3, down=False), simulated, 0, None, "")
+    adapt.Trainer(start, simulated, 0, "").fit_all(twin, flights_of(sweeps, 3, down=False))
     teacher, training, student, *_ = trainings
     assert teacher is twin and training["start"] is start and student.metadata["number"] == 2
     assert [len(x) if x else x for x in training["pseudo_labels"]] == [2] + [None] * 5
@@ -215,7 +215,7 @@ def test_a_detector_of_labelled_flights_labels_the_others(sweeps, trainings):
     """Of five flights without labels those in which it sees an entry without exit, or nothing, are left out."""
     simulated = adapt.SimulatedFlights([log for _, log, _ in sweeps[:4]], [None] * 4)
     flights = [*flights_of(sweeps, 3), *flights_of(sweeps, 8, down=False)[3:]]
-    model = adapt.together(None, object(), flights, simulated, 0, None, "")
+    model = adapt.Trainer(None, simulated, 0, "").fit_all(object(), flights)
     first, teacher, second, better, third = trainings
     assert len(first["flights"]) == 3 + 4 and teacher.metadata["number"] == 1 and better.metadata["number"] == 3
     assert model.metadata["number"] == 5 and third["flights"] == second["flights"]
@@ -229,7 +229,7 @@ def test_a_teacher_that_sees_nothing_is_the_detector(sweeps, trainings, monkeypa
     monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
     simulated = adapt.SimulatedFlights([sweeps[0][1]], [None])
     flights = [*flights_of(sweeps, 2), *flights_of(sweeps, 4, down=False)[2:]]
-    model = adapt.together(None, object(), flights, simulated, 0, None, "")
+    model = adapt.Trainer(None, simulated, 0, "").fit_all(object(), flights)
     assert model.metadata["number"] == len(trainings) == 1
 
 
@@ -238,10 +238,10 @@ def test_the_lag_is_that_of_recorded_flights(sweeps, trainings):
     log = sweeps[0][1]
     edges = logs.true_edges(log)
     early = [replace(e, sample=e.sample - 10) for e in edges]
-    assert best.timed(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
-    assert best.timed(trained(0), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
-    assert best.timed(trained(0, 0.7), ([log], [[]])).metadata["lag_s"] == 0.7
-    assert best.timed(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
+    assert best.with_lag(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
+    assert best.with_lag(trained(0), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
+    assert best.with_lag(trained(0, 0.7), ([log], [[]])).metadata["lag_s"] == 0.7
+    assert best.with_lag(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
 
 
 def score(error_m):

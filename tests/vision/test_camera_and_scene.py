@@ -71,7 +71,7 @@ def test_a_ray_beside_the_platform_meets_the_floor_and_one_at_the_sky_nothing():
 def test_blur_is_as_long_as_speed_times_exposure_times_focal_length_over_height():
     speed, seconds, height = 0.3, 0.02, 0.04
     places = [np.array([speed * seconds * s, 0.0, 0.76 + height]) for s in np.linspace(-0.5, 0.5, 41)]
-    row = scenes().blurred(CAMERA, [scenes().Pose(p, LEVEL) for p in places], plain_scene(0.0, 1.0))[120]
+    row = scenes().blur(CAMERA, [scenes().Pose(p, LEVEL) for p in places], plain_scene(0.0, 1.0))[120]
     ramp = np.count_nonzero((row > 0.01) & (row < 0.99))
     assert blur_px(CAMERA, speed, seconds, height) == pytest.approx(27.0)
     assert ramp == pytest.approx(27.0, abs=1.5)

@@ -20,10 +20,10 @@ def test_a_straight_edge_is_found_where_it_crosses_the_middle_row(column, tilt_d
     rows, columns = np.mgrid[0:244, 0:324]
     image = np.where(columns > column + np.tan(np.radians(tilt_deg)) * (rows - 121.5), 200, 60).astype(np.uint8)
     image = np.clip(image + np.random.default_rng(4).normal(0, 20, image.shape), 0, 255).astype(np.uint8)
-    line = lines.strongest(lines.classical(lines.binned(image)), CAMERA)
+    line = lines.strongest(lines.classical(lines.shrink(image)), CAMERA)
     assert line.column == pytest.approx(column + 0.5, abs=1.0)
     empty = np.full((244, 324), 120) + np.random.default_rng(5).normal(0, 20, (244, 324))
-    assert lines.strongest(lines.classical(lines.binned(empty)), CAMERA).strength < 0.3 * line.strength
+    assert lines.strongest(lines.classical(lines.shrink(empty)), CAMERA).strength < 0.3 * line.strength
 
 
 def level_flight(speed=0.3, clearance=0.04):
@@ -56,9 +56,9 @@ def test_in_good_light_the_camera_places_both_edges_within_a_centimetre():
     from airtouch.vision import compare, lines
 
     film = made_film()
-    sights = compare.filmed([film], 500.0, {"classical": lines.classical}, 7)["classical"]
+    sights = compare.sights_of_films([film], 500.0, {"classical": lines.classical}, 7)["classical"]
     detections = compare.crossings([film], sights, compare.threshold([film], sights))
-    score = compare.scored([film], detections)[0]
+    score = compare.flight_scores([film], detections)[0]
     assert [e.detected_sample is not None for e in score.edges] == [True, True] and score.false == ()
     assert max(abs(e.error_m) for e in score.edges) < 0.01
 
@@ -79,13 +79,13 @@ def test_a_line_ahead_is_crossed_after_its_distance_over_the_speed():
 
 
 def test_a_fusion_weighs_pairs_and_drops_or_keeps_single_edges():
-    from airtouch.vision.compare import Fusion, fused
+    from airtouch.vision.compare import Fusion, fuse
 
     camera = [Detection(100, "edge"), Detection(400, "edge")]
     airtouch = [Detection(140, "entry"), Detection(700, "exit")]
-    assert [d.sample for d in fused(camera, airtouch, Fusion(0.25, True, True))] == [130, 400, 700]
-    assert [d.sample for d in fused(camera, airtouch, Fusion(1.0, False, True))] == [100, 700]
-    assert [d.sample for d in fused(camera, airtouch, Fusion(0.0, True, False))] == [140, 400]
+    assert [d.sample for d in fuse(camera, airtouch, Fusion(0.25, True, True))] == [130, 400, 700]
+    assert [d.sample for d in fuse(camera, airtouch, Fusion(1.0, False, True))] == [100, 700]
+    assert [d.sample for d in fuse(camera, airtouch, Fusion(0.0, True, False))] == [140, 400]
 
 
 @pytest.mark.parametrize(("camera_off", "airtouch_off"), [(1, 20), (20, 1)])

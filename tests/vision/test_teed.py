@@ -37,7 +37,7 @@ def test_the_network_in_numpy_has_keras_outputs():
     for layer in model.layers:  # biases too, which start at 0
         layer.set_weights([rng.normal(scale=0.3, size=w.shape) for w in layer.get_weights()])
     image = rng.integers(0, 255, (24, 40)).astype(np.uint8)
-    logit = np.asarray(model(teed.normalised(image)[None, ..., None]))[0, ..., 0]
+    logit = np.asarray(model(teed.normalise(image)[None, ..., None]))[0, ..., 0]
     assert np.ptp(logit) > 0.1
     assert teed.infer(teed.weights_of_keras(model), image) == pytest.approx(1.0 / (1.0 + np.exp(-logit)), abs=1e-5)
 

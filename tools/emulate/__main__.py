@@ -38,7 +38,7 @@ CHANGES: dict[int, dict[str, float]] = {
     300: {"detector": 1, "scoreIn": 2.3}}
 
 
-def recorded(count: int) -> list[FlightLog]:
+def recorded_flights(count: int) -> list[FlightLog]:
     """So many recorded flights, or a simulated one where none are here."""
     folder = Path(os.environ.get("AIRTOUCH_FLIGHTS", build.ROOT.parent / "shared" / "flights"))
     logs = [read(path) for path in sorted(folder.glob(RECORDED))[:count]]
@@ -48,14 +48,14 @@ def recorded(count: int) -> list[FlightLog]:
     return [log] if isinstance(log, FlightLog) else []
 
 
-def later(log: FlightLog, begin: int) -> FlightLog:
+def from_row(log: FlightLog, begin: int) -> FlightLog:
     """The log from this row on. AirTouchError where it has none."""
     if begin >= len(log):
         raise AirTouchError(f"{log.meta.get('source', 'the flight')} has {len(log)} rows: --begin must be less")
     return FlightLog({name: values[begin:] for name, values in log.columns.items()}, log.meta)
 
 
-def show(what: str, seconds: float, result: Replay) -> None:
+def print_replay(what: str, seconds: float, result: Replay) -> None:
     """A line of the table, and what differed."""
     task, words = result.least_left
     print(f"{what}: {result.steps} steps, {result.different} differ, prob within {result.prob_off:.1g}; edges "
@@ -155,13 +155,13 @@ def flights_of(options: argparse.Namespace) -> list[FlightLog]:
     height.cases(options.only)
     if options.keep:
         make_folder(options.keep)
-    logs = [later(read(path), options.begin) for path in options.flights]
+    logs = [from_row(read(path), options.begin) for path in options.flights]
     for log in logs:
         rows(log)
     return logs
 
 
-def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
+def replay_and_print(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
     """Replay and print; parameters change in the last flight. Steps that differ."""
     different = 0
     for i, log in enumerate(logs):
@@ -170,7 +170,7 @@ def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
         result = replay(elf, log, steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
-        show(name, time.monotonic() - start_s, result)
+        print_replay(name, time.monotonic() - start_s, result)
         different += result.different
     return different
 
@@ -188,10 +188,10 @@ def main(arguments: list[str]) -> int:
         return 0 if report(elf, build.platform(), options.seeds, options.traces, options.force) else 1
     if options.height:
         return 0 if height.report(elf, build.platform(), options.seeds, options.only, options.keep) else 1
-    logs = logs or [later(log, options.begin) for log in recorded(1 if options.gap8 else 2)]
+    logs = logs or [from_row(log, options.begin) for log in recorded_flights(1 if options.gap8 else 2)]
     if options.gap8:
         return 0 if gap8.report(elf, logs[0], options.steps) else 1
-    return 1 if replayed(elf, logs, options.steps) else 0
+    return 1 if replay_and_print(elf, logs, options.steps) else 0
 
 
 if __name__ == "__main__":

@@ -138,7 +138,7 @@ class Board:
             ready, _, _ = select.select([self._from], [], [], PATIENCE_S)
             new = os.read(self._from, length - len(got)) if ready else b""
             if not new:
-                how = f"said nothing for {PATIENCE_S:.0f} s" if not ready else self._ended()
+                how = f"said nothing for {PATIENCE_S:.0f} s" if not ready else self._ending()
                 raise AirTouchError(f"the board {how}; {self._last()}")
             got += new
         return got
@@ -152,7 +152,7 @@ class Board:
         """Function and offset of an address in the program."""
         return Elf(self.elf).where(address & ~1)
 
-    def _ended(self) -> str:
+    def _ending(self) -> str:
         """The exit code of the board and the end of its output, in words."""
         output = self._qemu.communicate()[0].decode(errors="replace")
         return f"has stopped with code {self._qemu.returncode}. {output[-1000:]}"

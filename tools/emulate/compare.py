@@ -93,7 +93,7 @@ def fly_mission(elf: Path, drone: Vehicle, seed: int) -> Mission:
     return Mission(seed, on, off, coarse_on, coarse_off, side_by_side.own_loop(plan, drone, seed))
 
 
-def show(one: Mission) -> None:
+def print_mission(one: Mission) -> None:
     """Print what one mission shows."""
     plan = scenario.load(SCENARIO)
     other, n, first, by = differing(one.on, one.off)
@@ -141,7 +141,7 @@ def report(elf: Path, platform: str = "cf2", seeds: int = 1, traces: Path | None
     missions = []
     for seed in range(1, seeds + 1):
         missions.append(fly_mission(elf, vehicle(platform), seed))
-        show(missions[-1])
+        print_mission(missions[-1])
     show_side_by_side(missions, vehicle(platform))
     if traces:
         side_by_side.write_traces(traces, missions[0].on, missions[0].own, force)

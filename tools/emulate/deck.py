@@ -86,7 +86,7 @@ class Deck:
     def _take(self, content: bytes) -> None:
         """Take bytes from the board and handle each whole CPX packet."""
         self._bytes += content
-        while (whole := self._whole()) is not None:
+        while (whole := self._take_frame()) is not None:
             if whole == CLEAR:
                 self._clear = True
             elif (whole[2] & 7, whole[3] & 63) == (GAP8, APP):  # others are for the ESP32: the WiFi's name and key
@@ -97,7 +97,7 @@ class Deck:
             self._flush()
         self.board.go()
 
-    def _whole(self) -> bytes | None:
+    def _take_frame(self) -> bytes | None:
         """The first whole frame of what came, which is taken out."""
         if len(self._bytes) < 2:
             return None

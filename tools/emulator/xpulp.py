@@ -56,7 +56,7 @@ class XpulpMachine(Machine):
         self._innermost = _innermost(words)
         self._words = words
         self._forget()
-        self._uc.hook_add(uc_const.UC_HOOK_INTR, self._refused)
+        self._uc.hook_add(uc_const.UC_HOOK_INTR, self._on_unknown_instruction)
         self._uc.hook_add(uc_const.UC_HOOK_CODE, self._step)
 
     def team(self, name: str, arguments: Callable[[int], Sequence[int]], cores: int = 1) -> Cycles:
@@ -122,7 +122,7 @@ class XpulpMachine(Machine):
             self._branch = at
         self._cycles += cost
 
-    def _refused(self, uc: Any, number: int, data: object) -> None:
+    def _on_unknown_instruction(self, uc: Any, number: int, data: object) -> None:
         """An instruction that unicorn does not know: the counter already stands behind it."""
         at = (uc.reg_read(riscv.UC_RISCV_REG_PC) - 4 - self._base) >> 2
         if number != 2 or not 0 <= at < len(self._words) or not self._extension(self._words[at]):
@@ -141,15 +141,15 @@ class XpulpMachine(Machine):
                 write(_X[rd], result)
             return result is not None
         if opcode == _POST_LOAD and funct3 in _SIZES:
-            write(_X[rs1], (a + _signed(word >> 20, 12)) & 0xFFFF_FFFF)
+            write(_X[rs1], (a + _sign_extend(word >> 20, 12)) & 0xFFFF_FFFF)
             return self._load(a, rd, funct3)
         if opcode == _ALU and funct3 < 3:
-            offset = _signed((word >> 25) << 5 | rd, 12)
+            offset = _sign_extend((word >> 25) << 5 | rd, 12)
             write(_X[rs1], (a + offset) & 0xFFFF_FFFF)
             return self._store(a, rs2, 1 << funct3)
         if opcode == _ROUND and funct3 == 2 and funct7 >> 5 == 2 and rd:  # cv.addrn
             shift = funct7 & 31
-            total = _signed(_signed(a, 32) + _signed(read(_X[rs2]), 32) + (1 << shift >> 1), 32)
+            total = _sign_extend(_sign_extend(a, 32) + _sign_extend(read(_X[rs2]), 32) + (1 << shift >> 1), 32)
             write(_X[rd], (total >> shift) & 0xFFFF_FFFF)
             return True
         if opcode != _ALU or funct3 != 3:
@@ -188,7 +188,7 @@ class XpulpMachine(Machine):
 _SIZES = {0: (1, True), 1: (2, True), 2: (4, False), 4: (1, False), 5: (2, False)}
 
 
-def _signed(value: int, bits: int) -> int:
+def _sign_extend(value: int, bits: int) -> int:
     """The low bits as a signed number."""
     value &= (1 << bits) - 1
     return value - (1 << bits) if value >> (bits - 1) else value
@@ -196,7 +196,7 @@ def _signed(value: int, bits: int) -> int:
 
 def _bytes(word: int) -> list[int]:
     """The four signed bytes of a word, the lowest first."""
-    return [_signed(word >> (8 * i), 8) for i in range(4)]
+    return [_sign_extend(word >> (8 * i), 8) for i in range(4)]
 
 
 def _word(values: Sequence[int]) -> int:
@@ -222,11 +222,11 @@ def _alu(funct7: int, a: int, b: int, rs2: int, d: int) -> int | None:
 
     rs2: number of the second register, in some instructions an immediate.
     """
-    left, right = _signed(a, 32), _signed(b, 32)
+    left, right = _sign_extend(a, 32), _sign_extend(b, 32)
     simple = {0x28: lambda: abs(left), 0x29: lambda: left <= right, 0x2A: lambda: a <= b,
               0x2B: lambda: min(left, right), 0x2C: lambda: min(a, b), 0x2D: lambda: max(left, right),
-              0x2E: lambda: max(a, b), 0x30: lambda: _signed(a, 16), 0x31: lambda: a & 0xFFFF,
-              0x32: lambda: _signed(a, 8), 0x33: lambda: a & 0xFF,
+              0x2E: lambda: max(a, b), 0x30: lambda: _sign_extend(a, 16), 0x31: lambda: a & 0xFFFF,
+              0x32: lambda: _sign_extend(a, 8), 0x33: lambda: a & 0xFF,
               0x48: lambda: d + left * right, 0x49: lambda: d - left * right}
     if funct7 in simple:
         return int(simple[funct7]())
@@ -235,7 +235,7 @@ def _alu(funct7: int, a: int, b: int, rs2: int, d: int) -> int | None:
         return max(-bound, min(bound - 1, left))
     if funct7 == 0x42:  # cv.addrnr
         shift = b & 31
-        return _signed(_signed(d, 32) + left + (1 << shift >> 1), 32) >> shift
+        return _sign_extend(_sign_extend(d, 32) + left + (1 << shift >> 1), 32) >> shift
     return None
 
 
@@ -264,8 +264,8 @@ def _innermost(words: Sequence[int]) -> dict[int, tuple[int]]:
     for at, word in enumerate(words):
         if word & 0x7F != _BRANCH:
             continue
-        offset = _signed((word >> 31) << 12 | (word >> 7 & 1) << 11 | (word >> 25 & 63) << 5 | (word >> 8 & 15) << 1,
-                         13)
+        bits = (word >> 31) << 12 | (word >> 7 & 1) << 11 | (word >> 25 & 63) << 5 | (word >> 8 & 15) << 1
+        offset = _sign_extend(bits, 13)
         target = at + offset // 4
         if offset < 0 and not any(w & 0x7F in (_BRANCH, *_JUMPS) for w in words[target:at]):
             targets[at] = (target,)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from log_fuzzing.sound import motion, packed, si_columns
+from log_fuzzing.sound import motion, pack_log, si_columns
 
 
 def table(columns: dict[str, np.ndarray], comments: str = "") -> bytes:
@@ -25,7 +25,7 @@ def _flying(n: int, **changed: np.ndarray) -> dict[str, np.ndarray]:
 def usd(times: np.ndarray, version: int = 2) -> bytes:
     """A uSD log of three accelerations at the given times (microseconds, or milliseconds in version 1)."""
     variables = [(f"acc.{a}", "f") for a in "xyz"]
-    return packed(version, [(1, "fixedFrequency", variables)], [(1, int(t), [0.0, 0.1, 1.0]) for t in times])
+    return pack_log(version, [(1, "fixedFrequency", variables)], [(1, int(t), [0.0, 0.1, 1.0]) for t in times])
 
 
 def damaged_time(n: int) -> bytes:

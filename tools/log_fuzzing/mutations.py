@@ -116,11 +116,11 @@ def numbers(data: bytes, r: Random) -> bytes:
         scale, shift = r.choice((1.0, 1e-9, -1.0, 1e3, 1e9, 1e200, 0.0)), r.choice((0.0, 1e-3, 1.0, 60.0, 1e5, 1e12))
         for row in table[start:stop]:
             if column < len(row):
-                row[column] = value if kind else _scaled(row[column], scale, shift)
+                row[column] = value if kind else _scale(row[column], scale, shift)
     return _join(table)
 
 
-def _scaled(cell: bytes, scale: float, shift: float) -> bytes:
+def _scale(cell: bytes, scale: float, shift: float) -> bytes:
     """A cell's number times a scale plus a shift; any other cell as it is."""
     try:
         return b"%r" % (float(cell) * scale + shift)
@@ -179,7 +179,7 @@ def encoding(data: bytes, r: Random) -> bytes:
     return data.replace(b"e", r.choice((b"E", b"d", b"")))
 
 
-def zipped(data: bytes, r: Random) -> bytes:
+def zip_again(data: bytes, r: Random) -> bytes:
     """Packed again, in several members, with a tail, cut or damaged."""
     half = len(data) // 2
     kind = r.randrange(10)
@@ -206,11 +206,11 @@ def text(data: bytes, r: Random) -> bytes:
     """One to three mutations of a text table, now and then packed."""
     for _ in range(r.choice((1, 1, 1, 2, 3))):
         data = r.choice(TEXT)(data, r)
-    return zipped(data, r) if r.random() < 0.03 else data
+    return zip_again(data, r) if r.random() < 0.03 else data
 
 
 def packed_text(data: bytes, r: Random) -> bytes:
     """A gzipped text table: its text mutated, or its packed bytes."""
     if r.random() < 0.3:
         return any_bytes(data, r)
-    return zipped(text(gzip.decompress(data), r), r)
+    return zip_again(text(gzip.decompress(data), r), r)

@@ -10,7 +10,7 @@ from random import Random
 import pyarrow as pa
 from pyarrow import parquet
 
-from log_fuzzing.mutations import META, any_bytes, cut, zipped
+from log_fuzzing.mutations import META, any_bytes, cut, zip_again
 
 #: numbers that a cell may come to hold
 EXTREMES = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 4e38, -0.0, 1e19, 1e10, 1e12, 65536.0)
@@ -63,7 +63,7 @@ def _column(values: list, r: Random) -> pa.Array:
     return pa.array([value if start <= i < stop else v for i, v in enumerate(values)], pa.float64())
 
 
-def _written(names: list[str], arrays: list[pa.Array], meta: bytes | None, r: Random) -> bytes:
+def _write(names: list[str], arrays: list[pa.Array], meta: bytes | None, r: Random) -> bytes:
     """A Parquet file of these columns, with random settings of the writer."""
     table = pa.Table.from_arrays(arrays, names=names)
     if meta is not None:
@@ -101,7 +101,7 @@ def _table(data: bytes, r: Random) -> bytes:
             arrays = [array[:rows] for array in arrays]
         else:
             meta = r.choice((*JSON, None))
-    return _written(names, arrays, meta, r)
+    return _write(names, arrays, meta, r)
 
 
 def _footer(data: bytes, r: Random) -> bytes:
@@ -130,4 +130,4 @@ def parquet_file(data: bytes, r: Random) -> bytes:
         data = _footer(data, r) if len(data) > 12 else data
     elif kind > 0.75:
         data = b"PAR1" + any_bytes(data[4:], r) if r.random() < 0.8 else cut(data, r)
-    return zipped(data, r) if r.random() < 0.02 else data
+    return zip_again(data, r) if r.random() < 0.02 else data

@@ -133,10 +133,10 @@ def usd(flight: Motion, version: int) -> bytes:
         if i % 5 == 0:
             records.append((9, tick, [1.5]))
     events = [(7, "fixedFrequency", list(zip(table, kinds, strict=True))), (9, "estTDOA", [("distance", "f")])]
-    return packed(version, events, records)
+    return pack_log(version, events, records)
 
 
-def packed(version: int, events: list, records: list) -> bytes:
+def pack_log(version: int, events: list, records: list) -> bytes:
     """The bytes of a uSD log: events (id, name, [(variable, type)]), records (id, time, values), CRC-32."""
     out = [b"\xbc", struct.pack("<HH", version, len(events))]
     for number, name, variables in events:
@@ -163,10 +163,10 @@ def usd_old(flight: Motion) -> bytes:
     packer = struct.Struct("<" + "".join(kinds))
     rows = [packer.pack(*(v if kind == "f" else int(v) for v, kind in zip(row, kinds, strict=True)))
             for row in np.column_stack(list(table.values())).tolist()]
-    return packed_old([(name.encode(), kind) for name, kind in zip(table, kinds, strict=True)], rows, 7)
+    return pack_old_log([(name.encode(), kind) for name, kind in zip(table, kinds, strict=True)], rows, 7)
 
 
-def packed_old(variables: list, rows: list[bytes], a_block: int,
+def pack_old_log(variables: list, rows: list[bytes], a_block: int,
                other: Callable[[int, bytes], tuple[int, bytes]] = lambda count, checksum: (count, checksum)) -> bytes:
     """The bytes of an old uSD log: variables (name, type), packed rows, so many a block.
 

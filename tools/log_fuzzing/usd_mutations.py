@@ -4,7 +4,7 @@ import struct
 import zlib
 from random import Random
 
-from log_fuzzing.mutations import any_bytes, cut, zipped
+from log_fuzzing.mutations import any_bytes, cut, zip_again
 
 #: type of a variable -> its bytes
 SIZES = {"b": 1, "B": 1, "?": 1, "h": 2, "H": 2, "i": 4, "I": 4, "l": 4, "L": 4, "q": 8, "Q": 8, "e": 2, "f": 4, "d": 8}
@@ -147,4 +147,4 @@ def usd(data: bytes, r: Random) -> bytes:
     data = data + struct.pack("<I", zlib.crc32(data)) if kind < 0.7 else data + r.randbytes(r.choice((0, 1, 4, 9)))
     if kind > 0.9:
         data = cut(data, r)
-    return zipped(data, r) if r.random() < 0.02 else data
+    return zip_again(data, r) if r.random() < 0.02 else data

@@ -3,8 +3,8 @@
 import struct
 from random import Random
 
-from log_fuzzing.mutations import any_bytes, cut, zipped
-from log_fuzzing.sound import packed_old
+from log_fuzzing.mutations import any_bytes, cut, zip_again
+from log_fuzzing.sound import pack_old_log
 from log_fuzzing.usd_mutations import NAMES, PAYLOADS, SIZES, TIMES
 
 
@@ -95,6 +95,6 @@ def usd_old(data: bytes, r: Random) -> bytes:
             return count, checksum
         return r.choice((count, 0, 255, count - 1)) & 255, r.choice((checksum, r.randbytes(4), b""))
 
-    data = packed_old(log.variables, log.rows, r.choice((1, 7, 255)), other)
+    data = pack_old_log(log.variables, log.rows, r.choice((1, 7, 255)), other)
     data = cut(data, r) if r.random() < 0.1 else data
-    return zipped(data, r) if r.random() < 0.02 else data
+    return zip_again(data, r) if r.random() < 0.02 else data

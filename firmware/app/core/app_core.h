@@ -18,10 +18,11 @@
 
 #include "airtouch_stream.h"
 
-#define APP_PACKETS 2         ///< a step, at most: the CPX queue is two deep
+#define APP_PACKETS 2  ///< a step, at most: the CPX queue is two deep
+#define APP_EVENTS 4   ///< kinds of single events: appEvent_t
+// No source for these three: round numbers.
 #define APP_RECENT_STEPS 100  ///< health flags of single events stay up for so long
 #define APP_ANSWER_STEPS 50   ///< an answer of the GAP8 that is older says nothing of now
-#define APP_EVENTS 4          ///< kinds of them
 #define APP_STILL_STEPS 100   ///< of flight without a change of the horizontal acceleration, until that is a fault
 
 /** appParams_t.detector. */
@@ -102,7 +103,7 @@ bool appParamsSame(const appParams_t *one, const appParams_t *other);
  * @param params    NULL for those shipped; put right where they are out of range
  * @param haveGap8  whether there is an AI-deck; without one the detectors of the GAP8 fall back to
  *                  the same one on the STM32 (`best`) or to FR-CFAR alone (`paper`)
- * @param nonce     very likely other after each start of the processor
+ * @param nonce     very likely differs from start to start of the processor, as its clock in us does
  */
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
 

@@ -9,7 +9,7 @@
 #include "link_sender.h"
 #include "stream_detector.h"
 
-#define APP_LOCAL_AFTER 25   ///< steps of silence until the network runs here
+#define APP_LOCAL_AFTER 25   ///< steps of silence until the network runs here; no source: round number
 #define APP_LOCAL_SAMPLES 8  ///< a step, at most, while it catches up: about 2 ms
 
 /** Where it stands; plain values. */

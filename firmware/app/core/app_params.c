@@ -32,26 +32,27 @@ static uint16_t clampSetting(float *value, float low, float high, float shipped)
 uint16_t appParamsClamp(appParams_t *params) {
   appParams_t shipped;
   appParamsDefaults(&shipped);
-  uint16_t changed = clampByte(&params->enable, 1);
-  changed = (uint16_t)(changed + clampByte(&params->detector, APP_PAPER_STREAM_GAP8));
-  changed = (uint16_t)(changed + clampByte(&params->filter, APP_FILTER_AS_TRAINED));
+  uint32_t changed = clampByte(&params->enable, 1);
+  changed += clampByte(&params->detector, APP_PAPER_STREAM_GAP8);
+  changed += clampByte(&params->filter, APP_FILTER_AS_TRAINED);
   // Hz: 5 bins of 0.5 Hz are all that the band's storage has room for, at least one must lie within.
-  changed = (uint16_t)(changed + clampSetting(&params->bandWidth, 0.6f, 2.0f, shipped.bandWidth));
+  changed += clampSetting(&params->bandWidth, 0.6f, 2.0f, shipped.bandWidth);
   // Hz: a band of any width then lies between 1 and 49 Hz, above the mean's bin and below Nyquist's.
-  changed = (uint16_t)(changed + clampSetting(&params->bandMid, 2.0f, 48.0f, shipped.bandMid));
+  changed += clampSetting(&params->bandMid, 2.0f, 48.0f, shipped.bandMid);
   // No source, round numbers: far within FLT_MIN to 1, all that FR-CFAR takes.
-  changed = (uint16_t)(changed + clampSetting(&params->pFa, 1e-12f, 0.5f, shipped.pFa));
+  changed += clampSetting(&params->pFa, 1e-12f, 0.5f, shipped.pFa);
   // Neither 0 nor 1, which a probability always or never reaches, and the exit at least 0.01 below the entry.
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityIn, 0.02f, 0.99f, shipped.probabilityIn));
+  changed += clampSetting(&params->probabilityIn, 0.02f, 0.99f, shipped.probabilityIn);
   const float below = params->probabilityIn - 0.01f;
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, below, shipped.probabilityOut));
+  changed += clampSetting(&params->probabilityOut, 0.01f, below, shipped.probabilityOut);
   // Logits: what is compared with a score is at most 8 + 0.3 * 8 (edge_decoder.c, overShare), so 12 never fires. No
   // source for -8.
-  changed = (uint16_t)(changed + clampSetting(&params->scoreIn, -8.0f, 12.0f, shipped.scoreIn));
-  changed = (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, shipped.scoreOut));
+  changed += clampSetting(&params->scoreIn, -8.0f, 12.0f, shipped.scoreIn);
+  changed += clampSetting(&params->scoreOut, -8.0f, 12.0f, shipped.scoreOut);
   // Steps of 10 ms, at most 10 s: no source, round numbers.
-  changed = (uint16_t)(changed + clampSteps(&params->probabilityDwell, 10, 1000));
-  return (uint16_t)(changed + clampSteps(&params->alertHold, 1, 1000));
+  changed += clampSteps(&params->probabilityDwell, 10, 1000);
+  changed += clampSteps(&params->alertHold, 1, 1000);
+  return (uint16_t)changed;
 }
 
 /** The same bits: NaN is then the same as itself. */

@@ -74,7 +74,7 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     flat = ffi.new("flatNetworkFloat_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
         "shapes": pointer(shapes), "weights": pointer(weights), "bias": pointer(bias)})
-    size = checked(lib.networkFloatBatchArena(flat))
+    size = valid_size(lib.networkFloatBatchArena(flat))
     outputs = np.empty((len(x), int(np.prod(layers[-1].output_shape))), dtype=np.float32)
     lib.networkFloatBatch(flat, pointer(x), len(x), ffi.new("float[]", size), pointer(outputs))
     return outputs
@@ -118,7 +118,7 @@ def parameter_bytes(network: Int8Network | StreamNetwork) -> int:
 def arena_bytes(network: Int8Network) -> int:
     """Bytes of working memory of one inference, the input not counted."""
     flat, keep = flat_layers(network.layers)
-    return checked(lib.networkInt8BatchArena(flat))
+    return valid_size(lib.networkInt8BatchArena(flat))
 
 
 def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -141,7 +141,7 @@ def layer_shape(layer: Int8Layer) -> list[int]:
 def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
     """The C view of a network whose layers fit each other, and the arrays that must outlive it."""
     flat, keep = flat_layers(network.layers)
-    checked(lib.networkInt8BatchArena(flat))
+    valid_size(lib.networkInt8BatchArena(flat))
     return flat, keep
 
 
@@ -167,7 +167,7 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     return flat, [shapes, weights, bias, multiplier, shift, counts, skips]
 
 
-def checked(size: int) -> int:
+def valid_size(size: int) -> int:
     """The size that the library returned. Raises AirTouchError where it is -1 less the number of a wrong layer."""
     if size < 0:
         raise AirTouchError(f"network: layer {-size - 1} does not fit its weights or its neighbours")

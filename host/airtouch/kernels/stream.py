@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
-from airtouch.kernels.network import checked, flat_layers
+from airtouch.kernels.network import flat_layers, valid_size
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
@@ -30,7 +30,7 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
 def arena_bytes(network: StreamNetwork) -> int:
     """Bytes of state that the network keeps between samples."""
     flat, keep = flat_stream(network)
-    return checked(lib.streamInt8BatchArena(flat))
+    return valid_size(lib.streamInt8BatchArena(flat))
 
 
 def flat_stream(network: StreamNetwork) -> tuple[Any, list]:

@@ -30,7 +30,7 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> Fl
     columns = {"t_s": clock - begin}
     for name, (times, values) in signals.items():
         fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * SAMPLE_PERIOD_S if len(times) > 1 else False
-        columns[name] = _averaged(times, values, clock) if fast else _repeated(times, values, clock)
+        columns[name] = _average(times, values, clock) if fast else _hold(times, values, clock)
     return FlightLog(columns, {"condition": "", "warnings": [], **meta})
 
 
@@ -41,16 +41,16 @@ def _sorted(times: np.ndarray, values: np.ndarray) -> Signal:
     return times[timed][order], values[timed][order]
 
 
-def _averaged(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
+def _average(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """Mean of the values within half a period of each tick, (m,); the last value before it where there are none."""
     tick = np.floor((times - clock[0]) / SAMPLE_PERIOD_S + 0.5).astype(int)
     usable = (tick >= 0) & (tick < len(clock)) & np.isfinite(values)
     count = np.bincount(tick[usable], minlength=len(clock))
     total = np.bincount(tick[usable], values[usable], minlength=len(clock))
-    return np.where(count > 0, total / np.maximum(count, 1), _repeated(times, values, clock))
+    return np.where(count > 0, total / np.maximum(count, 1), _hold(times, values, clock))
 
 
-def _repeated(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
+def _hold(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """The last value before each tick, (m,); NaN where it is older than HOLD_S or missing."""
     last = np.searchsorted(times, clock + 1e-9, side="right") - 1
     recent = (last >= 0) & (clock - times[np.maximum(last, 0)] <= HOLD_S)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, printable
-from airtouch.logs.checks.readings import checked
+from airtouch.logs.checks.readings import without_impossible_values
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
 from airtouch.logs.table import Sheet, names_of, sheet
@@ -29,26 +29,26 @@ def read(path: str | Path) -> FlightLog:
         from airtouch.logs.formats import rosbag
 
         if rosbag.is_bag(path):
-            return checked(rosbag.read(path))
+            return without_impossible_values(rosbag.read(path))
     return parse(_bytes(path), str(path))
 
 
 def parse(data: bytes, source: str) -> FlightLog:
     """The flight log in a file's bytes. `source` is its name in messages.
 
-    Impossible values and times become NaN, with a warning (`readings.checked`).
+    Impossible values and times become NaN, with a warning (`readings.without_impossible_values`).
     """
     notes: list[str] = []
-    data = unzipped(data, source, notes)
-    with np.errstate(invalid="ignore", over="ignore"):  # `checked` handles the infinities
+    data = unzip(data, source, notes)
+    with np.errstate(invalid="ignore", over="ignore"):  # `without_impossible_values` handles the infinities
         log = _by_content(data, source)
     log.meta["warnings"] = notes + log.meta["warnings"]
-    return checked(log)
+    return without_impossible_values(log)
 
 
 def load_bytes(path: str | Path) -> bytes:
     """A file's bytes, unpacked if it is gzipped. Raises AirTouchError as `read` does."""
-    return unzipped(_bytes(path), str(path), [])
+    return unzip(_bytes(path), str(path), [])
 
 
 def load_text(path: str | Path) -> bytes:
@@ -130,6 +130,7 @@ def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
+    """The log in a file's bytes; the first of them tell the format."""
     if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
     if data[:4] == b"PAR1":
@@ -172,6 +173,7 @@ def _bytes(path: str | Path) -> bytes:
 
 
 def _by_header(text: Sheet, source: str) -> FlightLog:
+    """The log in a CSV; the header line tells the format. Raises AirTouchError for an unknown one."""
     if not text.first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
     names = names_of(text.first)
@@ -200,7 +202,7 @@ def _numeric(cell: str) -> bool:
     return True
 
 
-def unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
+def unzip(data: bytes, source: str, notes: list[str]) -> bytes:
     """The data, unpacked if it is gzipped. Of a truncated file it is what can be unpacked, with a warning in `notes`.
 
     Raises AirTouchError for damaged data and for more than 1 GiB unpacked.

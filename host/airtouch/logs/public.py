@@ -59,6 +59,7 @@ def has_file(path: Path, sha256: str) -> bool:
 
 
 def _place(read: Callable[[str, str], bytes | None], row: dict[str, str], target: Path) -> str:
+    """Write a flight of the registry to `target`, gzipped: "new", or "failed" where its SHA-256 is another."""
     content = read(row["file"], row["sha256"])
     if content is None or hashlib.sha256(content).hexdigest() != row["sha256"]:
         return "failed"
@@ -80,6 +81,10 @@ def from_folder(folder: Path) -> Callable[[str, str], bytes | None]:
 
 
 def _from_network(base_url: str) -> Callable[[str, str], bytes | None]:
+    """read(name, sha256) of files below an address: the content, None where it cannot be fetched.
+
+    Raises AirTouchError without the extra 'dataset'.
+    """
     try:
         import pooch
     except ImportError:
@@ -105,11 +110,11 @@ def _write_manifest(path: Path, present: set[str]) -> None:
     rows = [row for row in registry() if row["file"] in present]
     columns = [name for name in registry()[0] if name != "sha256"]
     lines = [",".join(columns)]
-    lines += [",".join(_quoted(row[name]) for name in columns) for row in rows]
+    lines += [",".join(_quote(row[name]) for name in columns) for row in rows]
     _replace(path, ("\n".join(lines) + "\n").encode())
 
 
-def _quoted(cell: str) -> str:
+def _quote(cell: str) -> str:
     return f'"{cell}"' if "," in cell else cell
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
+from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
 LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN
@@ -28,7 +28,7 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
         raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; "
                             f"give {1 / SLOWEST_S:g} to {1 / FASTEST_S:g} Hz")
     time_s, gaps = regular_time(log) if len(log) else (np.empty(0), [])
-    order = rising(time_s)
+    order = rising_subsequence(time_s)
     time_s = time_s[order]
     period = true_period(time_s)
     if period is None:
@@ -101,7 +101,7 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
         if hold:
             new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
         else:
-            t, v = _smoothed(t, v, period, *low_pass) if low_pass else (t, v)
+            t, v = _smooth(t, v, period, *low_pass) if low_pass else (t, v)
             for row, one in zip(new, v, strict=True):
                 row[first:last] = np.interp(at, t, one)
     return new
@@ -114,8 +114,8 @@ def _low_pass(period: float, rate_hz: float) -> tuple[np.ndarray, int]:
     return butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos"), int(3.0 / (CUTOFF * rate_hz * period)) + 1
 
 
-def _smoothed(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
-              padding: int) -> tuple[np.ndarray, np.ndarray]:
+def _smooth(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
+            padding: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (m,) of an even grid at the old rate, and channels (k, m) low-passed on it.
 
     Intervals that are too short for the filter stay unfiltered.

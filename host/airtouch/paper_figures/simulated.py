@@ -71,7 +71,7 @@ def inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.all(np.array(side) >= 0.0, axis=0)
 
 
-def labelled(log: FlightLog, edges: Callable[[FlightLog], list[Edge]] = crossings) -> FlightLog:
+def with_truth(log: FlightLog, edges: Callable[[FlightLog], list[Edge]] = crossings) -> FlightLog:
     """The log with a down range that steps by 1 m at each edge, as ground truth for training and scoring."""
     over = np.zeros(len(log), bool)
     for edge in edges(log):

@@ -25,7 +25,7 @@ def percent(value: float | None, interval: tuple[float, float] | list[float] | N
     return text if interval is None else f"{text} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
 
 
-def missed(row: Mapping[str, Any]) -> str:
+def misses(row: Mapping[str, Any]) -> str:
     """`2.9 % of 174 missed [0, 6.9]`."""
     interval = row["intervals"]["missed"]
     text = f"{percent(row['missed'])} of {row['edges']} missed"
@@ -34,7 +34,7 @@ def missed(row: Mapping[str, Any]) -> str:
 
 def score(row: Mapping[str, Any]) -> str:
     """Error, misses and false edges side by side."""
-    return f"{metres(row)}, {missed(row)}, {row['false_per_minute'] or 0:.1f} false a minute"
+    return f"{metres(row)}, {misses(row)}, {row['false_per_minute'] or 0:.1f} false a minute"
 
 
 def reaches(row: Mapping[str, Any], error_m: float) -> bool:
@@ -52,7 +52,7 @@ def worse(first: dict, second: dict) -> bool:
                for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
 
 
-def judged(yes: bool, evidence: str) -> Verdict:
+def verdict(yes: bool, evidence: str) -> Verdict:
     """The verdict "reproduced" or "not reproduced", with the figures behind it."""
     return Verdict(REPRODUCED if yes else NOT_REPRODUCED, evidence)
 

@@ -10,17 +10,22 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 
+#: unit in a column's name -> its factor to SI
 UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0, "mv": 1e-3, "v": 1.0, "ma": 1e-3, "ua": 1e-6, "a": 1.0}
+#: quantity -> first words of a column's name that mean it: those of common INA219 sketches
 QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
               "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
               "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
 MEASURED = ("time", "volts", "amperes")
+#: factor to seconds of a time column whose name says no unit; other columns are SI
 FACTORS = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
+#: quantity -> (column, factor to SI) of a log without header: what tools/power/ina219_logger.ino writes
 WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "stage": (3, 1.0)}
-MOST_BAD = 0.05  #: fraction of unreadable lines up to which a log is read; serial ports lose characters
+#: fraction of unreadable lines up to which a log is read: serial ports lose some; no source: round number
+MOST_BAD = 0.05
 MOST_V, MOST_A = 26.0, 3.2  #: V and A, the INA219's range
-GAP = 20.0  #: sample periods; no energy is counted over a longer gap
-BLOCK_S = 1.0  #: s, block length of the interval, longer than the correlation of the noise
+GAP = 20.0  #: sample periods; no energy is counted over a longer gap; no source: round number
+BLOCK_S = 1.0  #: s, block length of the interval; no source: chosen to be longer than the noise is correlated
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,7 @@ def canonical(name: str, known: Sequence[str]) -> str:
     return plain.get(re.sub(r"[^a-z0-9]", "", name.lower()), name)
 
 
-def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
+def added_power(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
     """Stage -> (mW added to the stage before it, half width of the 95 % interval). The first stage counts in full."""
     result, before = {}, None
     for name, power in stages.items():

@@ -11,7 +11,7 @@ from pathlib import Path
 from airtouch.detector.best.recipe import STRIDE
 from airtouch.errors import AirTouchError
 from airtouch.parameters import SAMPLE_RATE_HZ
-from airtouch.power.ina219 import Power, added
+from airtouch.power.ina219 import Power, added_power
 
 #: stage -> the paper's figure, mW (Table 1), in the order in which stages are switched on
 PAPER_MW = {"baseline": 78.0, "FC-FE": 6.0, "CCS-FF": 2.0, "filter": 2.0, "network": 33.0}
@@ -26,7 +26,7 @@ BUDGETS = Path(__file__).resolve().parents[3] / "tests" / "emulation"
 def table(stages: dict[str, Power]) -> str:
     """Table 1 as text: power added by each stage with its interval, energy per step, and the paper's figure."""
     lines = [f"{'':44} {'measured, mW':>22} {'a step, uJ':>11} {'paper, mW':>10} {'n, s':>14}"]
-    for name, (mw, half) in added(stages).items():
+    for name, (mw, half) in added_power(stages).items():
         interval = f"{mw:8.1f} [{mw - half:.1f}, {mw + half:.1f}]" if math.isfinite(half) else f"{mw:8.1f}"
         a_step = "" if name == "baseline" else f"{1e3 * mw / SAMPLE_RATE_HZ:.0f}"
         paper = f"{PAPER_MW[name]:.0f}" if name in PAPER_MW else ""

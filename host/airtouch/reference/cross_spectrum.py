@@ -28,6 +28,7 @@ def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)
 
 
 def _root_of_product(power: np.ndarray) -> np.ndarray:
+    """The square root of the product of each row of (n, k), (n,)."""
     clipped = np.where(power > FLOAT32_MAX, FLOAT32_MAX, np.where(power < 0, 0.0, power))
     mantissa, exponent = np.frexp(clipped[:, 0])
     exponent = exponent.astype(np.int64)

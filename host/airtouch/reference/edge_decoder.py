@@ -8,7 +8,7 @@ import numpy as np
 LOGITS = ("over", "entry", "exit")
 #: largest magnitude of a logit, a probability of 0.9997: one wild logit moves the smoothed one no further
 LOGIT_LIMIT = 8.0
-SLOW_AT_START = -3.0  #: the smoothed over logit before anything is known: over a platform with a probability of 0.05
+SMOOTHED_AT_START = -3.0  #: smoothed over logit before anything is known: over a platform with a probability of 0.05
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was
 
 
@@ -35,6 +35,19 @@ class DecoderConfig:
     hold_steps: int = 0
 
 
+@dataclass(slots=True)
+class _State:
+    """What the decoder remembers from step to step while the drone flies; `edgeDecoder_t` in C."""
+
+    airborne_steps: int = 0  #: without a break
+    smoothed_over: float = SMOOTHED_AT_START
+    over: bool = False  #: over a platform
+    since: int = LONG_AGO  #: steps since the last edge
+    waiting: int = 0  #: kind of the edge that waits to be reported: 0 none, 1 entry, 2 exit
+    due: int = 0  #: steps until it is reported
+    peak: float = 0.0  #: its logit at the crossing
+
+
 def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig = DecoderConfig()) -> np.ndarray:
     """Edges (n,), 0 none, 1 entry, 2 exit, of logits (n, 3 or more): over, entry, exit; airborne (n,) bool.
 
@@ -42,32 +55,42 @@ def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig
     """
     limited = np.clip(np.where(np.isnan(logits), -LOGIT_LIMIT, logits), -LOGIT_LIMIT, LOGIT_LIMIT)
     edges = np.zeros(len(limited), dtype=np.uint8)
-    start, waiting, due, peak, over, slow, since = 0, 0, 0, 0.0, False, SLOW_AT_START, LONG_AGO
-    for t, (p, *events) in enumerate(limited):
+    state = _State()
+    for t, (over_logit, *event_logits) in enumerate(limited):
         if not airborne[t]:
-            start, waiting, over, slow, since = t + 1, 0, False, SLOW_AT_START, LONG_AGO
+            state = _State()
             continue
-        slow += config.smooth_gain * (p - slow)
-        since = min(since + 1, LONG_AGO)
-        if waiting and events[waiting - 1] > peak:
-            peak, due = events[waiting - 1], config.hold_steps
-        elif waiting:
-            due = max(due - 1, 0)
-        free = t + 1 - start >= config.arm_steps and since >= config.dwell_steps
-        if free and _fires(p, events[int(over)], slow, over, config):
-            edges[t] = waiting
-            recent = limited[max(t - config.look_back, start):t + 1, 1 + int(over)][::-1]
-            back = int(np.argmax(recent))
-            peak, due = recent[back], max(config.hold_steps - back, 0)
-            over, since, slow = not over, 0, 0.0
-            waiting = 1 if over else 2
-        if not edges[t] and waiting and due == 0:
-            edges[t], waiting = waiting, 0
+        state.airborne_steps += 1
+        state.smoothed_over += config.smooth_gain * (over_logit - state.smoothed_over)
+        state.since = min(state.since + 1, LONG_AGO)
+        if state.waiting:
+            _wait(state, event_logits[state.waiting - 1], config)
+        ready = state.airborne_steps >= config.arm_steps and state.since >= config.dwell_steps
+        event = int(state.over)  # column of the event that can come next
+        if ready and _fires(state, over_logit, event_logits[event], config):
+            edges[t] = state.waiting  # an edge that still waits is not held up by the next one
+            first = t + 1 - min(state.airborne_steps, config.look_back + 1)
+            recent = limited[first:t + 1, 1 + event][::-1]
+            steps_ago = int(np.argmax(recent))
+            state.peak, state.due = recent[steps_ago], max(config.hold_steps - steps_ago, 0)
+            state.over, state.waiting = not state.over, event + 1
+            state.since, state.smoothed_over = 0, 0.0
+        if not edges[t] and state.waiting and state.due == 0:
+            edges[t], state.waiting = state.waiting, 0
     return edges
 
 
-def _fires(p: float, event: float, slow: float, over: bool, config: DecoderConfig) -> bool:
+def _wait(state: _State, logit: float, config: DecoderConfig) -> None:
+    """Move the edge that waits to a higher peak of its event's logit, or a step nearer to its report."""
+    if logit > state.peak:
+        state.peak, state.due = logit, config.hold_steps
+    else:
+        state.due = max(state.due - 1, 0)
+
+
+def _fires(state: _State, over_logit: float, event_logit: float, config: DecoderConfig) -> bool:
     """Whether an edge is seen: by its own logit beside the over logit, or late by the smoothed one."""
-    if over:
-        return event - config.over_share * p > config.exit_score or slow < config.late_exit
-    return event + config.over_share * p > config.entry_score or slow > config.late_entry
+    support = config.over_share * over_logit
+    if state.over:
+        return event_logit - support > config.exit_score or state.smoothed_over < config.late_exit
+    return event_logit + support > config.entry_score or state.smoothed_over > config.late_entry

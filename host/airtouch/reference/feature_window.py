@@ -49,6 +49,7 @@ def streaming_z_score(features: np.ndarray, time_constant: float) -> np.ndarray:
 
 
 def _standardise(values: np.ndarray, time_constant: float) -> np.ndarray:
+    """`streaming_z_score` of one column (n,) of finite values."""
     out = np.zeros(len(values))
     mean, variance = values[0], 0.0
     for i, (sample, gain) in enumerate(zip(values, exponential_gain(len(values), time_constant), strict=True)):

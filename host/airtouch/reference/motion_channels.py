@@ -1,4 +1,4 @@
-"""What the streaming detector sees of a flight: twelve channels without slow drift, each of unit swing."""
+"""The inputs of the streaming detector: channels without slow drift, each in units of its nominal amplitude."""
 
 from dataclasses import dataclass, field
 
@@ -17,17 +17,18 @@ ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"  #: the sensors
 class Channel:
     """One motion channel.
 
-    swing: its nominal swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is
+    amplitude: its nominal amplitude, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is
     reflected left to right. sensors: those that it needs.
     """
 
     name: str
-    swing: float
+    amplitude: float
     mirror: int
     sensors: tuple[str, ...]
 
 
 #: The channels in the order of their columns, as motion_channels.c computes them, but the last one, which is 0.
+#: Amplitudes: no source, round numbers of the order of a pass over an edge (the rates are 15 and 5 deg/s).
 CHANNEL_TABLE = (
     Channel("ax", 0.5, 1, (ACCELERATION,)),
     Channel("ay", 0.5, -1, (ACCELERATION,)),
@@ -50,11 +51,11 @@ THRUST_DELAY = 2  #: samples from a command to its thrust
 class MotionConfig:
     """Settings; the samples are those of a 100 Hz log.
 
-    scale: nominal swing of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
-    clamped to that many swings. slow_samples: time constant of the motors' slow means.
+    scale: nominal amplitude of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
+    clamped to that many amplitudes. slow_samples: time constant of the motors' slow means.
     """
 
-    scale: tuple[float, ...] = tuple(channel.swing for channel in CHANNEL_TABLE)
+    scale: tuple[float, ...] = tuple(channel.amplitude for channel in CHANNEL_TABLE)
     limit: float = 4.0
     arm_pwm: float = DEFAULT.arm_pwm
     slow_samples: float = 300.0
@@ -67,7 +68,7 @@ class MotionConfig:
 def motion_channels(
     acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, config: MotionConfig | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Channels (n, 12) in units of their nominal swing, and airborne (n,) bool. Causal.
+    """Channels (n, 12) in units of their nominal amplitude, and airborne (n,) bool. Causal.
 
     acc_level: (n, 3) m/s^2, level axes, gravity in z. gyro: (n, 3) rad/s. pwm: (n, 4).
     Columns as NAMES: the motors' roll, pitch, yaw and mean have their slow mean taken off; `unexplained

@@ -137,6 +137,7 @@ def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> 
 
 
 def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    """FR-CFAR's cells under test, its threshold and its alerts."""
     power = np.maximum(trace.signals["cfar_power"].astype(float), 1e-12)
     ax.semilogy(t, power, lw=0.6, label="tested")
     threshold = np.maximum(trace.signals["threshold"].astype(float), 1e-12)

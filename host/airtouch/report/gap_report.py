@@ -36,7 +36,7 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
         title="Gap between flights and simulator", headline=headline,
         answers=(words.measured(headline), words.overall(measurement.gap)),
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
-        calibration=gap_tables.named(measurement.calibration),
+        calibration=gap_tables.parameter_rows(measurement.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),
                ("What these logs cannot say", measurement.cannot), ("Notes", _notes(measurement.notes, pictures)),
                ("Left out", measurement.left_out)],
@@ -62,7 +62,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
         remaining=words.remaining_in_words(left[:gap_tables.MOST_LEFT]), remaining_count=len(left),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
-        calibration=gap_tables.named(diagnosis.calibration),
+        calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),
                ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
         flights=_flights(diagnosis.flights, diagnosis.vehicle, diagnosis.baseline), command=command)
@@ -71,6 +71,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
 
 def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], pictures: Pictures | None,
           **context: Any) -> str:
+    """The HTML of a page: what diagnosis and measurement share, and `context`; what it lacks is left out."""
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "gap.html").read_text("utf-8"))
     absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],

@@ -37,7 +37,7 @@ def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, 
             some = [place.get((phase.name, channel.name, band)) for band in bands(cells)]
             if any(some):
                 rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
-                    c and {**shaded(c), "headline": (c.phase, c.channel, c.band_hz) == marked} for c in some]})
+                    c and {**heat_map_cell(c), "headline": (c.phase, c.channel, c.band_hz) == marked} for c in some]})
         shown = (n == 0 and phase.over > 0) or (headline is not None and phase.name == headline.phase)
         worse = f", {phase.worse} worse than before" if phase.worse else ""
         out.append({"name": capital(PHASE_WORDS[phase.name]), "rows": rows, "open": shown,
@@ -58,7 +58,7 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def shaded(cell: Cell) -> dict[str, str]:
+def heat_map_cell(cell: Cell) -> dict[str, str]:
     """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
     times = ratio(cell)
     sure = summary.significant(cell)
@@ -137,6 +137,6 @@ def figure(value: Any) -> str:
     return "-"
 
 
-def named(parameters: Mapping[str, Quantity]) -> list[tuple[str, str]]:
+def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, str]]:
     """(name, value with interval) of calibrated parameters."""
     return [(k, quantity(q)) for k, q in parameters.items()]

@@ -7,7 +7,7 @@ from matplotlib.patches import Polygon as PolygonPatch
 from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
-from airtouch.detector.evaluation.edge_map import EdgeMap
+from airtouch.detector.evaluation.edge_map import EdgeMap, Platform
 from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
 
 STRIP_M = 0.3  #: m, drawn width of a platform that was crossed once; its true width is unknown
@@ -22,7 +22,7 @@ def edge_map(plane: EdgeMap, title: str) -> bytes:
 
 def figure_of(plane: EdgeMap, title: str) -> Figure:
     """The map as a matplotlib figure."""
-    xy, points = plane.xy, plane.points
+    xy = plane.xy
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
@@ -30,30 +30,8 @@ def figure_of(plane: EdgeMap, title: str) -> Figure:
         ax.plot(*xy.T, color=GREY, lw=0.9, label="track")
         _ends(ax, xy)
         for platform in plane.platforms:
-            ends = (platform.near_side, platform.far_side)
-            if platform.outline is None and all(isinstance(end, Point) for end in ends):
-                strip = _strip(*(np.array(end.coords[0]) for end in ends))
-                ax.add_patch(PolygonPatch(strip, facecolor=GREEN, alpha=0.12, lw=0,
-                                          label="platform (its width is not known)"))
-            elif platform.outline is not None:
-                ax.add_patch(patch_from_polygon(platform.outline, facecolor=GREEN, alpha=0.12, lw=0, label="platform"))
-            if platform.outline is not None:
-                ring = np.array(platform.outline.exterior.coords)
-                band = platform.outline.boundary.buffer(2 * platform.sigma_m)
-                ax.add_patch(patch_from_polygon(band, facecolor=GREEN, alpha=0.15, lw=0))
-                ax.plot(*ring.T, color=GREEN, lw=1.6, label="outline")
-            for line in (platform.near_side, platform.far_side):
-                if isinstance(line, LineString):
-                    ax.plot(*np.array(line.coords).T, color=GREEN, lw=0.8, ls=":")
-        for point in points:
-            along = _direction(xy, point.sample) * 2 * point.sigma_m
-            ends = np.array([[point.x_m, point.y_m]]) + np.outer([-1, 1], along)
-            ax.plot(*ends.T, color=COLOURS[point.kind], lw=2.5, alpha=0.4, solid_capstyle="round")
-        for kind, colour in COLOURS.items():
-            at = [p for p in points if p.kind == kind]
-            if at:
-                ax.scatter([p.x_m for p in at], [p.y_m for p in at], s=14, color=colour, zorder=3,
-                           label=f"{kind} ({len(at)})")
+            _draw_platform(ax, platform)
+        _draw_points(ax, plane)
         _room_below(ax, xy)
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
@@ -62,6 +40,35 @@ def figure_of(plane: EdgeMap, title: str) -> Figure:
         figure.draw_without_rendering()  # equal axes change the limits when they are drawn
         _scale_bar(ax)
         return figure
+
+
+def _draw_platform(ax: Axes, platform: Platform) -> None:
+    """Draw the outline with its 2-sigma band, or a strip where a single pass crossed the platform, and both sides."""
+    sides = (platform.near_side, platform.far_side)
+    if platform.outline is not None:
+        ax.add_patch(patch_from_polygon(platform.outline, facecolor=GREEN, alpha=0.12, lw=0, label="platform"))
+        band = platform.outline.boundary.buffer(2 * platform.sigma_m)
+        ax.add_patch(patch_from_polygon(band, facecolor=GREEN, alpha=0.15, lw=0))
+        ax.plot(*np.array(platform.outline.exterior.coords).T, color=GREEN, lw=1.6, label="outline")
+    elif all(isinstance(side, Point) for side in sides):
+        strip = _strip(*(np.array(side.coords[0]) for side in sides))
+        ax.add_patch(PolygonPatch(strip, facecolor=GREEN, alpha=0.12, lw=0, label="platform (its width is not known)"))
+    for side in sides:
+        if isinstance(side, LineString):
+            ax.plot(*np.array(side.coords).T, color=GREEN, lw=0.8, ls=":")
+
+
+def _draw_points(ax: Axes, plane: EdgeMap) -> None:
+    """Draw each edge, with a bar of 2 sigma along the track."""
+    for point in plane.points:
+        along = _direction(plane.xy, point.sample) * 2 * point.sigma_m
+        ends = np.array([[point.x_m, point.y_m]]) + np.outer([-1, 1], along)
+        ax.plot(*ends.T, color=COLOURS[point.kind], lw=2.5, alpha=0.4, solid_capstyle="round")
+    for kind, colour in COLOURS.items():
+        at = [p for p in plane.points if p.kind == kind]
+        if at:
+            ax.scatter([p.x_m for p in at], [p.y_m for p in at], s=14, color=colour, zorder=3,
+                       label=f"{kind} ({len(at)})")
 
 
 def _strip(near: np.ndarray, far: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from airtouch.twin.comparison.words import answer, gap_row
 from airtouch.twin.fitting.levers import Lever
 from airtouch.twin.recorded.flights import RecordedFlights
 
-MOST_GAPS = 30
+MOST_GAPS = 30  #: gaps that the page lists, largest first; no source: about one screen
 
 
 def write_report(path: Path, recorded: RecordedFlights, comparison: Comparison, curves: Curves, levers: Sequence[Lever],

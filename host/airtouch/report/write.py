@@ -37,7 +37,7 @@ def write_report(
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
     template = environment.from_string(source)
-    answers = [answer(*row) for row in sorted(scored.summaries.items(), key=_missed)]
+    answers = [answer(*row) for row in sorted(scored.summaries.items(), key=_missed_count)]
     page = template.render(
         title=title, answers=answers, summaries=scored.summaries, columns=COLUMNS, cell=cell,
         breakdowns=scored.breakdowns,
@@ -49,7 +49,7 @@ def write_report(
     write_bytes(page.encode(), path, force)
 
 
-def _missed(row: tuple[str, Mapping[str, Any]]) -> int:
+def _missed_count(row: tuple[str, Mapping[str, Any]]) -> int:
     """Sort key of the sentences: number of missed edges."""
     return row[1]["missed_count"]
 

@@ -54,7 +54,7 @@ Progress = Callable[[str, int, int, str], None]
 
 
 @dataclass(frozen=True)
-class Flight:
+class LoadedFlight:
     """A log and the condition (speed, fold) of its file."""
 
     file: FlightFile
@@ -96,7 +96,7 @@ class Adapted:
         """
         scores = {name: getattr(self, name) for name in ("twin_only", "held_out_half", "held_out")}
         return {**self.model.metadata.get("adapted", {}), "left_out": [list(pair) for pair in self.left_out],
-                **{name: summary.summarise(given) if given else None for name, given in scores.items()}}
+                **{name: summary.summarise(of_flights) if of_flights else None for name, of_flights in scores.items()}}
 
     def __repr__(self) -> str:
         training = self.model.metadata.get("adapted", {})
@@ -104,7 +104,7 @@ class Adapted:
                 f"{training.get('pseudo_labelled')} by the detector, {len(self.left_out)} left out; plain() says more)")
 
 
-def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
+def adapt(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, work: Path, *,
           start: BestModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
           progress: Progress | None = None, command: str = "airtouch adapt") -> Adapted:
     """Train a detector on flights and their twin. The same arguments give the same bits.
@@ -121,30 +121,27 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     twin_flights, origin = simulated_flights(flights, scene, vehicle, seed, progress, work)
     twin_flights = replace(twin_flights, logs=[sensors.without(log, absent) for log in twin_flights.logs])
     labelled = [f for f in flights if f.labelled]
-    twin = cache.model(work / f"twin_{key}.npz", lambda: best.fit(
-        twin_flights.logs, seed, start=start, pseudo_labels=twin_flights.edges, decoder=None if start else DECODER,
-        steps=STEPS["shipped" if start else "scratch"], progress=_with_name(progress, "twin"), command=command,
-        lag_of=([f.log for f in labelled], [None] * len(labelled))))
+    trainer = Trainer(start, twin_flights, seed, command)
+    twin = cache.model(work / f"twin_{key}.npz",
+                       partial(trainer.fit_simulated, labelled, _with_name(progress, "twin")))
     twin_only = cache.scores(work / f"twin_{key}.json", partial(score_flights, labelled, twin))
     held_out, held_out_half = [], []
     if hold_out and len(labelled) >= MIN_LABELLED:
-        held_out, held_out_half = held_out_scores(flights, labelled, twin_flights, start, twin, work, key, seed,
-                                                  progress, command)
+        held_out, held_out_half = held_out_scores(trainer, twin, flights, work, key, progress)
     train = [without_range(f) for f in flights] if withhold else flights
-    name = "unlabelled" if withhold else "all"
-    model = cache.model(work / f"{name}_{key}.npz", lambda: together(
-        start, twin, train, twin_flights, seed, _with_name(progress, "all flights"), command))
+    model = cache.model(work / f"{'unlabelled' if withhold else 'all'}_{key}.npz",
+                        partial(trainer.fit_all, twin, train, _with_name(progress, "all flights")))
     count = sum(f.labelled for f in train)
     training = {"twin": origin, "labelled": count, "pseudo_labelled": len(flights) - count}
     return Adapted(replace(model, metadata={**model.metadata, "adapted": training}), held_out, held_out_half, twin_only)
 
 
-def absent_sensors(flights: Sequence[Flight]) -> tuple[str, ...]:
+def absent_sensors(flights: Sequence[LoadedFlight]) -> tuple[str, ...]:
     """The sensors that all of the flights lack."""
-    return tuple(s for s in sensors.SENSORS if all(s in sensors.missing(f.log) for f in flights))
+    return tuple(s for s in sensors.SENSORS if all(s in sensors.missing_sensors(f.log) for f in flights))
 
 
-def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
+def simulated_flights(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, seed: int,
                       progress: Progress | None, work: Path | None = None) -> tuple[SimulatedFlights, dict[str, Any]]:
     """Flights of the twin, added to the recorded flights' free air if there is any, and a description for metadata.
 
@@ -168,64 +165,84 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
     return SimulatedFlights(twin_logs, list(edges)), description
 
 
-def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], twin_flights: SimulatedFlights,
-             seed: int, progress: Progress | None, command: str) -> BestModel:
-    """A detector trained on recorded and simulated flights; the twin's detector itself without recorded ones.
+@dataclass(frozen=True)
+class Trainer:
+    """Trains detectors on recorded flights and simulated ones beside them; all its trainings share these settings.
 
-    With labelled flights it is trained from `start` on both kinds, each with half of the crops: a network that is
-    trained further on a few labelled flights alone forgets the edges that those lack. Flights without labels are then
-    labelled by it, or by the twin's detector where no flight is labelled (`self_trained`).
+    start: weights to start from, None for random ones. simulated: flights to train on beside recorded ones. command:
+    noted in the models. The methods' progress is as in `adapt`.
+    """
+
+    start: BestModel | None
+    simulated: SimulatedFlights
+    seed: int
+    command: str
+
+    def fit_simulated(self, lag_of: Sequence[LoadedFlight], progress: Progress | None = None) -> BestModel:
+        """A detector trained on the simulated flights alone, with its lag on the recorded flights `lag_of`."""
+        return best.fit(self.simulated.logs, self.seed, start=self.start, pseudo_labels=self.simulated.edges,
+                        lag_of=([f.log for f in lag_of], [None] * len(lag_of)), progress=progress, **self._settings())
+
+    def fit(self, labelled: Sequence[LoadedFlight], pupils: Sequence[LoadedFlight] = (),
+            pseudo_edges: Sequence[list[Edge] | None] = (), progress: Progress | None = None) -> BestModel:
+        """One training on labelled flights, flights `pupils` with pseudo-labels, and simulated ones, of equal weight.
+
+        Without `start` the recorded and simulated flights are augmented more (AUGMENTATION). The lag is that of the
+        recorded ones: recorded edges are detected later than simulated ones.
+        """
+        count = len(self.simulated.logs)
+        recorded, labels = [f.log for f in (*labelled, *pupils)], [*[None] * len(labelled), *pseudo_edges]
+        weights = [count / len(group) for group in (labelled, pupils) for _ in group] + [1.0] * count
+        return best.fit([*recorded, *self.simulated.logs], self.seed, start=self.start,
+                        pseudo_labels=[*labels, *self.simulated.edges], emphasis=weights, lag_of=(recorded, labels),
+                        progress=progress, **self._settings(), **({} if self.start else AUGMENTATION))
+
+    def self_train(self, teacher: BestModel, labelled: Sequence[LoadedFlight], unlabelled: Sequence[LoadedFlight],
+                   progress: Progress | None = None) -> BestModel:
+        """A detector trained on labelled flights, flights that the teacher labels, and simulated ones.
+
+        Flights in which the teacher sees no platform, or not both edges of each, are left out: they may be over one
+        that it missed. The teacher itself where no flight remains. In each of ROUNDS the detector of the round before
+        is the teacher.
+        """
+        for _ in range(ROUNDS):
+            labels = best.pseudo_labels([f.log for f in unlabelled], teacher)
+            complete = [(f, edges) for f, edges in zip(unlabelled, labels, strict=True)
+                        if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
+            if not complete:
+                break
+            pupils, pseudo_edges = zip(*complete, strict=True)
+            teacher = self.fit(labelled, pupils, pseudo_edges, progress)
+        return teacher
+
+    def fit_all(self, twin: BestModel, flights: Sequence[LoadedFlight], progress: Progress | None = None) -> BestModel:
+        """A detector trained on flights with and without labels and on simulated ones; `twin` itself without flights.
+
+        It is trained from `start` on both kinds, each with half of the crops: a network that is trained further on a
+        few labelled flights alone forgets the edges that those lack. Flights without labels are then labelled by it,
+        or by `twin`, the detector of simulated flights, where no flight is labelled.
+        """
+        labelled = [f for f in flights if f.labelled]
+        unlabelled = [f for f in flights if not f.labelled]
+        teacher = self.fit(labelled, progress=progress) if labelled else twin
+        return self.self_train(teacher, labelled, unlabelled, progress)
+
+    def _settings(self) -> dict[str, Any]:
+        """Options of `best.fit` that depend on where the weights come from."""
+        return {"decoder": None if self.start else DECODER, "steps": STEPS["shipped" if self.start else "scratch"],
+                "command": self.command}
+
+
+def held_out_scores(trainer: Trainer, twin: BestModel, flights: Sequence[LoadedFlight], work: Path, key: str,
+                    progress: Progress | None = None) -> tuple[list[FlightScore], list[FlightScore]]:
+    """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
+
+    The labelled flights are assigned to FOLDS folds by seed; those without labels are in every training. Models and
+    scores are stored in `work` under `key`.
     """
     labelled = [f for f in flights if f.labelled]
     unlabelled = [f for f in flights if not f.labelled]
-    teacher = _fit_mixture(start, labelled, [], [], twin_flights, seed, progress, command) if labelled else twin
-    return self_trained(start, teacher, labelled, unlabelled, twin_flights, seed, progress, command)
-
-
-def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence[Flight], unlabelled: Sequence[Flight],
-                 twin_flights: SimulatedFlights, seed: int, progress: Progress | None, command: str) -> BestModel:
-    """A detector trained from `start` on labelled flights, flights that the teacher labels, and simulated ones.
-
-    Each kind has the same share of the crops. Flights in which the teacher sees no platform, or not both edges of
-    each, are left out: they may be over one that it missed. The teacher itself where no flight remains. In each of
-    ROUNDS the detector of the round before is the teacher.
-    """
-    for _ in range(ROUNDS):
-        labels = best.pseudo_labels([f.log for f in unlabelled], teacher)
-        complete = [(f, edges) for f, edges in zip(unlabelled, labels, strict=True)
-                    if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
-        if not complete:
-            break
-        pupils, pseudo_edges = zip(*complete, strict=True)
-        teacher = _fit_mixture(start, labelled, pupils, pseudo_edges, twin_flights, seed, progress, command)
-    return teacher
-
-
-def _fit_mixture(start: BestModel | None, labelled: Sequence[Flight], pupils: Sequence[Flight],
-                 pseudo_edges: Sequence[list[Edge] | None], twin_flights: SimulatedFlights, seed: int,
-                 progress: Progress | None, command: str) -> BestModel:
-    """One training on labelled flights, flights `pupils` with pseudo-labels, and simulated ones, of the same weight.
-
-    The lag is that of the recorded ones: recorded edges are detected later than simulated ones.
-    """
-    count = len(twin_flights.logs)
-    recorded, labels = [f.log for f in (*labelled, *pupils)], [*[None] * len(labelled), *pseudo_edges]
-    weights = [count / len(group) for group in (labelled, pupils) for _ in group] + [1.0] * count
-    return best.fit([*recorded, *twin_flights.logs], seed, start=start, pseudo_labels=[*labels, *twin_flights.edges],
-                    emphasis=weights, decoder=None if start else DECODER, progress=progress, command=command,
-                    steps=STEPS["shipped" if start else "scratch"], lag_of=(recorded, labels),
-                    **({} if start else AUGMENTATION))
-
-
-def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], twin_flights: SimulatedFlights,
-                    start: BestModel | None, twin: BestModel, work: Path, key: str, seed: int,
-                    progress: Progress | None, command: str) -> tuple[list[FlightScore], list[FlightScore]]:
-    """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
-
-    The labelled flights are assigned to FOLDS folds by seed. Models and scores are stored in `work` under `key`.
-    """
-    order = np.random.default_rng([seed, 7]).permutation(len(labelled))
-    unlabelled = [f for f in flights if not f.labelled]
+    order = np.random.default_rng([trainer.seed, 7]).permutation(len(labelled))
     folds = min(FOLDS, len(labelled))
     scores: list[FlightScore] = []
     scores_half: list[FlightScore] = []
@@ -237,18 +254,18 @@ def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], twin_
             path = work / f"fold{k}_{divisor}_{key}"
             name = f"hold-out {k + 1}/{folds}" + (" (half)" if divisor == 2 else "")
             model = cache.model(path.with_suffix(".npz"), partial(
-                together, start, twin, [*subset, *unlabelled], twin_flights, seed, _with_name(progress, name), command))
+                trainer.fit_all, twin, [*subset, *unlabelled], _with_name(progress, name)))
             results += cache.scores(path.with_suffix(".json"), partial(score_flights, test, model))
     return scores, scores_half
 
 
-def without_range(flight: Flight) -> Flight:
+def without_range(flight: LoadedFlight) -> LoadedFlight:
     """The flight without its down range."""
     log = flight.log
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
-def score_flights(flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
+def score_flights(flights: Sequence[LoadedFlight], model: BestModel) -> list[FlightScore]:
     """The flights' scores by a model."""
     return [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
 
@@ -260,7 +277,7 @@ def _with_name(progress: Progress | None, name: str) -> Progress | None:
     return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)
 
 
-def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
+def _key(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
     settings = (STAGE_VERSION, scene.table, vehicle, seed, TWIN_FLIGHTS, STEPS, AUGMENTATION, ROUNDS, DECODER,
                 *edge_strength.BOUNDS)

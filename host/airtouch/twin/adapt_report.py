@@ -10,12 +10,13 @@ from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate, summary
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.errors import AirTouchError
-from airtouch.twin.adapt import Adapted, Flight
+from airtouch.twin.adapt import Adapted, LoadedFlight
 from airtouch.twin.recorded.course import course
 
 
 def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
-             progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
+             progress: Callable[[int, int], None] = lambda *_: None,
+             ) -> tuple[list[LoadedFlight], list[tuple[str, str]]]:
     """Flights that can be used, and (path, reason) of the others.
 
     A speed that is not stated comes from the log; speed_mps, m/s, where the log has no platform. progress: as
@@ -33,7 +34,8 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
                     speed = course(log).speed_mps
                 except AirTouchError:
                     speed = speed_mps
-            usable.append(Flight(FlightFile(file.path, replace(file.condition, speed_mps=speed or speed_mps)), log))
+            condition = replace(file.condition, speed_mps=speed or speed_mps)
+            usable.append(LoadedFlight(FlightFile(file.path, condition), log))
         except AirTouchError as error:
             left_out.append((str(file.path), str(error)))
     return usable, left_out

@@ -187,7 +187,7 @@ def flights(air: Sequence[FreeAir], responses: Sequence[Response],
         base, other = (air[int(i)] for i in rng.integers(len(air), size=2))
         entry, leave = (e.sample for e in response.edges)
         place = base.step + round(other.approach * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))  # row of the entry
-        values = _lengthened(base, level, place + leave - entry + round(RATE_HZ * rng.uniform(*LEVEL_AFTER_S)), rng)
+        values = _lengthen(base, level, place + leave - entry + round(RATE_HZ * rng.uniform(*LEVEL_AFTER_S)), rng)
         if place < entry or place + leave - entry + round(SETTLED_S * RATE_HZ) > len(values):
             continue
         if has_platform:
@@ -200,7 +200,7 @@ def flights(air: Sequence[FreeAir], responses: Sequence[Response],
     return out, labels
 
 
-def _lengthened(base: FreeAir, level: Sequence[np.ndarray], rows: int, rng: np.random.Generator) -> np.ndarray:
+def _lengthen(base: FreeAir, level: Sequence[np.ndarray], rows: int, rng: np.random.Generator) -> np.ndarray:
     """A flight's start, parts of level flight up to as many rows, and its end, (n, 10)."""
     cruise = base.start[base.step + round(SETTLED_S * RATE_HZ):]
     median = np.median(cruise if len(cruise) >= MIN_LEVEL_S * RATE_HZ else base.start[-RATE_HZ:], axis=0)
@@ -209,7 +209,7 @@ def _lengthened(base: FreeAir, level: Sequence[np.ndarray], rows: int, rng: np.r
         part = level[int(rng.integers(len(level)))]
         parts.append(part - np.median(part, axis=0) + median)
         length += len(part) - round(BLEND_S * RATE_HZ)
-    return _joined([_joined(parts)[:rows], base.end])
+    return _join([_join(parts)[:rows], base.end])
 
 
 def values_of(log: FlightLog) -> np.ndarray:
@@ -217,7 +217,7 @@ def values_of(log: FlightLog) -> np.ndarray:
     return hold_finite(np.column_stack([level_acceleration(log), log.stack(GYRO), log.stack(PWM)]))[0]
 
 
-def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _join(parts: Sequence[np.ndarray]) -> np.ndarray:
     """The parts in sequence, (n, 10), blended over BLEND_S; parts that are shorter than two blends are skipped."""
     n = round(BLEND_S * RATE_HZ)
     share = np.linspace(0.0, 1.0, n)[:, None]

@@ -14,10 +14,11 @@ from airtouch.detector.trace import Detection
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.vision import lines
 from airtouch.vision.camera import Camera
-from airtouch.vision.crossings import Film, Sight, detections, frames, sight
+from airtouch.vision.crossings import GROUP_S, Film, Sight, detections, frames, sight
 
-THRESHOLDS = 30  #: candidates for the threshold: quantiles of the strengths in the training frames
-TOGETHER_S = 0.6  #: s, largest time between crossings of camera and AirTouch at one edge
+#: candidates for the threshold: quantiles of the strengths in the training frames; no source: round number
+THRESHOLDS = 30
+TOGETHER_S = GROUP_S  #: s, largest time between crossings of camera and AirTouch at one edge
 ROUNDING = 1.0 / 12.0  #: variance of rounding to a sample, samples squared
 Sights = Sequence[Sequence[Sight]]  #: one sequence a film
 
@@ -35,15 +36,15 @@ class Fusion:
     airtouch_alone: bool
 
 
-def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper], seed: int,
-           tell: Callable[[str], None] = lambda _: None) -> dict[str, list[list[Sight]]]:
+def sights_of_films(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper], seed: int,
+                    tell: Callable[[str], None] = lambda _: None) -> dict[str, list[list[Sight]]]:
     """Mapper's name -> sights in each film at one illuminance. Every frame is rendered once for all mappers."""
     camera = Camera()
     sights: dict[str, list[list[Sight]]] = {name: [] for name in mappers}
     for number, shot in enumerate(films, start=1):
         of_film: dict[str, list[Sight]] = {name: [] for name in mappers}
         for time_s, image in frames(camera, shot, lux, seed):
-            small = lines.binned(image)
+            small = lines.shrink(image)
             for name, mapper in mappers.items():
                 of_film[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
         for name, of_mapper in of_film.items():
@@ -71,7 +72,7 @@ def lag(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
 
     It is negative: the down range, from which the true edges come, is some hundredths of a second late.
     """
-    return tuning.lag((shot.edges, found) for shot, found in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
+    return tuning.lag((shot.edges, detected) for shot, detected in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
 
 
 def without_lag(by_film: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
@@ -91,19 +92,19 @@ def airtouch_crossings(films: Sequence[Film], name: str) -> list[list[Detection]
     return by_film
 
 
-def scored(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:
+def flight_scores(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:
     """One score for each film: errors and misses at its edges, and false crossings a minute."""
     scores = []
-    for shot, found in zip(films, by_film, strict=True):
+    for shot, detected in zip(films, by_film, strict=True):
         filming = np.zeros(len(shot.log), bool)
         filming[int(shot.first_s / SAMPLE_PERIOD_S):int(shot.last_s / SAMPLE_PERIOD_S)] = True
-        inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in found]
+        inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in detected]
         scores.append(score_flight(Path(shot.log.source).name, Condition(speed_mps=shot.speed_mps), shot.edges, filming,
                                    np.full(len(shot.log), np.nan), inside))
     return scores
 
 
-def fused(by_camera: Sequence[Detection], by_airtouch: Sequence[Detection], fusion: Fusion) -> list[Detection]:
+def fuse(by_camera: Sequence[Detection], by_airtouch: Sequence[Detection], fusion: Fusion) -> list[Detection]:
     """Crossings by a fusion rule: pairs at their weighted mean time, and the single ones that the rule accepts."""
     pairs = match([d.sample for d in by_camera], [d.sample for d in by_airtouch], TOGETHER_S / SAMPLE_PERIOD_S)
     joined = [Detection(round(fusion.share * by_camera[i].sample + (1.0 - fusion.share) * by_airtouch[j].sample),
@@ -126,12 +127,12 @@ def choose_fusion(films: Sequence[Film], by_camera: Sequence[Sequence[Detection]
     choices = [Fusion(airtouch / (camera + airtouch), camera_alone, airtouch_alone)
                for camera_alone in (True, False) for airtouch_alone in (True, False)]
     return max(choices, key=lambda f: tuning.timed_f1(
-        [(shot.edges, fused(a, b, f)) for shot, a, b in zip(films, by_camera, by_airtouch, strict=True)]))
+        [(shot.edges, fuse(a, b, f)) for shot, a, b in zip(films, by_camera, by_airtouch, strict=True)]))
 
 
 def _squared_error(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
-    """Mean squared error of the edges found, samples squared, rounding included; the tolerance's where none is."""
+    """Mean squared error of the detected edges, samples squared, rounding included; the tolerance's where none is."""
     tolerance = TOLERANCE_S / SAMPLE_PERIOD_S
-    errors = [found[j].sample - shot.edges[i].sample for shot, found in zip(films, by_film, strict=True)
-              for i, j in match([e.sample for e in shot.edges], [d.sample for d in found], tolerance)]
+    errors = [detected[j].sample - shot.edges[i].sample for shot, detected in zip(films, by_film, strict=True)
+              for i, j in match([e.sample for e in shot.edges], [d.sample for d in detected], tolerance)]
     return float(np.mean(np.square(errors))) + ROUNDING if errors else tolerance ** 2

@@ -15,8 +15,8 @@ from airtouch.vision import scene as scenes
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.lines import Line
 
-MARGIN_S = 0.8  #: s of film before the first edge and after the last
-GROUP_S = 0.6  #: s, longest time between two frames of one edge
+MARGIN_S = 0.8  #: s of film before the first edge and after the last; no source: a little more than GROUP_S
+GROUP_S = 0.6  #: s, longest time between two frames of one edge; no source: round number, 0.18 m at 0.3 m/s
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def frames(camera: Camera, shot: Film, lux: float, seed: int) -> Iterator[tuple[
     shares = scenes.subposes(camera, shot.speed_mps, seconds, shot.clearance_m)
     for time_s in np.arange(shot.first_s + rng.uniform(0.0, 1.0 / camera.frame_hz), shot.last_s, 1.0 / camera.frame_hz):
         inside = [pose(shot.log, time_s + share * seconds) for share in shares]
-        yield float(time_s), expose(camera, scenes.blurred(camera, inside, shot.scene), lux, seconds, rng)
+        yield float(time_s), expose(camera, scenes.blur(camera, inside, shot.scene), lux, seconds, rng)
 
 
 def pose(log: FlightLog, time_s: float) -> scenes.Pose:

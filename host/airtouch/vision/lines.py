@@ -28,7 +28,7 @@ class Line:
     column: float
 
 
-def binned(image: np.ndarray) -> np.ndarray:
+def shrink(image: np.ndarray) -> np.ndarray:
     """(120, 160) float32: means over 2 x 2 pixels of the middle 240 x 320, a binning that the chip has too."""
     top, left = (image.shape[0] - 240) // 2, (image.shape[1] - 320) // 2
     return image[top:top + 240, left:left + 320].astype(np.float32).reshape(120, 2, 160, 2).mean(axis=(1, 3))
@@ -40,7 +40,7 @@ def classical(image: np.ndarray) -> np.ndarray:
     return slope / (float(slope.std()) + 1.0)
 
 
-def learned(weights: teed.Weights) -> Mapper:
+def learned_mapper(weights: teed.Weights) -> Mapper:
     """The network's probability of an edge."""
     return lambda image: teed.infer(weights, image)
 

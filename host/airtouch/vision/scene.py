@@ -76,10 +76,10 @@ def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
         x, y = ground_points(camera, pose, scene.top_m)
         on_top = over(scene, x, y)
         if on_top.any():
-            top = _sampled(scene.top, x, y, TOP_M_PER_PX)
+            top = _sample(scene.top, x, y, TOP_M_PER_PX)
     if on_top.all():
         return top
-    floor = _sampled(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
+    floor = _sample(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
     return np.where(on_top, top, floor) if on_top.any() else floor
 
 
@@ -98,7 +98,7 @@ def subposes(camera: Camera, speed_mps: float, seconds: float, distance_m: float
     return np.linspace(-0.5, 0.5, int(np.clip(count, 3, 13)))
 
 
-def blurred(camera: Camera, poses: Sequence[Pose], scene: Scene) -> np.ndarray:
+def blur(camera: Camera, poses: Sequence[Pose], scene: Scene) -> np.ndarray:
     """The mean of the views of several poses within an exposure."""
     return np.mean([view(camera, pose, scene) for pose in poses], axis=0)
 
@@ -112,13 +112,13 @@ def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> 
     return (cv2.dilate(inside, kernel) - cv2.erode(inside, kernel)) > 0
 
 
-def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
+def _sample(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
     """The repeated texture at x, y (m), interpolated bilinearly; its mean for NaN."""
-    u, v = (_wrapped(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px)) for a in (x, y))
+    u, v = (_wrap(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px)) for a in (x, y))
     grey = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
     return grey if np.isfinite(x).all() else np.where(np.isfinite(x), grey, tile.mean())
 
 
-def _wrapped(place_px: np.ndarray) -> np.ndarray:
+def _wrap(place_px: np.ndarray) -> np.ndarray:
     """Places modulo TILE_PX; the same bits as np.mod, which is five times slower, for the tile is a power of two."""
     return place_px - np.float32(TILE_PX) * np.floor(place_px / np.float32(TILE_PX))

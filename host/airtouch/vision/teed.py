@@ -62,7 +62,7 @@ def smish(x: np.ndarray) -> np.ndarray:
 
 def infer(weights: Weights, image: np.ndarray) -> np.ndarray:
     """P(edge) (rows, columns) of a grey image (rows, columns) of 0 to 255, both multiples of 4. Plain NumPy."""
-    x = normalised(image)[..., None]
+    x = normalise(image)[..., None]
     one = smish(_conv(weights, "block1.2", smish(_conv(weights, "block1.1", x, 2))))
     two = _conv(weights, "block2.2", smish(_conv(weights, "block2.1", one)))
     down = _pool(two)
@@ -76,7 +76,7 @@ def infer(weights: Weights, image: np.ndarray) -> np.ndarray:
     return expit((first + _depthwise(weights, "fuse2", first)).sum(axis=-1))
 
 
-def normalised(image: np.ndarray) -> np.ndarray:
+def normalise(image: np.ndarray) -> np.ndarray:
     """float32 with mean 0 and rms 1 over the image (over the last two axes)."""
     x = image.astype(np.float32)
     x = x - x.mean(axis=(-2, -1), keepdims=True)

@@ -18,7 +18,7 @@ from airtouch.vision import scene as scenes
 from airtouch.vision import teed
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.crossings import draw_texture
-from airtouch.vision.lines import binned
+from airtouch.vision.lines import shrink
 from airtouch.vision.weights import SIZES
 
 IMAGES, STEPS, BATCH, CROP_PX = 500, 600, 8, 96  #: rendered images, training steps, crops a step, pixels of a crop
@@ -48,9 +48,9 @@ def examples(count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
         level = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
         shares = scenes.subposes(camera, abs(speed), seconds, high)
         places = [np.array([x + speed * s * seconds, 0.0, 0.76 + high]) for s in shares]
-        shown = scenes.blurred(camera, [scenes.Pose(p, level) for p in places], scene)
-        images[i] = binned(expose(camera, shown, lux, seconds, rng))
-        truth[i] = binned(scenes.outline(camera, scenes.Pose(np.array([x, 0.0, 0.76 + high]), level), scene, 2.0)) > 0.4
+        shown = scenes.blur(camera, [scenes.Pose(p, level) for p in places], scene)
+        images[i] = shrink(expose(camera, shown, lux, seconds, rng))
+        truth[i] = shrink(scenes.outline(camera, scenes.Pose(np.array([x, 0.0, 0.76 + high]), level), scene, 2.0)) > 0.4
     return images, truth
 
 
@@ -70,7 +70,7 @@ def train(name: str, images: np.ndarray, truth: np.ndarray, steps: int = STEPS, 
     model = teed.build_keras(SIZES[name])
     model.compile(keras.optimizers.Adam(PEAK_RATE), loss=loss)
     rng = np.random.default_rng(seed)
-    x = teed.normalised(images)
+    x = teed.normalise(images)
     for step in range(steps):
         model.optimizer.learning_rate = one_cycle(step, steps, PEAK_RATE)
         chosen = rng.integers(len(x), size=BATCH)

@@ -59,14 +59,14 @@ def test_the_rates_alone_tell_flight_from_ground(flights):
     for path in paths:
         log = logs.read(path)
         air = np.flatnonzero(logs.airborne(log))
-        airborne = sensors.flying(log.stack(GYRO))
+        airborne = sensors.is_flying(log.stack(GYRO))
         assert not airborne[:max(air[0] - 30, 0)].any(), path
         assert airborne[air[0] + 100:air[-1]].mean() > 0.999, path
 
 
 def test_flight_is_told_causally():
     gyro = made_flight(5).stack(GYRO)
-    assert np.array_equal(sensors.flying(gyro[:1000]), sensors.flying(gyro)[:1000])
+    assert np.array_equal(sensors.is_flying(gyro[:1000]), sensors.is_flying(gyro)[:1000])
 
 
 def test_a_sensor_that_no_training_flight_has_is_silent_for_good():
@@ -105,7 +105,7 @@ def test_sample_by_sample_is_the_same_as_at_once(sensor):
     from airtouch.crazyflie.view.host_detector import HostDetector
 
     log = sensors.without(made_flight(4, 1500), (sensor,))
-    pieces = HostDetector(missing=sensors.missing(log))
+    pieces = HostDetector(missing=sensors.missing_sensors(log))
     for first in range(0, len(log), 7):
         pieces.next({name: values[first:first + 7] for name, values in log.columns.items()})
     at_once = best.run(log)

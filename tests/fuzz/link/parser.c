@@ -18,8 +18,9 @@ static bool sameBody(const edgeLinkPacket_t *a, const edgeLinkPacket_t *b) {
              memcmp(a->result.answer, b->result.answer, a->result.count * sizeof a->result.answer[0]) == 0;
     default: {
       const edgeLinkHeartbeat_t *x = &a->heartbeat, *y = &b->heartbeat;
-      return x->uptimeMs == y->uptimeMs && x->expected == y->expected && x->taken == y->taken && x->lost == y->lost &&
-             x->refused == y->refused && x->algorithm == y->algorithm && x->flags == y->flags &&
+      return x->uptimeMs == y->uptimeMs && x->expected == y->expected && x->samplesTaken == y->samplesTaken &&
+             x->samplesLost == y->samplesLost && x->packetsRefused == y->packetsRefused &&
+             x->algorithm == y->algorithm && x->flags == y->flags &&
              memcmp(x->digest, y->digest, EDGE_LINK_DIGEST_BYTES) == 0;
     }
   }

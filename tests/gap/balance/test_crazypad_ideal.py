@@ -17,7 +17,7 @@ def test_millimetres_of_a_condition():
 
 def test_a_small_cut_may_be_normal():
     table = [{"condition": c, "verdict": "none", "effects": []} for c in ("normal_flight", "cut_propeller_M3_1mm")]
-    assert pad.balanced(table) == 0.5 and pad.forgiven(table) == 1.0
+    assert pad.balanced_accuracy(table) == 0.5 and pad.forgiven(table) == 1.0
     table[1]["condition"] = "cut_propeller_M3_3mm"
     assert pad.forgiven(table) == 0.5
 
@@ -34,7 +34,7 @@ def test_slope_and_scatter_are_found_again():
                                                  strict=True)]
     scatter = np.array([0.013, 0.008, 0.008, 0.024])
     means = np.array([balance.change(c, 0.03, 1.2) for c in cuts]) + scatter * generator.standard_t(4, (400, 4))
-    coefficients, residuals = balance.fitted(means, cuts)
+    coefficients, residuals = balance.fit(means, cuts)
     assert coefficients == pytest.approx([0.03, 1.2], rel=0.1)
     assert balance.maintenance(residuals, np.full((400, 4), 1e-8), 4.0) == pytest.approx(scatter, rel=0.2)
 
@@ -47,6 +47,6 @@ def test_learners_tell_what_is_apart_and_not_what_is_not(learner, monkeypatch):
     rows = [{"drone": "E8", "condition": n} for n in names for _ in range(12)]
     separate = np.repeat(np.eye(4), 12, axis=0)
     folds = [np.arange(48) % 4 == i for i in range(4)]
-    sure = ideal.judged(ideal.Table(rows, 10.0 * separate + generator.normal(size=(48, 4))), folds, learner)
-    chance = ideal.judged(ideal.Table(rows, generator.normal(size=(48, 4))), folds, learner)
-    assert pad.balanced(sure) > 0.95 and pad.balanced(chance) < 0.6
+    sure = ideal.cross_validate(ideal.Table(rows, 10.0 * separate + generator.normal(size=(48, 4))), folds, learner)
+    chance = ideal.cross_validate(ideal.Table(rows, generator.normal(size=(48, 4))), folds, learner)
+    assert pad.balanced_accuracy(sure) > 0.95 and pad.balanced_accuracy(chance) < 0.6

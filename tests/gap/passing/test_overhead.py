@@ -128,6 +128,6 @@ def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights, mo
     cases = [c for c in gap_real.swarm(flights, "build") if c.flight.endswith("downwash_cf102d19_008.csv.gz")]
     case, = gap_real.with_partners(cases, flights)
     assert case.partner
-    diagnosis = gap_real.answered(case)
+    diagnosis = gap_real.diagnose_case(case)
     assert gap_real.answer(diagnosis) == "downwash"
     assert any(abs(s["from_s"] - 5.5) < 0.3 for s in diagnosis["effects"][0]["seconds"])

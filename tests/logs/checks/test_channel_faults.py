@@ -43,14 +43,14 @@ def test_stuck_intervals_are_the_runs_that_a_loop_finds(seed):
             if k - start > 50:
                 expected.append(("gyro_x_radps", start, k))
             start = k
-    intervals = channel_faults.stuck(log_of({"gyro_x_radps": values}), flying)
+    intervals = channel_faults.stuck_intervals(log_of({"gyro_x_radps": values}), flying)
     # 0.5 s to the bit is on the limit
     assert [interval for interval in intervals if interval[2] - interval[1] != 50] == expected
 
 
 def test_a_channel_that_never_changes_is_stuck_on_the_ground_too():
     log = log_of({"vbat_V": np.full(400, 3.9), "acc_x_mps2": np.arange(400.0)})
-    assert channel_faults.stuck(log, np.zeros(400, bool)) == [("vbat_V", 0, 400)]
+    assert channel_faults.stuck_intervals(log, np.zeros(400, bool)) == [("vbat_V", 0, 400)]
 
 
 def test_duplicates_are_the_pairs_whose_correlation_is_one():
@@ -67,5 +67,5 @@ def test_saturation_counts_samples_at_full_scale():
     rng = np.random.default_rng(4)
     pwm = rng.choice([100.0, 65534.0, 65535.0], 400)
     gyro = rng.choice([0.0, np.deg2rad(1990.0), -np.deg2rad(2000.0)], 400)
-    assert channel_faults.saturated(log_of({"m1_pwm": pwm, "gyro_x_radps": gyro, "acc_x_mps2": gyro})) == {
+    assert channel_faults.saturation_counts(log_of({"m1_pwm": pwm, "gyro_x_radps": gyro, "acc_x_mps2": gyro})) == {
         "m1_pwm": sum(v == 65535 for v in pwm), "gyro_x_radps": sum(v < 0 for v in gyro)}

@@ -18,7 +18,7 @@ from airtouch.logs import public
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
 from log_fuzzing.hostile import HOSTILE, table
-from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns
+from log_fuzzing.sound import META, canonical, motion, pack_log, parquet, si_columns
 
 
 def flying(n=200, **changed):
@@ -51,7 +51,7 @@ def test_values_that_no_sensor_reads_are_missing_and_said_so():
     assert np.flatnonzero(np.isnan(log["vx_mps"])).tolist() == [7, 9] and log["vx_mps"][11] == 3e38
     assert "vx_mps: no sensor reads inf (sample 7); 2 of 200 values were taken as missing" in log.meta["warnings"]
     variables = [(f"acc.{a}", "d") for a in "xyz"]
-    data = packed(2, [(1, "fixedFrequency", variables)], [(1, 1000 * i, [1e308, 0.0, 1.0]) for i in range(5)])
+    data = pack_log(2, [(1, "fixedFrequency", variables)], [(1, 1000 * i, [1e308, 0.0, 1.0]) for i in range(5)])
     assert np.isnan(parse(data, "log00")["acc_x_mps2"]).all()
 
 
@@ -121,13 +121,13 @@ def test_lines_of_blanks_are_skipped_and_errors_name_the_line_after_them(blank):
 
 def test_damaged_usd_headers_are_refused_with_the_remedy():
     variables = [(f"acc.{a}", "f") for a in "xyz"]
-    twice = packed(2, [(1, "fixedFrequency", variables), (1, "other", variables[:1])], [])
+    twice = pack_log(2, [(1, "fixedFrequency", variables), (1, "other", variables[:1])], [])
     with pytest.raises(AirTouchError, match="two events have the number 1; copy it from the card again"):
         parse(twice, "log00")
-    oversized = packed(2, [(1, "fixedFrequency", variables * 100)], [])
+    oversized = pack_log(2, [(1, "fixedFrequency", variables * 100)], [])
     with pytest.raises(AirTouchError, match="300 variables in one event.*; copy it"):
         parse(oversized, "log00")
-    odd = packed(2, [(1, "fixedFrequency", [("a\nb" * 3000, "f")])], [(1, 0, [0.0])])
+    odd = pack_log(2, [(1, "fixedFrequency", [("a\nb" * 3000, "f")])], [(1, 0, [0.0])])
     with pytest.raises(AirTouchError, match="none of its variables is known") as error:
         parse(odd, "log00")
     assert str(error.value).isprintable() and len(str(error.value)) < 200

@@ -64,9 +64,9 @@ def test_levers_at_edges_come_back(aim, vehicle, chosen):
 
 def test_every_height_has_as_many_flights():
     courses = [made_course(i, c) for i, c in enumerate([0.02] * 9 + [0.05] * 2 + [0.09])]
-    of = edge_fit.balanced(courses, 30, np.random.default_rng(0))
+    of = edge_fit.balanced_draw(courses, 30, np.random.default_rng(0))
     heights = [courses[i].clearance_m for i in of]
     assert [heights.count(h) for h in (0.02, 0.05, 0.09)] == [10, 10, 10]
     assert len(set(of)) == 12
-    drawn_courses = edge_fit.balanced(courses[:9], 18, np.random.default_rng(0))
+    drawn_courses = edge_fit.balanced_draw(courses[:9], 18, np.random.default_rng(0))
     assert sorted(drawn_courses.tolist()) == sorted(2 * list(range(9)))

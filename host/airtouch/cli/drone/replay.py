@@ -42,7 +42,7 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
         raise AirTouchError(f"{flight}: give one flight, not a folder")
     log = evaluate.read_flight(files[0], evaluate.spare_of(best))
     file = dataset.with_flown_speed(files[0], log)
-    detector = HostDetector(best.load(model), sensors.missing(log))
+    detector = HostDetector(best.load(model), sensors.missing_sensors(log))
     board = boards.Board(flight.name, "best", detector.lag_s)
     with stopping(quiet=True) as stop, screen(bool(speed)) as (show, say):
         fed = replay.run(log, board, detector, speed=speed, speed_mps=file.condition.speed_mps, stop=stop,

@@ -32,7 +32,7 @@ def blind() -> None:
 def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
     """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart.
 
-    First it finds how strong each effect must be to show at all; that takes minutes, however few the flights.
+    It first measures how strong each effect must be to show at all; that takes minutes, however few the flights.
     """
     make_folder(out)
     click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
@@ -61,7 +61,7 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 
     need("plots", "scoring a sealed set")
     check_free(json_path, plot, force)
-    _scored(sealed.score(folder, answers, key), json_path, plot, force)
+    _print_score(sealed.score(folder, answers, key), json_path, plot, force)
 
 
 @blind.command("run", epilog=examples(
@@ -91,24 +91,24 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
         from airtouch.gap.sealed import blind_run as check
 
         figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
-    _scored(figures, json_path or out / "figures.json", out / "figures.png", True)
+    _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 
-def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:
+def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:
     """Print the score of a blind check, and write it to files."""
     from rich.table import Table
 
     from airtouch.logs.files import write_bytes
     from airtouch.report import blind_figures
 
-    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.rows(found)),
-                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(found))):
+    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.rows(figures)),
+                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
         table = Table(*heads)
         for row in rows:
             table.add_row(*row)
         scores.console().print(table)
     if json_path:
-        scores.write_json(json_path, found, force)
+        scores.write_json(json_path, figures, force)
     if plot:
-        write_bytes(blind_figures.picture(found), plot, force)
+        write_bytes(blind_figures.picture(figures), plot, force)
     written(json_path, plot)

@@ -12,9 +12,7 @@ from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import interval, ratio, short
 
-MOST_CELLS = 16
-
-
+MOST_CELLS = 16  #: rows of a table of cells, largest first; no source: fits a terminal
 #: column of a table of cells -> (text of a cell, columns of the narrowest terminal that shows it)
 CELL_COLUMNS: dict[str, tuple[Callable[[Cell], str], int]] = {
     "phase": (lambda c: c.phase, 0),
@@ -31,40 +29,40 @@ CELL_COLUMNS: dict[str, tuple[Callable[[Cell], str], int]] = {
 NUMBERS = ("gap", "floor", "gap/floor", "after")
 
 
-def cells(found: Iterable[Cell], title: str, width: int) -> Table:
+def cell_table(cells: Iterable[Cell], title: str, width: int) -> Table:
     """A table of cells of a gap map for a terminal of a width; a column that says nothing is left out."""
-    found = list(found)[:MOST_CELLS]
+    cells = list(cells)[:MOST_CELLS]
     table = Table(title=title, title_justify="left", caption_justify="left",
                   caption="90 % intervals; a cell is listed when its interval clears the floor's")
     columns = [(name, text) for name, (text, least) in CELL_COLUMNS.items()
-               if width >= least and any(text(cell) for cell in found)]
+               if width >= least and any(text(cell) for cell in cells)]
     for name, _ in columns:
         table.add_column(name, justify="right" if name in NUMBERS else "left", no_wrap=name != "regime")
-    for cell in found:
+    for cell in cells:
         table.add_row(*(text(cell) for _, text in columns))
     return table
 
 
-def measurement(screen: Console, found: Measurement) -> None:
+def measurement(screen: Console, result: Measurement) -> None:
     """Print a measurement."""
-    count = len(found.flights)
-    screen.print(f"{count} flight{'s' * (count != 1)} against {found.vehicle}; floor: {found.map.floor_from}"
-                 + (f" ({len(found.baseline)})" if found.baseline else ""))
-    if found.where:
-        screen.print(cells(found.where, "Largest cells of the gap", screen.width))
+    count = len(result.flights)
+    screen.print(f"{count} flight{'s' * (count != 1)} against {result.vehicle}; floor: {result.map.floor_from}"
+                 + (f" ({len(result.baseline)})" if result.baseline else ""))
+    if result.where:
+        screen.print(cell_table(result.where, "Largest cells of the gap", screen.width))
     else:
         screen.print("No cell of the gap stands out of its floor.")
-    screen.print(words.overall(found.gap))
-    remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors])
-    remarks(screen, "What these logs cannot say", found.cannot)
-    remarks(screen, "Notes", found.notes)
+    screen.print(words.overall(result.gap))
+    remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in result.rotors])
+    remarks(screen, "What these logs cannot say", result.cannot)
+    remarks(screen, "Notes", result.notes)
 
 
-def diagnosis(screen: Console, found: Diagnosis) -> None:
+def diagnosis(screen: Console, result: Diagnosis) -> None:
     """Print a diagnosis: sentences, effects, ranking, largest cells and next steps."""
-    for sentence in words.sentences(found):
+    for sentence in words.sentences(result):
         screen.print(sentence)
-    for effect in found.effects:
+    for effect in result.effects:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
                   caption="shrink: part of the gap above the floor that goes away on data held out, "
@@ -72,25 +70,25 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
-    for r in words.leading(found.ranking):
+    for r in words.leading(result.ranking):
         table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"), r.why)
     screen.print(table)
-    for group in found.indistinguishable:
+    for group in result.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")
-    if found.where:
-        screen.print(cells(found.where, "Where", screen.width))
-    remarks(screen, "What stays open", words.all_open_in_words(found.unexplained))
-    remarks(screen, "Other near effects", words.nearest_in_words(found))
-    if found.next:
+    if result.where:
+        screen.print(cell_table(result.where, "Where", screen.width))
+    remarks(screen, "What stays open", words.all_open_in_words(result.unexplained))
+    remarks(screen, "Other near effects", words.nearest_in_words(result))
+    if result.next:
         screen.print("Next:")
-    for step in found.next:
+    for step in result.next:
         page = f" (host/docs/effects.md, {step.page!r})" if step.page else ""
         screen.print(f"  - {step.text}{page}", highlight=False)
         if step.command:
             # Not wrapped: a line break within a copied command would end it.
             screen.print(f"      {step.command}", highlight=False, soft_wrap=True)
-    remarks(screen, "What these logs cannot say", found.cannot)
-    remarks(screen, "Notes", found.notes)
+    remarks(screen, "What these logs cannot say", result.cannot)
+    remarks(screen, "Notes", result.notes)
 
 
 def remarks(screen: Console, title: str, lines: Sequence[str]) -> None:

@@ -70,7 +70,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
     twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
-        [f.file.path for f in labelled if not sensors.missing(f.log)], vehicles.load(vehicle) if vehicle else
+        [f.file.path for f in labelled if not sensors.missing_sensors(f.log)], vehicles.load(vehicle) if vehicle else
         vehicles.load(), work, speed_mps=speed, seed=seed, bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")

@@ -22,12 +22,12 @@ class HostDetector:
     """
 
     def __init__(self, model: BestModel | None = None, missing: tuple[str, ...] = ()) -> None:
-        """missing: the sensors, one at most, that the rows lack (`detector.shared.sensors.missing`)."""
+        """missing: the sensors, one at most, that the rows lack (`detector.shared.sensors.missing_sensors`)."""
         self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)
         self._missing = missing
         self._decoder = self.model.decoder_without(missing)
-        self._session = StreamSession(self.model.int8, sensors.silenced(self.model.recipe.motion, missing),
+        self._session = StreamSession(self.model.int8, sensors.silence(self.model.recipe.motion, missing),
                                       self._decoder)
         self._rates = np.empty((0, 3))
         self._logits: list[np.ndarray] = []

@@ -28,12 +28,12 @@ from airtouch.detector.best.detector import (
     pseudo_labels,
     run,
     run_float,
-    timed,
     trace_of,
+    with_lag,
 )
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.recipe import Recipe
 
 __all__ = ["DECODER", "DECODER_WITHOUT", "FINE_TUNING", "KINDS", "SPARE_SENSORS", "TIMING_SIGMA_S", "BestModel",
            "Recipe", "fit", "flight_events", "lag_s", "load", "model_for", "parameters", "pseudo_labels", "run",
-           "run_float", "timed", "trace_of"]
+           "run_float", "trace_of", "with_lag"]

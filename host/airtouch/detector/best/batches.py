@@ -20,7 +20,7 @@ AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and
 
 
 @dataclass(frozen=True)
-class Flight:
+class TrainingFlight:
     """One training flight of n samples.
 
     x: (n, channels). goals: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
@@ -42,10 +42,10 @@ def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.
     """
     logged = sensors.signals(log)
     return kernels.motion_channels(logged.acc, logged.gyro, logged.pwm,
-                                   sensors.silenced(motion or MotionConfig(), logged.missing))
+                                   sensors.silence(motion or MotionConfig(), logged.missing))
 
 
-def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None = None) -> Flight:
+def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None = None) -> TrainingFlight:
     """A log as a training flight; its edges are those of its down range unless given.
 
     Flights that pass over the platform at 4 cm or more are drawn more often.
@@ -53,14 +53,14 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
     x, airborne = channels_of(log, recipe.motion)
     edges = logs.true_edges(log) if edges is None else edges
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
-    silent = {channel for sensor in sensors.missing(log) for channel in sensors.CHANNELS_OF[sensor]}
-    return Flight(x, goals(over_platform(edges, len(log)), edges, recipe),
-                  np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
-                  tuple(sorted(silent)))
+    silent = {channel for sensor in sensors.missing_sensors(log) for channel in sensors.CHANNELS_OF[sensor]}
+    return TrainingFlight(x, goals(over_platform(edges, len(log)), edges, recipe),
+                          np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
+                          tuple(sorted(silent)))
 
 
-def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
-          free_air: Sequence[Flight] = ()) -> tuple[np.ndarray, np.ndarray]:
+def batch(flights: Sequence[TrainingFlight], recipe: Recipe, rng: np.random.Generator,
+          free_air: Sequence[TrainingFlight] = ()) -> tuple[np.ndarray, np.ndarray]:
     """Inputs (batch, crop, channels) and goals (batch, crop / stride, outputs), float32.
 
     free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
@@ -95,7 +95,7 @@ def _silent(recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
     return silent
 
 
-def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _crop(flight: TrainingFlight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """One crop, its time stretched by up to `warp`; before and after the flight its first and last sample repeat."""
     speed = 1.0 + recipe.warp * rng.uniform(-1, 1)
     last = len(flight.x) - 1
@@ -107,7 +107,7 @@ def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.
     return x, flight.goals[np.round(t[::STRIDE]).astype(int)]
 
 
-def crop_start(flight: Flight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
+def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
     """Where a crop starts, samples: before an edge, at take-off, at landing, or anywhere in the flight.
 
     A crop that lies anywhere seldom holds the last second of its flight, so landings are drawn by themselves.

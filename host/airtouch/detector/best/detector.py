@@ -16,7 +16,7 @@ import numpy as np
 from airtouch import __version__, kernels, logs
 from airtouch.detector.best import model as model_file
 from airtouch.detector.best import sensor_note
-from airtouch.detector.best.batches import Flight, channels_of, flight_of
+from airtouch.detector.best.batches import TrainingFlight, channels_of, flight_of
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
 from airtouch.detector.best.recipe import STRIDE, Recipe
@@ -70,7 +70,7 @@ def run(log: FlightLog, model: BestModel | None = None) -> Trace:
 
 def model_for(model: BestModel | None, log: FlightLog) -> BestModel:
     """The model that serves this log: the shipped one has others for logs that lack a sensor."""
-    return (model or load(None)).serving(sensors.missing(log))
+    return (model or load(None)).serving(sensors.missing_sensors(log))
 
 
 def run_float(log: FlightLog, model: BestModel) -> Trace:
@@ -79,14 +79,14 @@ def run_float(log: FlightLog, model: BestModel) -> Trace:
     steps = float_logits(model.weights, model.recipe.graph, x)
     edge = np.zeros(len(log), dtype=np.uint8)
     edge[::STRIDE] = kernels.edge_decoder(steps[:, :len(LOGITS)], airborne[::STRIDE],
-                                          model.decoder_without(sensors.missing(log)))
+                                          model.decoder_without(sensors.missing_sensors(log)))
     return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
 
 
 def trace_of(log: FlightLog, model: BestModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
     """Edges with the highest probability of their crossing that led to them."""
     over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
-    absent = sensors.missing(log)
+    absent = sensors.missing_sensors(log)
     decoder = model.decoder_without(absent)
     recent = (decoder.hold_steps + decoder.look_back) * STRIDE
     edges = []
@@ -101,7 +101,7 @@ def flight_events(log: FlightLog, model: BestModel) -> StreamEvents:
     """One flight through the C detector."""
     logged = sensors.signals(log)
     return kernels.stream_detector(logged.acc, logged.gyro, logged.pwm, model.int8,
-                                   sensors.silenced(model.recipe.motion, logged.missing),
+                                   sensors.silence(model.recipe.motion, logged.missing),
                                    model.decoder_without(logged.missing))
 
 
@@ -122,7 +122,7 @@ def fit(
     recipe: shape and training, changed by `changes` (fields of `Recipe`: steps, peak_rate, ...). decoder: its settings;
     `start`'s, else DECODER. most_flights: train on so many at most, drawn by seed. A sensor that no flight has is
     silent for good. work: a folder in which the training is kept, so that the same call goes on after a stop.
-    lag_of: flights, and edges as in pseudo_labels, whose lag counts before that of the training flights (`timed`).
+    lag_of: flights, and edges as in pseudo_labels, whose lag counts before that of the training flights (`with_lag`).
     The flights' names and hashes go into the model's metadata.
     Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
     """
@@ -133,18 +133,13 @@ def fit(
     labels = list(pseudo_labels) if pseudo_labels is not None else [None] * len(flights)
     if len(labels) != len(flights):
         raise AirTouchError(f"training: {len(labels)} pseudo-labels for {len(flights)} flights; give one a flight")
-    if recipe is None:
-        recipe = replace(start.recipe, **FINE_TUNING) if start else Recipe()
-    recipe = _changed(recipe, changes)
+    recipe = _recipe(recipe, changes, start)
     use_tensorflow(seed)
     if most_flights is not None and most_flights < len(flights):
         drawn = sorted(np.random.default_rng(seed).permutation(len(flights))[:most_flights])
         flights, labels = [flights[i] for i in drawn], [labels[i] for i in drawn]
         emphasis = emphasis if emphasis is None else [emphasis[i] for i in drawn]
     recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
-    if start is not None and start.recipe.graph != recipe.graph:
-        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
-                            "alone")
     examples = _examples(flights, labels, emphasis, recipe, report)
     weights = training.fit(examples, recipe, seed, lambda done, total, note: report("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
@@ -155,10 +150,10 @@ def fit(
         "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
         "sigma_s": TIMING_SIGMA_S, **_decoders(decoder, start), **training_set.of(flights, start),
         "free_air": len(free_air)})
-    return timed(model, *([lag_of] if lag_of else []), (flights, labels))
+    return with_lag(model, *([lag_of] if lag_of else []), (flights, labels))
 
 
-def timed(model: BestModel, *groups: Labelled) -> BestModel:
+def with_lag(model: BestModel, *groups: Labelled) -> BestModel:
     """The model with its lag on the first group of flights in which it finds an edge; its own lag where it finds none.
 
     A group: logs, and the edges of each, None where its down range shows them.
@@ -173,7 +168,7 @@ def timed(model: BestModel, *groups: Labelled) -> BestModel:
 
 
 def _examples(flights: Sequence[FlightLog], labels: Sequence[Sequence[logs.Edge] | None],
-              emphasis: Sequence[float] | None, recipe: Recipe, report: Progress) -> list[Flight]:
+              emphasis: Sequence[float] | None, recipe: Recipe, report: Progress) -> list[TrainingFlight]:
     """The flights as the trainer takes them; AirTouchError where none has an edge."""
     examples = []
     for i, (log, edges) in enumerate(zip(flights, labels, strict=True)):
@@ -217,11 +212,21 @@ def _decoders(decoder: DecoderConfig | None, start: BestModel | None) -> dict[st
     return {"decoder": asdict(DECODER), "decoder_without": {name: asdict(c) for name, c in DECODER_WITHOUT.items()}}
 
 
-def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
+def _recipe(recipe: Recipe | None, changes: dict[str, Any], start: BestModel | None) -> Recipe:
+    """The recipe to train by: the given one, else that of FINE_TUNING of `start`, else the default; with the changes.
+
+    Raises AirTouchError for an unknown field, and for another shape than that of `start`.
+    """
+    if recipe is None:
+        recipe = replace(start.recipe, **FINE_TUNING) if start else Recipe()
     try:
-        return replace(recipe, **changes)
+        recipe = replace(recipe, **changes)
     except TypeError as error:
         raise AirTouchError(f"training: {str(error).split(') ')[-1]}; known: {', '.join(asdict(recipe))}") from None
+    if start is not None and start.recipe.graph != recipe.graph:
+        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
+                            "alone")
+    return recipe
 
 
 def load(path: Path | None) -> BestModel:

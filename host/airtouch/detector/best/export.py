@@ -38,6 +38,7 @@ def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _header(model: BestModel) -> str:
+    """airtouch_stream.h: sizes, hash and declarations."""
     network, motion, decoder = model.int8, model.recipe.motion, model.decoder
     names = ", ".join(output.name for output in OUTPUTS)
     return f"""// The `best` detector: {parameter_bytes(network)} bytes of constants.
@@ -63,6 +64,7 @@ extern const motionConfig_t airtouchStreamMotion;
 
 
 def _source(model: BestModel) -> str:
+    """airtouch_stream.c: weights, network, scales and the settings of decoder and channels."""
     network, decoder = model.int8, model.decoder
     arrays, convs = [], []
     for i, (of, int8) in enumerate(zip(network.graph[:-1], network.layers[:-1], strict=True)):
@@ -95,6 +97,7 @@ def _source(model: BestModel) -> str:
 
 
 def _motion(motion: MotionConfig) -> str:
+    """The settings of the motion channels as a C initialiser."""
     vehicle = motion.vehicle
     thrust = ", ".join(float_literal(c) for c in vehicle.thrust_of_pwm_n)
     literals = [float_literal(1.0 / s) for s in motion.scale]

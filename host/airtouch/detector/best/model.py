@@ -157,6 +157,7 @@ def parse(data: bytes, source: str) -> BestModel:
 
 
 def _recipe(table: Any, source: str) -> Recipe:
+    """The recipe in a model's metadata. Raises AirTouchError for a shape that this version does not run."""
     wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; "
                           f"{archive.REMEDY}")
     try:
@@ -176,6 +177,7 @@ def _recipe(table: Any, source: str) -> Recipe:
 
 
 def _check_metadata(model: BestModel, source: str) -> None:
+    """Raise AirTouchError unless lag and decoder settings are finite numbers."""
     lag, own = model.metadata.get("lag_s"), model.metadata.get("decoder_without", {})
     if not isinstance(own, dict):
         raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.detector.best.network import Weights, window_logits
 from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.recipe import Recipe
-from airtouch.detector.shared.tensorflow import convert, read_weighted
+from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
 from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
@@ -39,7 +39,7 @@ def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tu
     """
     content = convert(window_logits(weights, recipe.graph), (1, 1, recipe.receptive_samples, recipe.graph[0].inputs),
                       representative[:, None, None])
-    return network_of(read_weighted(content), recipe), content
+    return network_of(read_weighted_layers(content), recipe), content
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:

@@ -16,7 +16,9 @@ STRIDE = 2  #: samples between two rows that are computed: 50 Hz
 class Recipe:
     """The settings of a trained network: with the flights and the seed they give its bits.
 
-    Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch.
+    Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch. Width, steps, delay
+    and the choice of crops come from 13 trainings over the five folds, the missing sensors and free air from two more
+    (host/docs/looks.md, 2026-11-21 and 22); the other numbers have no source.
     """
 
     # Shape
@@ -43,8 +45,8 @@ class Recipe:
     balance: float = 3.0  #: how often flights with edges of 4 cm or more are drawn against the others
     # Augmentation
     gain: float = 0.15  #: standard deviation of the logarithm of a gain that all channels share, and of each one's own
-    noise: float = 0.05  #: standard deviation of white noise, in nominal swings of a channel
-    offset: float = 0.1  #: standard deviation of a constant offset, in nominal swings of a channel
+    noise: float = 0.05  #: standard deviation of white noise, in nominal amplitudes of a channel
+    offset: float = 0.1  #: standard deviation of a constant offset, in nominal amplitudes of a channel
     yaw_deg: float = 20.0  #: largest turn about the vertical, degrees
     warp: float = 0.08  #: largest stretch of time, share
     mirror: float = 0.5  #: share of the crops that are mirrored left to right
@@ -74,7 +76,7 @@ class Recipe:
 
     @property
     def motion(self) -> MotionConfig:
-        """The channels' settings: a muted channel has no bounds to its nominal swing."""
+        """The channels' settings: a muted channel has no bounds to its nominal amplitude."""
         config = MotionConfig()
         scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
         return replace(config, scale=scale)

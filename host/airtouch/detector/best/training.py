@@ -5,29 +5,31 @@ import json
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from airtouch.detector.best.batches import Flight, batch
+from airtouch.detector.best.batches import TrainingFlight, batch
 from airtouch.detector.best.network import keras_model, weight_names, weight_shapes
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.detector.best.recipe import STRIDE, Recipe
 from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.logs.files import write_bytes
 
-PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
-KEEP_EVERY = 100  #: steps between two saved states
-RANK_EVERY = 20  #: steps between two rankings of the weights
+#: shares of the steps between which the zeros grow; no source: after the rise of the learning rate, and early enough
+#: that the last quarter mends what pruning costs
+PRUNE_FROM, PRUNE_TO = 0.3, 0.75
+KEEP_EVERY = 100  #: steps between two saved states; no source: round number, no effect on the weights
+RANK_EVERY = 20  #: steps between two rankings of the weights; no source: round number
 #: fields of a recipe that the compiled training step depends on; the others are of crops and pruning
 COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "peak_rate", "weight_decay", "event_weight")
 
 Weights = dict[str, np.ndarray]
 
 
-def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
+def fit(flights: Sequence[TrainingFlight], recipe: Recipe, seed: int,
         progress: Callable[[int, int, str], None] = lambda *_: None, *,
-        free_air: Sequence[Flight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
+        free_air: Sequence[TrainingFlight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
     """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
 
     The order of TensorFlow's sums, and so the bits, depends on how many threads it has: all processors, or
@@ -41,18 +43,18 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
     rng, names = np.random.default_rng(seed), weight_names(recipe.graph)
     drawn = keras_model(recipe.graph).get_weights()
-    model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
+    model, optimizer, _, masks, learn = _learner(recipe, drawn if start is None else [
         start[name].reshape(value.shape) for name, value in zip(names, drawn, strict=True)])
     for name, variable, mask in zip(names, model.trainable_variables, masks, strict=True):
-        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
+        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned_names(recipe)))
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
     state = [*model.trainable_variables, *optimizer.variables, *masks]
-    first = _resumed(resume, state, rng) if resume else 0
+    first = _resume(resume, state, rng) if resume else 0
     for step in range(first, recipe.steps):
         losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
         if start is None and (step % RANK_EVERY == 0 or step == last_rank):
-            _rank(model, masks, recipe, step / recipe.steps)
+            _prune(model, masks, recipe, step / recipe.steps)
         if resume and (step + 1) % KEEP_EVERY == 0:
             _save_state(resume, state, rng, step + 1)
         if (step + 1) % 50 == 0:
@@ -65,23 +67,29 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
     return {name: v.numpy().reshape(shapes[name]) for name, v in zip(names, model.trainable_variables, strict=True)}
 
 
-def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
-    """(model with these weights, optimizer, masks, learn(x, y) -> loss), before the first step."""
-    alike = Recipe(**{name: getattr(recipe, name) for name in COMPILED})
-    model, optimizer, untouched, masks, learn = compiled_step(alike)
-    model.set_weights(weights)
-    for variable, value in zip(optimizer.variables, untouched, strict=True):
+class Learner(NamedTuple):
+    """A Keras model with what trains it; all of one recipe share it."""
+
+    model: Any
+    optimizer: Any
+    optimizer_start: list[np.ndarray]  #: values of the optimizer's variables before the first step
+    masks: list  #: TensorFlow variables, one a weight: 0 where it is pruned, 1 elsewhere
+    learn: Callable  #: learn(x, y) takes one step on a batch and returns its loss
+
+
+def _learner(recipe: Recipe, weights: list[np.ndarray]) -> Learner:
+    """The learner of a recipe with these weights, before the first step."""
+    learner = compiled_step(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
+    learner.model.set_weights(weights)
+    for variable, value in zip(learner.optimizer.variables, learner.optimizer_start, strict=True):
         variable.assign(value)
-    return model, optimizer, masks, learn
+    return learner
 
 
 # all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
 @lru_cache(maxsize=4)
-def compiled_step(recipe: Recipe) -> tuple:
-    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
-
-    recipe: with nothing of its own but COMPILED.
-    """
+def compiled_step(recipe: Recipe) -> Learner:
+    """The learner of a recipe that differs from the default in COMPILED alone, with a compiled step."""
     import keras
     import tensorflow as tf
 
@@ -106,7 +114,7 @@ def compiled_step(recipe: Recipe) -> tuple:
             variable.assign(variable * mask)
         return loss
 
-    return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
+    return Learner(model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn)
 
 
 def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
@@ -117,7 +125,7 @@ def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int
     write_bytes(buffer.getvalue(), path, force=True)
 
 
-def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
+def _resume(path: Path, state: Sequence, rng: np.random.Generator) -> int:
     """Set variables and random numbers to the saved state; the next step, 0 without a saved state."""
     if not path.is_file():
         return 0
@@ -128,13 +136,13 @@ def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
         return int(saved["step"])
 
 
-def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
+def _prune(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
     """Set the masks of the inner layers to the sparsity that the schedule wants now."""
     part = np.clip((position - PRUNE_FROM) / (PRUNE_TO - PRUNE_FROM), 0.0, 1.0)
     sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
     if sparsity == 0.0 or position >= PRUNE_TO + 1.0 / recipe.steps:
         return
-    pruned = _pruned(recipe)
+    pruned = _pruned_names(recipe)
     for name, variable, mask in zip(weight_names(recipe.graph), model.trainable_variables, masks, strict=True):
         if name in pruned:
             values = variable.numpy()
@@ -142,7 +150,7 @@ def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa:
             mask.assign(keep_mask(flat, sparsity).reshape(values.shape))
 
 
-def _pruned(recipe: Recipe) -> list[str]:
+def _pruned_names(recipe: Recipe) -> list[str]:
     """The names of the weights of which pruning sets blocks to zero."""
     return [f"{layer.name}.kernel" for layer in recipe.graph if layer.pruned]
 

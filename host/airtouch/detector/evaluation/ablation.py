@@ -31,8 +31,9 @@ class Ablation:
     options: dict[str, Any] = field(default_factory=dict)
 
 
-def _only(group: str, title: str, *kept: str) -> Ablation:
-    muted = tuple(i for i, name in enumerate(NAMES[:-1]) if name not in kept)
+def _only(group: str, title: str, *channels: str) -> Ablation:
+    """The ablation of `best` with these motion channels alone."""
+    muted = tuple(i for i, name in enumerate(NAMES[:-1]) if name not in channels)
     return Ablation(group, title, options={"muted": muted})
 
 

@@ -58,7 +58,7 @@ def crossval(
     for fold, members in folds.items():
         key = cache_key(name, files, members, seed, study.hashed())
         cache = out / f"{name}{study.variant()}_fold{fold}_{key}.json"
-        entry = cached(cache)
+        entry = read_fold(cache)
         if entry is None:
             entry = _score_fold(study, fold, key, files, members, readable, tell)
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
@@ -162,7 +162,7 @@ def cache_key(name: str, files: Sequence[FlightFile], test: Sequence[FlightFile]
     return total.hexdigest()[:12]
 
 
-def cached(path: Path) -> dict[str, Any] | None:
+def read_fold(path: Path) -> dict[str, Any] | None:
     """A finished fold, or None where there is none or it is damaged."""
     try:
         entry = json.loads(path.read_text())

@@ -62,7 +62,7 @@ def check(log: FlightLog, spare: int = 0) -> None:
                             "airtouch logs convert --rate 100")
     if nothing_logged(log):
         raise AirTouchError(f"{log.source}: nothing was logged: every value of every channel is missing (NaN)")
-    names, channels = logged_channels(log, sensors.missing(log) if spare else ())
+    names, channels = logged_channels(log, sensors.missing_sensors(log) if spare else ())
     if spare:
         sensors.signals(log)  # names what is missing, where that is too much
     if len(log) * SAMPLE_PERIOD_S < SHORTEST_S:

@@ -10,10 +10,10 @@ from airtouch.detector.trace import Detection
 from airtouch.parameters import SAMPLE_PERIOD_S
 
 Settings = TypeVar("Settings")
-Flight = tuple[Sequence[TrueEdge], Sequence[Detection]]
+EdgesAndDetections = tuple[Sequence[TrueEdge], Sequence[Detection]]  #: of one flight
 
 
-def lag(flights: Iterable[Flight], otherwise: float = 0.0) -> float:
+def lag(flights: Iterable[EdgesAndDetections], otherwise: float = 0.0) -> float:
     """Median seconds from a true edge to its detection (positive is late); `otherwise` without any match."""
     delays = []
     for true, detections in flights:
@@ -23,7 +23,7 @@ def lag(flights: Iterable[Flight], otherwise: float = 0.0) -> float:
     return float(np.median(delays)) if delays else otherwise
 
 
-def timed_f1(flights: Iterable[Flight], lag_s: float = 0.0) -> float:
+def timed_f1(flights: Iterable[EdgesAndDetections], lag_s: float = 0.0) -> float:
     """F1 of detections and true edges where a match counts 1 - |error| / 1.5 s; 0 to 1.
 
     One number that falls with every miss, every false edge and every second of error.

@@ -36,6 +36,7 @@ def _render_window(model: Model) -> dict[str, str]:
 
 
 def _render_rolling(model: Model) -> dict[str, str]:
+    """File name -> text, for a model on a fixed scale."""
     inputs, outputs = golden_samples(model.int8, stride(model))
     if model.scale is None:
         raise AirTouchError("this model is one of windows: it has no fixed scale to roll on")
@@ -74,6 +75,7 @@ def golden_samples(network: Int8Network, stride: int) -> tuple[np.ndarray, np.nd
 
 
 def _rolling_header(model: Model) -> str:
+    """airtouch_rolling.h: sizes, hash and declarations."""
     network, step = model.int8, stride(model)
     size = rolling_size(network, step)
     (rows, columns, channels), outputs = network.input_shape, network.outputs
@@ -100,6 +102,7 @@ extern const fixedScale_t airtouchRollingScale;
 
 
 def _model_header(model: Model) -> str:
+    """airtouch_model.h: sizes, hash and declarations."""
     network = model.int8
     rows, columns, channels = network.input_shape
     return f"""// The trained network: {parameter_bytes(network)} bytes of constants.
@@ -133,6 +136,7 @@ def _decoding(model: Model, prefix: str) -> str:
 
 
 def _model_source(network: Int8Network, header: str, variable: str) -> str:
+    """The C source of a network with its arrays. variable: its name in C."""
     names = iter(WEIGHTED)
     parts = [layer(next(names) if one.weighted else "", one) for one in network.layers]
     arrays = [text for text, _ in parts if text]

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-DEFAULT_LAMBDA = 0.1  #: weight of the disturbance-force loss
+#: weight of the disturbance-force loss; no source: the paper leaves lambda to the application (section 5.2), not tuned
+DEFAULT_LAMBDA = 0.1
 
 
 def edge_loss(df_lambda: float = DEFAULT_LAMBDA, class_weights: tuple[float, float] = (1.0, 1.0)) -> Callable:

@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.detector.paper.graph import GRAPH, INPUT_SHAPE, OPERATIONS
 from airtouch.detector.paper.network import KERNEL_SHAPES, WEIGHTED, Weights
-from airtouch.detector.shared.tensorflow import convert, read_weighted
+from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
 from airtouch.reference.networks.int8_network import Int8Layer, Int8Network
 
 REPRESENTATIVE = 500  #: windows that set the range of each activation
@@ -23,6 +23,7 @@ def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]
 
 
 def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
+    """The int8 TFLite file of a network, with scales from the windows (n, rows, columns)."""
     import tensorflow as tf
 
     def network(x):
@@ -37,7 +38,7 @@ def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
 
 def read_tflite(content: bytes) -> Int8Network:
     """The paper's int8 network out of a TFLite file that `quantise` made."""
-    layers = read_weighted(content)
+    layers = read_weighted_layers(content)
     arrays: dict[str, np.ndarray] = {}
     for name, layer in zip(WEIGHTED, layers, strict=True):
         for part in ("weights", "bias", "weight_scale"):

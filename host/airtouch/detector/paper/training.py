@@ -23,10 +23,10 @@ from airtouch.parameters import DEFAULT
 EPOCHS = 10  #: the 200 of the paper overfit once flights are held out (host/docs/train.md)
 BATCH = 128  #: windows a batch; 32 in the paper
 SPARSITY = 0.8  #: fraction of zeros in the first dense layer; its cost: host/docs/ablations.md
-HELD_OUT = 0.15  #: fraction of the flights held out for early stopping
-PRUNED_BY = 0.6  #: fraction of the steps after which the pruning masks are fixed
-PATIENCE = 3  #: epochs without a lower loss on the held-out flights
-PEAK_RATE = 2e-3  #: largest learning rate of the cycle
+HELD_OUT = 0.15  #: fraction of the flights held out for early stopping; no source: round number
+PRUNED_BY = 0.6  #: fraction of the steps after which the pruning masks are fixed; no source: leaves time to recover
+PATIENCE = 3  #: epochs without a lower loss on the held-out flights, until training stops; no source: round number
+PEAK_RATE = 2e-3  #: largest learning rate of the cycle; no source: round number
 BATCHES_A_CALL = 50  #: batches between two returns to Python, for speed
 STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
 
@@ -219,6 +219,7 @@ def fit_keras(train: Windows, validation: Windows, epochs: int, sparsity: float,
 
 
 def _rate_table(steps: int):
+    """A Keras schedule of the learning rate: one cycle over the steps."""
     import keras
     from keras import ops
 
@@ -245,6 +246,7 @@ def _batches(windows: Windows, shuffle: bool):
 
 
 def _check(epochs: int, sparsity: float, block: int, df_lambda: float, conv_sparsity: float) -> None:
+    """Raise AirTouchError for settings out of range."""
     if epochs < 1:
         raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
     for share in (sparsity, conv_sparsity):

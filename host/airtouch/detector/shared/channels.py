@@ -24,8 +24,8 @@ def nine_channels(log: FlightLog) -> np.ndarray:
 def logged_channels(log: FlightLog, missing: Collection[str]) -> tuple[list[str], np.ndarray]:
     """Names (k) and values (n, k) float32 of those of the nine channels whose sensor is not missing.
 
-    missing: of "acceleration", "rates", "motors" (`sensors.missing`). Raises AirTouchError that names the columns
-    which the log lacks of the others.
+    missing: of "acceleration", "rates", "motors" (`sensors.missing_sensors`). Raises AirTouchError that names the
+    columns which the log lacks of the others.
     """
     names: list[str] = []
     parts = [np.empty((len(log), 0))]

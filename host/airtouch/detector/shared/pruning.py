@@ -14,8 +14,8 @@ def polynomial_sparsity(step: float, steps: float, initial: float, final: float,
     (Zhu and Gupta 2017, the polynomial decay of TensorFlow's pruning): from initial to
     final, the threshold being the magnitude below which that share of the weights lies.
     """
-    left = 1.0 - min(max(step / steps, 0.0), 1.0)
-    return final + (initial - final) * left**power
+    remaining = 1.0 - min(max(step / steps, 0.0), 1.0)
+    return final + (initial - final) * remaining**power
 
 
 def keep_mask(kernel: np.ndarray, sparsity: float, block: int = BLOCK) -> np.ndarray:

@@ -39,7 +39,7 @@ def required_columns(log: FlightLog, sensor: str) -> tuple[str, ...]:
     return {ACCELERATION: acceleration, RATES: GYRO, MOTORS: PWM}[sensor]
 
 
-def missing(log: FlightLog) -> tuple[str, ...]:
+def missing_sensors(log: FlightLog) -> tuple[str, ...]:
     """The sensors, of SENSORS, whose columns the log lacks."""
     return tuple(sensor for sensor in SENSORS if not log.has(*required_columns(log, sensor)))
 
@@ -50,7 +50,7 @@ def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals
     rates_before: (k, 3) rates of the samples before, where the log is a piece of a flight; FLYING_WINDOW + 1 are
     enough. Raises AirTouchError, naming columns, where more than one sensor is missing.
     """
-    absent = missing(log)
+    absent = missing_sensors(log)
     if len(absent) > 1:
         log.require(*(name for sensor in absent for name in required_columns(log, sensor)))
     n = len(log)
@@ -58,7 +58,7 @@ def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals
     gyro = np.zeros((n, 3)) if RATES in absent else log.stack(GYRO)
     if MOTORS in absent:
         rates = np.vstack([np.reshape(rates_before, (-1, 3)), gyro])
-        pwm = FLYING_PWM * np.tile(flying(rates)[len(rates_before):, None], (1, 4))
+        pwm = FLYING_PWM * np.tile(is_flying(rates)[len(rates_before):, None], (1, 4))
     else:
         pwm = log.stack(PWM)
     return Signals(acc, gyro, pwm, absent)
@@ -66,12 +66,12 @@ def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals
 
 def silent_in_all(flights: Sequence[FlightLog]) -> tuple[int, ...]:
     """Motion channels of the sensors that none of the flights has."""
-    absent = set(SENSORS).intersection(*(missing(log) for log in flights)) if flights else set()
+    absent = set(SENSORS).intersection(*(missing_sensors(log) for log in flights)) if flights else set()
     return tuple(sorted({channel for sensor in absent for channel in CHANNELS_OF[sensor]}))
 
 
-def silenced(motion: MotionConfig, absent: tuple[str, ...]) -> MotionConfig:
-    """The same settings with the channels of missing sensors held at 0: no bounds to their nominal swing."""
+def silence(motion: MotionConfig, absent: tuple[str, ...]) -> MotionConfig:
+    """The same settings with the channels of missing sensors held at 0: no bounds to their nominal amplitude."""
     silent = {channel for sensor in absent for channel in CHANNELS_OF[sensor]}
     return replace(motion, scale=tuple(np.inf if i in silent else s for i, s in enumerate(motion.scale)))
 
@@ -86,7 +86,7 @@ def without(log: FlightLog, sensors: tuple[str, ...]) -> FlightLog:
     return FlightLog({name: values for name, values in log.columns.items() if name not in dropped}, log.meta)
 
 
-def flying(gyro: np.ndarray) -> np.ndarray:
+def is_flying(gyro: np.ndarray) -> np.ndarray:
     """Whether the drone flies, (n,) bool, from its rates (n, 3) rad/s alone; causal. The rotors shake it."""
     rates = np.nan_to_num(gyro)
     change = np.zeros(len(rates))

@@ -53,7 +53,7 @@ def convert(network: Callable, shape: tuple[int, ...], inputs: np.ndarray) -> by
         return bytes(converter.convert())
 
 
-def read_weighted(content: bytes) -> list[dict[str, np.ndarray]]:
+def read_weighted_layers(content: bytes) -> list[dict[str, np.ndarray]]:
     """The layers with weights of a TFLite file that `convert` made, in order.
 
     Each: weights int8 (out, ...), bias int32 (out,), weight_scale float32 (out,), and scale float32 and

@@ -50,7 +50,7 @@ def _without_copies(pairs: list[tuple[str, str]], log: FlightLog) -> list[tuple[
     return [pair for pair in pairs if not set(pair) & set(ACC)]
 
 
-def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
+def stuck_intervals(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
     """Intervals of samples (channel, start, stop) in which a channel does not change.
 
     Any channel that is constant over the whole log; and in flight motors, rates and accelerations
@@ -73,7 +73,7 @@ def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
     return intervals
 
 
-def saturated(log: FlightLog) -> dict[str, int]:
+def saturation_counts(log: FlightLog) -> dict[str, int]:
     """Number of samples at full scale or beyond, by channel; channels without any are absent."""
     limits = {**dict.fromkeys(PWM, PWM_LIMIT), **dict.fromkeys(GYRO, 0.999 * GYRO_LIMIT),
               **dict.fromkeys(ACC, 0.999 * ACC_FULL_SCALE)}

@@ -99,7 +99,7 @@ def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
     return (np.arange(len(log)) + np.cumsum(shift)) * period, gaps
 
 
-def rising(time_s: np.ndarray) -> np.ndarray:
+def rising_subsequence(time_s: np.ndarray) -> np.ndarray:
     """Indices of the longest subsequence with rising times: a wrong time costs its own sample and no other."""
     place = np.flatnonzero(np.isfinite(time_s))
     times = time_s[place]

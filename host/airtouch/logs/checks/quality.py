@@ -1,12 +1,12 @@
 """The quality report of a flight: faults of its clock and of its channels."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from airtouch.errors import AirTouchError, printable
-from airtouch.logs.checks.channel_faults import duplicates, saturated, spikes, stuck
+from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, spikes, stuck_intervals
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
@@ -69,22 +69,15 @@ def check(log: FlightLog) -> Quality:
     period = true_period(clock)
     flying, phases, edges = _flight(log)
     missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
-    faults: dict[str, Any] = {
-        "gaps": lost_samples(clock, period) if period else [],
-        "clock_repeats": int((steps == 0).sum()),
-        "clock_backwards": int((steps < 0).sum()),
-        "missing": {name: count for name, count in missing.items() if count},
-        "duplicated": duplicates(log),
-        "stuck": stuck(log, flying),
-        "saturated": saturated(log),
-        "spikes": spikes(log),
-    }
-    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, faults, phases, period)
-    return Quality(
+    quality = Quality(
         source=log.source, format=str(log.meta.get("format", "")), samples=len(log),
         duration_s=_duration(clock, len(log), sample_period(log)), rate_hz=1.0 / period if period else None,
-        segments=phases, edges=edges, warnings=warnings, **faults,
-    )
+        gaps=lost_samples(clock, period) if period else [],
+        clock_repeats=int((steps == 0).sum()), clock_backwards=int((steps < 0).sum()),
+        missing={name: count for name, count in missing.items() if count},
+        duplicated=duplicates(log), stuck=stuck_intervals(log, flying), saturated=saturation_counts(log),
+        spikes=spikes(log), segments=phases, edges=edges, warnings=[str(w) for w in log.meta.get("warnings", [])])
+    return replace(quality, warnings=quality.warnings + _faults_in_words(log, quality))
 
 
 def clock_steps(log: FlightLog) -> np.ndarray:
@@ -108,36 +101,37 @@ def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
 
 
 def _duration(clock: np.ndarray, samples: int, period: float) -> float:
+    """Seconds from the first possible time to the last; by the number of samples without any."""
     timed = clock[np.abs(clock) <= LATEST_S]
     return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
-def _in_words(log: FlightLog, faults: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:
+def _faults_in_words(log: FlightLog, quality: Quality) -> list[str]:
+    """One line for each fault of the log."""
     words = []
     if nothing_logged(log):
         return ["nothing was logged: every value of every channel is missing"]
-    if faults["gaps"]:
-        lost = sum(gap.lost for gap in faults["gaps"])
-        longest = max(gap.seconds for gap in faults["gaps"])
-        words.append(f"{lost} samples lost in {len(faults['gaps'])} gaps, the longest {longest:.2f} s")
-    if faults["clock_repeats"]:
-        words.append(f"the clock stands still {faults['clock_repeats']} times")
-    if faults["clock_backwards"]:
-        words.append(f"the clock runs backwards {faults['clock_backwards']} times")
-    if log.has("t_s") and period is None and len(log) > 1:
+    if quality.gaps:
+        longest = max(gap.seconds for gap in quality.gaps)
+        words.append(f"{quality.lost} samples lost in {len(quality.gaps)} gaps, the longest {longest:.2f} s")
+    if quality.clock_repeats:
+        words.append(f"the clock stands still {quality.clock_repeats} times")
+    if quality.clock_backwards:
+        words.append(f"the clock runs backwards {quality.clock_backwards} times")
+    if log.has("t_s") and quality.rate_hz is None and len(log) > 1:
         words.append("the clock does not run, or not in seconds")
-    for name, count in faults["missing"].items():
+    for name, count in quality.missing.items():
         words.append(f"{name}: {count} of {len(log)} samples missing")
-    words += [f"{b} repeats {a}" for a, b in faults["duplicated"]]
-    for name, start, stop in faults["stuck"]:
+    words += [f"{b} repeats {a}" for a, b in quality.duplicated]
+    for name, start, stop in quality.stuck:
         whole = stop - start == len(log)
         place = f"{name} is stuck from sample {start} to {stop}"
         words.append(f"{name} never changes" if whole else place)
-    for name, count in faults["saturated"].items():
+    for name, count in quality.saturated.items():
         words.append(f"{name}: {count} samples at the end of its scale")
-    for name, at in faults["spikes"].items():
+    for name, at in quality.spikes.items():
         words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
-    in_air = sum(phase.stop - phase.start for phase in phases if phase.kind != "ground") * sample_period(log)
+    in_air = sum(phase.stop - phase.start for phase in quality.segments if phase.kind != "ground") * sample_period(log)
     if not in_air:
         words.append("no flight in it, or no motors and height to tell")
     elif in_air < SHORT_FLIGHT_S:

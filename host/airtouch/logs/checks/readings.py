@@ -1,4 +1,4 @@
-"""Limits of values and times. Every log that is read from a file passes `checked` once."""
+"""Limits of values and times. Every log that is read from a file passes `without_impossible_values` once."""
 
 from typing import Any
 
@@ -11,14 +11,14 @@ from airtouch.logs.flight_log import FlightLog
 LARGEST = float(np.finfo(np.float32).max)  #: the firmware's variables are float32 or smaller
 
 
-def checked(log: FlightLog) -> FlightLog:
+def without_impossible_values(log: FlightLog) -> FlightLog:
     """The log with impossible values as NaN and without impossible metadata, with a warning for each kind.
 
     Every value is then NaN or within float32, and n samples span less than n times 5 s. So time and
     memory of any later step are bounded by the size of the log. Raises AirTouchError for a clock that
     is not in seconds, or that is mostly impossible.
     """
-    meta, warnings = _checked_meta(log.meta)
+    meta, warnings = _possible_meta(log.meta)
     columns = {}
     for name, values in log.columns.items():
         with np.errstate(invalid="ignore"):
@@ -64,7 +64,7 @@ def _step(time_s: np.ndarray) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
-def _checked_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+def _possible_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The metadata without known keys of a wrong type or value, and all warnings so far."""
     meta, warnings = dict(meta), list(meta["warnings"])
     period = meta.get("sample_period_s", 0.01)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, nearest
-from airtouch.logs.checks.readings import checked
+from airtouch.logs.checks.readings import without_impossible_values
 from airtouch.logs.files import load_text
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
@@ -67,8 +67,9 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
         theirs = np.array([_number(r[place]) if place < len(r) else np.nan for r in rows[1:]])
         columns[name] = (theirs + how.get("offset", 0.0)) * how.get("scale", 1.0)
     meta = {k: v for k, v in table.items() if k != "columns"}
-    return checked(FlightLog({n: columns[n] for n in COLUMNS if n in columns},
-                             {"source": str(path), "format": "mapped", "condition": "", "warnings": [], **meta}))
+    log = FlightLog({n: columns[n] for n in COLUMNS if n in columns},
+                    {"source": str(path), "format": "mapped", "condition": "", "warnings": [], **meta})
+    return without_impossible_values(log)
 
 
 def _number(cell: str) -> float:

@@ -59,6 +59,7 @@ def read(data: bytes, source: str) -> FlightLog:
 
 
 def _motors(topics: dict) -> dict[str, Signal]:
+    """The signals of the four motors, PWM; none where neither topic has them."""
     for topic, field, low, high in (("actuator_motors", "control", 0.0, 1.0),
                                     ("actuator_outputs", "output", 1000.0, 2000.0)):
         table = topics.get(topic, {})

@@ -14,8 +14,9 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
 
+HALF = 0.5  #: fraction of the paper's gain from which a claim is reproduced; no source: half counts, less does not
 FEW = 10  #: flights of the small training set, on which the paper says that its loss helps most
-EPOCHS, QUICK_EPOCHS = 6, 3
+EPOCHS, QUICK_EPOCHS = 6, 3  #: epochs of every training here, and with --quick; no source: chosen for time
 
 
 @dataclass(frozen=True)
@@ -56,16 +57,16 @@ def df_loss(job: Job) -> Figure:
     pairs = list(zip(names[::2], names[1::2], strict=True))  # with the loss, without it
     gains = {on: 1.0 - (rows[on]["mean_abs_error_m"] or np.nan) / (rows[off]["mean_abs_error_m"] or np.nan)
              for on, off in pairs}
-    text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
-    helps = any(words.worse(rows[on], rows[off]) and gains[on] >= 0.5 * CLAIMS["df-loss"].values[2]
+    text = "; ".join(f"{what} {words.metres(r)}, {words.misses(r)}" for what, r in rows.items())
+    helps = any(words.worse(rows[on], rows[off]) and gains[on] >= HALF * CLAIMS["df-loss"].values[2]
                 for on, off in pairs)
     sooner = [1.0 - epochs[on] / epochs[off] for on, off in pairs]
     verdicts = {
-        "df-loss": words.judged(helps, f"{text}; error less by "
-                                + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
-        "df-epochs": words.judged(max(sooner) >= 0.5 * CLAIMS["df-epochs"].values[2],
-                                  "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
-                                  + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
+        "df-loss": words.verdict(helps, f"{text}; error less by "
+                                 + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
+        "df-epochs": words.verdict(max(sooner) >= HALF * CLAIMS["df-epochs"].values[2],
+                                   "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
+                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
     if job.quick:
         verdicts["df-epochs"] = Verdict(UNTESTABLE, f"{QUICK_EPOCHS} epochs are too few to see; leave out --quick")
     caption = (f"{_caption(job, rows)} Lambda is 0.1; the paper does not say its own. Dashed: trained on {FEW} "
@@ -82,8 +83,8 @@ def time_resolution(job: Job) -> Figure:
     """Performance:1h: windows of the band power of 200, 100 and 50 samples."""
     recorded.files(job)
     rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in RESOLUTIONS.items()}
-    text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
-    verdict = words.judged(words.worse(rows[50], rows[200]), text)
+    text = "; ".join(f"{size} samples {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())
+    verdict = words.verdict(words.worse(rows[50], rows[200]), text)
     return Figure("Time resolution of FC-FE", [words.table_row(f"{s} samples", r, window=s) for s, r in rows.items()],
                   _caption(job, rows) + " A shorter window resolves time better and frequency worse; the hop is one "
                                         "sample. The paper does not say which windows it compared. Physical filter "
@@ -95,12 +96,12 @@ def input_size(job: Job) -> Figure:
     """Performance:1i: network inputs of 50, 100, 170 and 250 samples."""
     recorded.files(job)
     rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in SIZES.items()}
-    text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
+    text = "; ".join(f"{size} samples {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())
     best = max(rows, key=lambda size: rows[size]["hit"]["0.25"])
     low, high = CLAIMS["input-size"].values
-    verdict = words.judged(low <= best <= high, f"{text}; most edges within 0.25 m with {best}: "
-                           + ", ".join(f"{s} {words.percent(r['hit']['0.25'], r['intervals']['hit']['0.25'])}"
-                                       for s, r in rows.items()))
+    verdict = words.verdict(low <= best <= high, f"{text}; most edges within 0.25 m with {best}: "
+                            + ", ".join(f"{s} {words.percent(r['hit']['0.25'], r['intervals']['hit']['0.25'])}"
+                                        for s, r in rows.items()))
     return Figure("Input size of the network", [words.table_row(f"{s} samples", r, rows=s) for s, r in rows.items()],
                   _caption(job, rows) + " Physical filter off. The best size is the one with most edges within 0.25 m.",
                   {"input-size": verdict}, lambda canvas: _curves(canvas, rows, "network input, samples"))
@@ -108,7 +109,7 @@ def input_size(job: Job) -> Figure:
 
 def _curves(canvas: Any, rows: dict[int, dict[str, Any]], label: str) -> None:
     left, right = canvas.subplots(1, 2)
-    for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of edges found, m"),
+    for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of detected edges, m"),
                                     (right, "missed", 100.0, "missed edges, %")):
         sizes = [s for s, r in rows.items() if r[key] is not None]
         pictures.curve(axes, sizes, [rows[s] for s in sizes], key, factor, pictures.COLOURS["paper"])

@@ -63,12 +63,13 @@ def _height_verdicts(rows: dict[tuple[str, str, str], dict[str, Any]], edges: in
     low, high = CLAIMS["height-4cm"].values[0], CLAIMS["height-9cm"].values[0]
     near = hits["paper", "4cm", "simulated"]  # share and its interval
     far = [hits["paper", h, "simulated"] for h in ("9cm", "12cm")]
-    return {"height-4cm": words.judged(near[1][1] >= low, f"{within('4cm')} (n = {edges} edges)"),
-            "height-9cm": words.judged(all(value <= high and value < near[1][0] for value, _ in far),
-                                       f"{within('9cm', '12cm')} (n = {edges} edges each)")}
+    return {"height-4cm": words.verdict(near[1][1] >= low, f"{within('4cm')} (n = {edges} edges)"),
+            "height-9cm": words.verdict(all(value <= high and value < near[1][0] for value, _ in far),
+                                        f"{within('9cm', '12cm')} (n = {edges} edges each)")}
 
 
 def _draw_heights(canvas: Any, groups: Groups) -> None:
+    """Draw the share of edges within each distance, by height, beside the paper's two claims."""
     for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
         pictures.hit_curves(axes, {f"{h}, {kind}": scores for (n, h, kind), scores in groups.items() if n == name},
                             legend=False)
@@ -101,12 +102,12 @@ def by_angle(job: Job) -> Figure:
                for name, sizes in groups.items()}
 
     def text(name: str) -> str:
-        return f"{name}: " + ", ".join(f"{size:.0f}° {words.metres(r)} and {words.missed(r)}"
+        return f"{name}: " + ", ".join(f"{size:.0f}° {words.metres(r)} and {words.misses(r)}"
                                        for size, r in by_size[name].items() if r["edges"])
 
     both = "; ".join(text(name) for name in reversed(DETECTORS))
-    verdicts = {"angle": words.judged(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
-                "angle-sides": words.judged(*_sides(rows))}
+    verdicts = {"angle": words.verdict(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
+                "angle-sides": words.verdict(*_sides(rows))}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
                + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
 
@@ -144,25 +145,26 @@ def wind(job: Job) -> Figure:
         for name in DETECTORS:
             rows[name, speed] = summary.summarise(simulated.scores(flights, name))
     table = [words.table_row(f"{n}, {v:g} m/s", r, detector=n, wind_mps=v) for (n, v), r in rows.items()]
-    text = "; ".join(f"{n}: " + ", ".join(f"{v:g} m/s {words.metres(rows[n, v])}, {words.missed(rows[n, v])}"
+    text = "; ".join(f"{n}: " + ", ".join(f"{v:g} m/s {words.metres(rows[n, v])}, {words.misses(rows[n, v])}"
                                           for v in WINDS_MPS) for n in reversed(DETECTORS))
     calm = {name: rows[name, WINDS_MPS[0]] for name in DETECTORS}
     same = {name: not any(words.worse(calm[name], rows[name, v]) for v in WINDS_MPS[1:]) for name in DETECTORS}
     caption = (f"Simulated: {2 * count} flights a speed, 4 cm over the platform, half with wind from the front and "
                "half from the left; the shipped networks. The wind is steady, as the paper's. The recorded flights "
                "have one with a fan.")
-    verdict = words.judged(same["paper"] and same["best"], text)
+    verdict = words.verdict(same["paper"] and same["best"], text)
     if calm["paper"]["missed"] is not None and calm["paper"]["missed"] > 0.5 and same["best"]:
         verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {text}")
 
     def draw(canvas):
+        """Draw error and misses against the wind's speed."""
         left, right = canvas.subplots(1, 2)
         for name in DETECTORS:
             by_speed = [rows[name, v] for v in WINDS_MPS]
             for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
                 pictures.curve(axes, WINDS_MPS, by_speed, key, factor, pictures.colour(name), name)
                 axes.set_xlabel("wind, m/s")
-        left.set(ylabel="mean error of edges found, m", ylim=(0, None))
+        left.set(ylabel="mean error of detected edges, m", ylim=(0, None))
         right.set(ylabel="missed edges, %", ylim=(0, 100))
         left.legend(fontsize=7, frameon=False)
 

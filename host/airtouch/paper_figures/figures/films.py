@@ -49,7 +49,7 @@ def crossings(job: Job) -> Crossings:
         for method, by_film in by_method.items():
             camera[method, lux] = compare.without_lag(by_film, compare.lag(training, by_film[:training_count]))
         rule = compare.choose_fusion(training, camera["teed", lux][:training_count], airtouch["best"][:training_count])
-        camera["fusion", lux] = [compare.fused(a, b, rule)
+        camera["fusion", lux] = [compare.fuse(a, b, rule)
                                  for a, b in zip(camera["teed", lux], airtouch["best"], strict=True)]
     return Crossings(scored, {key: by_film[training_count:] for key, by_film in camera.items()},
                      {name: by_film[training_count:] for name, by_film in airtouch.items()})
@@ -68,9 +68,9 @@ def _camera(job: Job, films: list[Any], training_count: int, lux: float, name: s
         stored = json.loads(path.read_text())
     except (OSError, ValueError):
         sizes = weights.SIZES if lux == SIZE_LUX else ("teed",)
-        mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in sizes}}
+        mappers = {"classical": lines.classical, **{n: lines.learned_mapper(weights.load(n)[0]) for n in sizes}}
         stored = {}
-        for method, sights in compare.filmed(films, lux, mappers, SEED, job.tell).items():
+        for method, sights in compare.sights_of_films(films, lux, mappers, SEED, job.tell).items():
             least = compare.threshold(films[:training_count], sights[:training_count])
             stored[method] = [[d.sample for d in detections] for detections in compare.crossings(films, sights, least)]
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -83,7 +83,7 @@ def film_scores(films: list[Any], detections: list[Any]) -> list[FlightScore]:
     """A score a film, of the crossings found in each."""
     from airtouch.vision import compare
 
-    return compare.scored(films, detections)
+    return compare.flight_scores(films, detections)
 
 
 def lux_of(job: Job) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ def pair_scores(job: Job) -> dict[tuple[str, str], list[FlightScore]]:
 
 @cache
 def _pair_scores(quick: bool, tell: Callable[[str], None]) -> dict[tuple[str, str], list[FlightScore]]:
+    """(detector, scene) -> scores of simulated flights over two materials, by a detector trained on others of them."""
     training_flights, scored = (8, 6) if quick else (20, 15)
     options: dict[str, dict[str, Any]] = {"best": {"steps": 300 if quick else 800},
                                           "paper": {"epochs": 3 if quick else 6}}
@@ -46,7 +47,7 @@ def _pair_scores(quick: bool, tell: Callable[[str], None]) -> dict[tuple[str, st
 
 
 def _flights(scene: str, count: int, seed: int) -> list[FlightLog]:
-    return [simulated.labelled(log) for log in simulated.flights(scene, count, seed=seed)]
+    return [simulated.with_truth(log) for log in simulated.flights(scene, count, seed=seed)]
 
 
 def overall(job: Job) -> Figure:
@@ -86,6 +87,7 @@ def by_pair(job: Job) -> Figure:
                 for name, scene in (("mat-cement", "paper-mat-cement"), ("water-cement", "paper-water-cement"))}
 
     def draw(canvas):
+        """Draw the errors at each pair of materials as boxes, with the share missed."""
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
             axes.boxplot([np.abs(errors_m(scores[name, scene])) for scene in PAIRS], widths=0.6, whis=(0, 100),
                          medianprops={"color": pictures.colour(name)})
@@ -99,7 +101,7 @@ def by_pair(job: Job) -> Figure:
         median, greatest = CLAIMS["mat-cement"].values
         canvas.axes[1].plot([1, 1], [median, greatest], "k*", ms=7, label="paper: mat, cement: median, greatest")
         canvas.axes[1].legend(fontsize=7, frameon=False)
-        canvas.axes[0].set_ylabel("|error| of edges found, m")
+        canvas.axes[0].set_ylabel("|error| of detected edges, m")
 
     return Figure("Errors by pair of materials", table, _caption(scores), verdicts, draw)
 

@@ -22,7 +22,7 @@ def heights(job: Job) -> Figure:
     claim = CLAIMS["height-error"]
     scores = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
     rows = {name: summary.summarise(flights) for name, flights in scores.items()}
-    verdict = words.judged(
+    verdict = words.verdict(
         words.reaches(rows["paper"], claim.values[0]),
         f"paper's method {words.score(rows['paper'])}; best {words.score(rows['best'])}"
         + ("; best reaches the claim" if words.reaches(rows["best"], claim.values[0]) else ""))
@@ -44,11 +44,11 @@ def against_baseline(job: Job) -> Figure:
     text = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
             f"{words.score(rows['best'])}. Below the baseline's error: "
             + ", ".join(f"{n} {100 * b:.0f} %" for n, b in better.items()))
-    verdict = words.judged(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, text)
+    verdict = words.verdict(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, text)
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
-        pictures.bars(left, table, "mean_abs_error_m", "error_low_m", "error_high_m", "mean error of edges found, m")
+        pictures.bars(left, table, "mean_abs_error_m", "error_low_m", "error_high_m", "mean error of detected edges, m")
         pictures.paper_stars(left, {1: ours, 2: theirs})
         pictures.bars(right, table, "missed", "missed_low", "missed_high", "missed edges, %", factor=100.0)
 

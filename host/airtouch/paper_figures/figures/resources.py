@@ -56,6 +56,7 @@ def _count() -> _Counts:
 
 
 def _rows(n: _Counts) -> list[dict[str, Any]]:
+    """The table's rows: the vision network, the paper's without and with zeros, and `best`."""
     step = n.best["mac_per_sample"]
     return [
         {"what": "TEED's structure, 320 x 320", "mac": n.vision_multiplications,
@@ -71,10 +72,11 @@ def _rows(n: _Counts) -> list[dict[str, Any]]:
 
 
 def _flops(n: _Counts) -> Verdict:
+    """The verdict on the multiply-accumulates of the paper's network and of the vision network."""
     theirs, said = CLAIMS["flops"].values
     vision = n.vision_multiplications
     side = np.sqrt(theirs / FLOPS_A_MAC / (vision / np.prod(PAPER_CAMERA)))
-    return words.judged(
+    return words.verdict(
         _near(n.dense_multiplications, said) and _near(FLOPS_A_MAC * vision, theirs),
         f"paper's network {n.dense_multiplications / 1e6:.2f} million multiply-accumulates without zeros (the paper's "
         f"0.28 counts these), {n.multiplications / 1e6:.2f} as shipped; TEED at 320 x 320 "
@@ -85,21 +87,22 @@ def _flops(n: _Counts) -> Verdict:
 
 def _parameters(n: _Counts) -> Verdict:
     theirs, said = CLAIMS["parameters"].values
-    return words.judged(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
-                        f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
-                        f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float")
+    return words.verdict(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
+                         f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
+                         f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float")
 
 
 def _memory() -> Verdict:
     camera, ring_bits = Camera(), 32 * 9 * DEFAULT.band_window
     frame_bits = 8 * camera.width * camera.height
-    return words.judged(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
-                        f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band power; "
-                        f"a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less than a "
-                        "million, not millions")
+    return words.verdict(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
+                         f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band "
+                         f"power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less "
+                         "than a million, not millions")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw work, parameters and memory of each row as bars."""
     paper_colour, best_colour = pictures.COLOURS["paper"], pictures.COLOURS["best"]
     for axes, key, label in zip(canvas.subplots(1, 3), ("mac", "parameter_bytes", "frame_bits"),
                                 ("multiply-accumulates", "bytes of parameters", "bits a frame or window"),

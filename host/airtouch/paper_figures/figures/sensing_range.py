@@ -40,7 +40,7 @@ def sanchez_cuevas(height_m: np.ndarray, radius_m: float, spacing_m: float) -> n
     return np.array([thrust_ratio(h, radius_m, spacing_m, 2.0) for h in np.atleast_1d(height_m)])
 
 
-def measured(height_m: np.ndarray, preset: str, scale: float = 1.0) -> np.ndarray:
+def measured_gain(height_m: np.ndarray, preset: str, scale: float = 1.0) -> np.ndarray:
     """Relative gain of lift at heights (n,), in m, of a curve fitted to recorded flights.
 
     scale: ratio of all lengths to those of the drone that flew.
@@ -63,7 +63,7 @@ def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np
     scale = radius_m / vehicles.load("crazyflie-2.1").rotor_radius_m
     return {"Cheeseman, Bennett": lambda h: cheeseman_bennett(h, radius_m),
             "Sanchez-Cuevas": lambda h: sanchez_cuevas(h, radius_m, math.sqrt(2.0) * arm_m),
-            "measured on 34 g, scaled with the rotor": lambda h: measured(h, SMALL, scale)}
+            "measured on 34 g, scaled with the rotor": lambda h: measured_gain(h, SMALL, scale)}
 
 
 def sensing_range(job: Job) -> Figure:
@@ -75,7 +75,7 @@ def sensing_range(job: Job) -> Figure:
              Craft("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
     rows = [row for one in craft for row in _rows(one, claimed)]
     rows.append({"what": "frame of 67 g", "curve": "measured", "mass_kg": 0.067, "rotor_radius_m": None,
-                 "range_m": reach(lambda h: measured(h, "frame-67g"))})
+                 "range_m": reach(lambda h: measured_gain(h, "frame-67g"))})
     verdicts = {"range": _at_3_m([r for r in rows if r["mass_kg"] == mass], claimed),
                 "range-small": _small([r for r in rows if r["mass_kg"] == small.mass_kg])}
     caption = (f"Heights are of the rotor discs. The range is where the lift falls below {100 * THRESHOLD:.0f} % of "
@@ -112,28 +112,30 @@ def _rows(craft: Craft, claimed_m: float) -> list[dict[str, Any]]:
 
 def _at_3_m(rows: list[dict[str, Any]], claimed_m: float) -> Verdict:
     farthest = max(r["range_at_best_m"] for r in rows)
-    return words.judged(farthest >= claimed_m,
-                        f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(rows):.2f} to {most(rows):.2f} m "
-                        "by three curves and two readings of the propeller's size; with "
-                        f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to {farthest:.1f} m "
-                        f"at most. At 3 m {100 * max(r['lift_at_3_m_share'] for r in rows):.2f} % of the weight is "
-                        "left at most. Nothing was flown")
+    return words.verdict(farthest >= claimed_m,
+                         f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(rows):.2f} to {most(rows):.2f} m "
+                         "by three curves and two readings of the propeller's size; with "
+                         f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to {farthest:.1f} m "
+                         f"at most. At 3 m {100 * max(r['lift_at_3_m_share'] for r in rows):.2f} % of the weight is "
+                         "left at most. Nothing was flown")
 
 
 def _small(rows: list[dict[str, Any]]) -> Verdict:
-    reach_m = reach(lambda h: measured(h, SMALL))
-    return words.judged(reach_m <= CLAIMS["range-small"].values[0],
-                        f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at {reach_m:.3f} "
-                        f"m of rotor height; published curves say {least(rows):.3f} to {most(rows):.3f} m")
+    reach_m = reach(lambda h: measured_gain(h, SMALL))
+    return words.verdict(reach_m <= CLAIMS["range-small"].values[0],
+                         f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at "
+                         f"{reach_m:.3f} m of rotor height; published curves say {least(rows):.3f} to "
+                         f"{most(rows):.3f} m")
 
 
 def _draw(canvas: Any, craft: list[Craft], claimed_m: float) -> None:
+    """Draw the gain of lift against height for each craft and curve, with the noise of the force."""
     axes = canvas.subplots()
     for one, colour in zip(craft, pictures.COLOURS.values(), strict=False):
         for (source, curve), style in zip(curves(one.radius_m, one.arm_m).items(), (":", "--", "-"), strict=True):
             axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
                         label=f"rotor {1000 * one.radius_m:.4g} mm, {source}")
-    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.GREY,
+    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured_gain(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.GREY,
                 label="67 g frame, measured")
     axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
     axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")

@@ -9,13 +9,15 @@ from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.power import ina219, stages
 
+NEGLIGIBLE = 0.05  #: fraction of the propellers' power; no source: round number, the paper finds 0.014 negligible
+
 
 def power(job: Job) -> Figure:
     """The paper's Table 1 beside a measurement or an estimate."""
-    return measured(job.power_log) if job.power_log else estimated()
+    return measured_power(job.power_log) if job.power_log else estimated_power()
 
 
-def measured(log: Path) -> Figure:
+def measured_power(log: Path) -> Figure:
     """Table 1 from a power log with a column of stages. Raises AirTouchError if it cannot be read."""
     try:
         trace = ina219.parse(log.read_text(encoding="utf-8", errors="replace"), str(log))
@@ -26,10 +28,10 @@ def measured(log: Path) -> Figure:
         raise AirTouchError(f"{log}: no column of stages; the sketch in tools/power writes one")
     rows = [{"what": stages.NAMES.get(name, name), "mw": mw, "low_mw": mw - half, "high_mw": mw + half,
              "paper_mw": stages.PAPER_MW.get(name), "seconds": powers[name].seconds, "lines": powers[name].lines}
-            for name, (mw, half) in ina219.added(powers).items()]
+            for name, (mw, half) in ina219.added_power(powers).items()]
     last = list(powers.values())[-1]
     total, half = last.mw, last.half_mw
-    verdicts = {"power": words.judged(total - half <= CLAIMS["power"].values[0],
+    verdicts = {"power": words.verdict(total - half <= CLAIMS["power"].values[0],
                                       f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
                                       f"{last.seconds:.0f} s"),
                 "negligible": _negligible(total - next(iter(powers.values())).mw, "measured")}
@@ -37,7 +39,7 @@ def measured(log: Path) -> Figure:
                   verdicts, lambda canvas: _draw(canvas, rows))
 
 
-def estimated() -> Figure:
+def estimated_power() -> Figure:
     """Table 1 estimated from instruction counts. Raises Missing without the counts."""
     if not stages.BUDGETS.is_dir():
         raise Missing("the counted instructions are in a checkout alone (tests/emulation); clone the repository, or "
@@ -60,11 +62,13 @@ def estimated() -> Figure:
 
 def _negligible(mw: float, source: str) -> Verdict:
     share = mw / CLAIMS["negligible"].values[0]
-    return words.judged(share < 0.05, f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the "
-                                      "paper's own 43 mW are 1.4 %. The propellers' power was not measured here")
+    return words.verdict(share < NEGLIGIBLE,
+                         f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's own 43 mW "
+                         "are 1.4 %. The propellers' power was not measured here")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw the power of each stage beside the paper's."""
     axes = canvas.subplots()
     places = range(len(rows))
     axes.barh([p - 0.2 for p in places], [r["mw"] for r in rows], height=0.38, color=pictures.COLOURS["best"],

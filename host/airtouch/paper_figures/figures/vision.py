@@ -26,47 +26,49 @@ LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate mov
 
 def light(job: Job) -> Figure:
     """Performance:3b: errors of the camera and of AirTouch from 500 to 5 lux."""
-    found = crossings(job)
+    data = crossings(job)
     lux = lux_of(job)
-    rows = {(name, v): summary.summarise(film_scores(found.films, found.camera[name, v]))
+    rows = {(name, v): summary.summarise(film_scores(data.films, data.camera[name, v]))
             for v in lux for name in ("classical", "teed")}
-    ours = _summaries(found)
+    ours = _summaries(data)
     table = [words.table_row(f"{name}, {v:g} lux", row, detector=name, lux=v) for (name, v), row in rows.items()]
     table += [words.table_row(f"{name}, any light", row, detector=name) for name, row in ours.items()]
-    caption = (f"Simulated: {len(found.films)} flights, 4 cm over the platform, camera and AirTouch on the same "
+    caption = (f"Simulated: {len(data.films)} flights, 4 cm over the platform, camera and AirTouch on the same "
                f"flights; frames of 324 x 244 rendered at 6 a second. {LIMITS}")
     return Figure("Errors against light", table, caption, _light_verdicts(rows, ours, lux),
                   lambda canvas: _draw_light(canvas, rows, ours, lux))
 
 
-def _summaries(found: Crossings) -> Summaries:
-    return {name: summary.summarise(film_scores(found.films, found.airtouch[name])) for name in AIRTOUCH}
+def _summaries(data: Crossings) -> Summaries:
+    return {name: summary.summarise(film_scores(data.films, data.airtouch[name])) for name in AIRTOUCH}
 
 
 def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dict[str, Verdict]:
+    """The verdicts on the claims about light. rows: the camera's by method and lux. ours: AirTouch's by detector."""
     def text(value: float) -> str:
-        return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.missed(rows[n, value])}"
+        return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.misses(rows[n, value])}"
                          for n in ("teed", "classical") if (n, value) in rows)
 
     claimed_m = CLAIMS["light-airtouch"].values[0]
     bright, bright_m = CLAIMS["light-bright"].values
     dark = [v for v in CLAIMS["light-dark"].values if ("teed", v) in rows]
-    flights = "; ".join(f"{n} {words.metres(r)}, {words.missed(r)}" for n, r in ours.items())
+    flights = "; ".join(f"{n} {words.metres(r)}, {words.misses(r)}" for n, r in ours.items())
     best = words.metres(ours["best"])
     return {
-        "light-airtouch": words.judged(
+        "light-airtouch": words.verdict(
             words.reaches(ours["paper"], claimed_m),
             f"light plays no part in its signals; simulated, shipped networks: {flights}"
             + (f"; best reaches {claimed_m:g} m" if words.reaches(ours["best"], claimed_m) else "")),
-        "light-bright": words.judged(
+        "light-bright": words.verdict(
             words.worse(rows["teed", bright], ours["best"]) and words.reaches(rows["teed", bright], bright_m),
             f"{text(bright)}; best {best}"),
-        "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
-                                   "; ".join(text(v) for v in dark) + f"; best {best}. "
-                                   + _crossing(rows, ours["best"], lux))}
+        "light-dark": words.verdict(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
+                                    "; ".join(text(v) for v in dark) + f"; best {best}. "
+                                    + _crossing(rows, ours["best"], lux))}
 
 
 def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float]) -> None:
+    """Draw error and misses of camera and AirTouch against the light."""
     left, right = canvas.subplots(1, 2)
     for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
         for name in ("classical", "teed"):
@@ -80,24 +82,24 @@ def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float
         axes.set(ylim=(0, None))
     left.plot(*CLAIMS["light-bright"].values, "k*", ms=8, label="paper: TEED")
     left.plot([20, 50, 100], [CLAIMS["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
-    _labelled(canvas, left, right)
+    _label_axes(canvas, left, right)
 
 
 def network_size(job: Job) -> Figure:
     """Performance:3c: the camera's errors against the size of its network, AirTouch's against the size of its own."""
-    found = crossings(job)
+    data = crossings(job)
     lux = SIZE_LUX
-    rows = {name: summary.summarise(film_scores(found.films, found.camera[name, lux])) for name in weights.SIZES}
+    rows = {name: summary.summarise(film_scores(data.films, data.camera[name, lux])) for name in weights.SIZES}
     table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
              for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
-    text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
+    text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.misses(r)}"
                      for n, r in rows.items())
-    ours = _summaries(found)
+    ours = _summaries(data)
     by_bytes, airtouch = _airtouch_sizes(job)
     table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
               for size, r in by_bytes.items()]
-    verdicts = {"network-vision": words.judged(words.worse(full, least), f"at 100 lux {text}"),
+    verdicts = {"network-vision": words.verdict(words.worse(full, least), f"at 100 lux {text}"),
                 "network-airtouch": airtouch}
 
     def draw(canvas):
@@ -112,9 +114,9 @@ def network_size(job: Job) -> Figure:
             axes.axvline(CLAIMS["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
             pictures.logarithmic(axes, sizes, "parameters (of best: bytes)")
             axes.set(ylim=(0, None))
-        _labelled(canvas, left, right)
+        _label_axes(canvas, left, right)
 
-    caption = (f"Simulated: the {len(found.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
+    caption = (f"Simulated: the {len(data.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
                f"and 8; each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
     return Figure("Errors against the size of the network", table, caption, verdicts, draw)
 
@@ -130,29 +132,29 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
             rows[folds[0]["parameters"]["parameter_bytes"]] = summary.summarise(scores)
     except Missing as missing:
         return {}, Verdict(UNTESTABLE, str(missing))
-    text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
+    text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())
     small, large = rows.values()
-    return rows, words.judged(not words.worse(large, small), f"best on recorded flights: {text}")
+    return rows, words.verdict(not words.worse(large, small), f"best on recorded flights: {text}")
 
 
 def fusion(job: Job) -> Figure:
     """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
-    found = crossings(job)
+    data = crossings(job)
     table: list[dict[str, Any]] = []
     scores: dict[tuple[str, float], float] = {}
     for lux in lux_of(job):
-        detections = {"camera": found.camera["teed", lux], "AirTouch": found.airtouch["best"],
-                      "both": found.camera["fusion", lux]}
+        detections = {"camera": data.camera["teed", lux], "AirTouch": data.airtouch["best"],
+                      "both": data.camera["fusion", lux]}
         for name, by_film in detections.items():
-            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(found.films, by_film, strict=True)])
-            row = summary.summarise(film_scores(found.films, by_film))
+            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(data.films, by_film, strict=True)])
+            row = summary.summarise(film_scores(data.films, by_film))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux,
                                          timed_f1=scores[name, lux]))
-        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(found.films, detections)
+        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(data.films, detections)
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
     never_worse, outcome = _outcome([r for r in table if r["detector"] == "both"])
-    verdict = words.judged(never_worse, f"timed F1, {sum(len(f.edges) for f in found.films)} edges: {text}; {outcome}")
+    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in data.films)} edges: {text}; {outcome}")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -163,7 +165,7 @@ def fusion(job: Job) -> Figure:
         axes.set(ylabel="timed F1 (1: every edge, no error)", ylim=(0.5, 1.02))
         axes.legend(fontsize=7, frameon=False)
 
-    caption = (f"Simulated: {len(found.films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 "
+    caption = (f"Simulated: {len(data.films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 "
                "s are one edge, at a time weighted by the inverse squared errors; errors, and whether edges of one "
                f"sense alone count, are learnt at each light on {films_of(job)[0]} other flights. Timed F1 counts a "
                f"match 1 - |error| / 1.5 s. {LIMITS}")
@@ -210,9 +212,9 @@ def _airtouch(axes: Any, ours: Summaries, key: str, factor: float) -> None:
             axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
 
 
-def _labelled(canvas: Any, left: Any, right: Any) -> None:
+def _label_axes(canvas: Any, left: Any, right: Any) -> None:
     """Label the axes of errors and of misses, and draw one legend below them."""
-    left.set_ylabel("mean error of edges found, m")
+    left.set_ylabel("mean error of detected edges, m")
     right.set_ylabel("missed edges, %")
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
 

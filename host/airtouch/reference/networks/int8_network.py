@@ -186,15 +186,15 @@ def _run_chunk(network: Int8Network, x: np.ndarray) -> np.ndarray:
 
 
 def _conv(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
-    windows = sliding_window_view(_centred(layer, x), layer.kernel, axis=(1, 2))  # n, rows, columns, in, kernel
+    windows = sliding_window_view(_centre(layer, x), layer.kernel, axis=(1, 2))  # n, rows, columns, in, kernel
     return _product(layer, np.moveaxis(windows, 3, 5).reshape(*windows.shape[:3], -1))
 
 
 def _dense(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
-    return _product(layer, _centred(layer, x).reshape(-1, 1, 1, layer.weights[0].size))
+    return _product(layer, _centre(layer, x).reshape(-1, 1, 1, layer.weights[0].size))
 
 
-def _centred(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
+def _centre(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
     return x.reshape(-1, *layer.input_shape).astype(np.int32) - layer.input_zero_point
 
 

@@ -16,7 +16,9 @@ from airtouch.simulation.firmware import (
 )
 
 _F = np.float64
-FLYING_MS = 2000  #: so long after the motors' last turn the firmware still takes itself to be flying
+#: ms after the motors' last turn in which the firmware still takes itself to be flying: IS_FLYING_HYSTERESIS_THRESHOLD
+#: of crazyflie-firmware's supervisor.c
+FLYING_MS = 2000
 STATE = np.dtype([
     ("kalman", kalman.STATE),
     ("range_module", range_module.STATE),

@@ -32,9 +32,10 @@ STATE = np.dtype([
     ("column", _F, (9,)),  # working space
 ])
 Z = 2  #: row of the covariance
-MOST_VARIANCE, LEAST_VARIANCE = 100.0, 1e-6
-MOVED_RAD = 1e-4  #: attitude errors from here on go into the quaternion
-MOST_ERROR_RAD = 10.0
+# The next four are those of crazyflie-firmware's kalman_core.c.
+MOST_VARIANCE, LEAST_VARIANCE = 100.0, 1e-6  #: bounds of every variance, in its state's unit squared
+MOVED_RAD = 1e-4  #: rad, attitude error above which it is moved into the quaternion
+MOST_ERROR_RAD = 10.0  #: rad, attitude error from which on it is dropped instead
 TINY = 1e-6  #: keeps lengths from being zero
 
 

@@ -150,7 +150,7 @@ def _boosting(seed: int) -> Any:
     return HistGradientBoostingClassifier(**BOOSTING, random_state=seed)
 
 
-def _binned(train: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _bin(train: np.ndarray, x: np.ndarray) -> np.ndarray:
     """x (rows, features) in BINS bins of each feature's distribution in `train`; trees need the order only.
 
     Scikit-learn's own binning takes a hundred times as long for weighted rows.
@@ -173,7 +173,7 @@ def _out_of_fold(x: np.ndarray, kind: np.ndarray, flight: np.ndarray, seed: int,
         test, train = fold == k, fold != k
         if not test.any() or len(np.unique(kind[train])) < 2:
             continue
-        bins = _binned(x[train], x)
+        bins = _bin(x[train], x)
         model = _boosting(seed).fit(bins[train], kind[train])
         score[test] = model.predict_proba(bins[test])[:, 1]
     for i in range(x.shape[1]):  # how well each feature separates alone

@@ -48,7 +48,7 @@ def refine(target: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np
     edge_indices = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
     edge_levers = [levers[k] for k in edge_indices]
     steps = np.array([lever.step for lever in edge_levers])
-    chosen = balanced(target.courses, flights, np.random.default_rng([seed, 17]))
+    chosen = balanced_draw(target.courses, flights, np.random.default_rng([seed, 17]))
     total = 1 + len(edge_indices) + STEPS
     comparisons = 0
 
@@ -58,23 +58,22 @@ def refine(target: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np
         simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers,
                                            np.tile(trial, (len(chosen), 1)), seed, FIRST_NUMBER, fixed, workers)
         progress(comparisons := comparisons + 1, total)
-        return np.clip((simulated - target.features[chosen]) / target.scatter, -fit.CLIP, fit.CLIP)
+        return target.differences(simulated, chosen)
 
-    values = lever_set.clipped(levers, values)
+    values = lever_set.clip(levers, values)
     present = difference(values)
     jacobian = np.column_stack([
-        _mean(difference(_stepped(values, k, levers[k])) - present) / _sign(values[k], levers[k])
+        _mean(difference(_step(values, k, levers[k])) - present) / _sign(values[k], levers[k])
         for k in edge_indices])
-    recorded = np.maximum(np.isfinite(target.features).sum(axis=0), 1)
     history = [_cost(_mean(present))]
     factor = 1.0
     for _ in range(STEPS):
-        variance = _variance(present) + 1.0 / recorded
+        variance = _variance(present) + 1.0 / target.counts
         step = factor * fit.least_squares_step(np.nan_to_num(jacobian), _mean(present), variance, edge_levers,
                                                values[edge_indices], steps)
         trial = values.copy()
         trial[edge_indices] += steps * step
-        trial = lever_set.clipped(levers, trial)
+        trial = lever_set.clip(levers, trial)
         trial_difference = difference(trial)
         history.append(_cost(_mean(trial_difference)))
         if history[-1] < min(history[:-1]):
@@ -89,7 +88,7 @@ def flights_for(batch: int) -> int:
     return FLIGHTS * batch // BATCH
 
 
-def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) -> np.ndarray:
+def balanced_draw(courses: Sequence[Course], count: int, rng: np.random.Generator) -> np.ndarray:
     """Numbers of courses, (count,), with equal numbers of each height class and of each course within a class."""
     height = [height_class(c.clearance_m) for c in courses]
     classes = [rng.permutation([i for i, h in enumerate(height) if h == name]) for name in CLASSES if name in height]
@@ -103,7 +102,7 @@ def _sign(value: float, lever: Lever) -> float:
     return 1.0 if value + lever.step <= lever.high else -1.0
 
 
-def _stepped(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
+def _step(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
     """The values (levers,) with lever k one step further."""
     out = values.copy()
     out[k] += _sign(values[k], lever) * lever.step

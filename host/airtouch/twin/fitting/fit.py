@@ -54,6 +54,15 @@ class Target:
     features: np.ndarray
     scatter: np.ndarray
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Flights that have each feature, (features,), at least 1."""
+        return np.maximum(np.isfinite(self.features).sum(axis=0), 1)
+
+    def differences(self, simulated: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Simulated features (k, features) less those of the `chosen` flights (k,), in scatters, clipped to CLIP."""
+        return np.clip((simulated - self.features[chosen]) / self.scatter, -CLIP, CLIP)
+
 
 @dataclass
 class State:
@@ -70,6 +79,20 @@ class State:
     samples: list[np.ndarray]
     differences: list[np.ndarray]
     refined: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What all rounds of a fit share: the arguments of `fit` of these names."""
+
+    target: Target
+    vehicle: Vehicle
+    levers: Sequence[Lever]
+    rounds: int
+    flights: int
+    seed: int
+    fixed: Mapping[str, Any] | None
+    workers: int
 
 
 def target_of(courses: Sequence[Course], features: np.ndarray) -> Target:
@@ -95,8 +118,9 @@ def fit(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: in
     """
     fit_key = key(target, vehicle, levers, flights=flights, seed=seed, fixed=fixed)
     state = load(state_file, fit_key) or State(lever_set.starts(levers), [], [], [])
+    settings = _Settings(target, vehicle, levers, rounds, flights, seed, fixed, workers)
     for number in range(len(state.history), rounds):
-        _round(state, target, vehicle, levers, number, rounds, flights, seed, fixed, workers)
+        _round(state, settings, number)
         state.refined = None
         if progress:
             progress(number + 1, rounds, state.history[-1]["misfit"])
@@ -126,33 +150,31 @@ def total(misfit: Mapping[str, float]) -> float:
     return float(np.sqrt(sum((GROUP_WEIGHT[name] * rms) ** 2 for name, rms in misfit.items())))
 
 
-def _round(state: State, target: Target, vehicle: Vehicle, levers: Sequence[Lever], number: int, rounds: int,
-           flights: int, seed: int, fixed: Mapping[str, Any] | None, workers: int) -> None:
+def _round(state: State, settings: _Settings, number: int) -> None:
     """One round: simulate flights with levers drawn around the present ones, regress, and step. Changes the state."""
     start_s = time.process_time()
-    rng = np.random.default_rng([seed, number, 13])
+    target, levers, flights = settings.target, settings.levers, settings.flights
+    rng = np.random.default_rng([settings.seed, number, 13])
     steps = np.array([lever.step for lever in levers])
-    values = lever_set.clipped(levers, state.values + steps * rng.standard_normal((flights, len(levers))))
+    values = lever_set.clip(levers, state.values + steps * rng.standard_normal((flights, len(levers))))
     passes = flights // len(target.courses) + 1
     chosen = np.concatenate([rng.permutation(len(target.courses)) for _ in range(passes)])[:flights]
-    simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers, values, seed,
-                                       number * flights, fixed, workers)
-    differences = np.clip((simulated - target.features[chosen]) / target.scatter, -CLIP, CLIP)
+    simulated = fly.simulated_features([target.courses[i] for i in chosen], settings.vehicle, levers, values,
+                                       settings.seed, number * flights, settings.fixed, settings.workers)
     diverged = int((~np.isfinite(simulated[:, 0])).sum())
     if diverged > MAX_DIVERGED * flights:
         raise AirTouchError(f"{diverged} of {flights} simulated flights did not end well; give a vehicle file nearer "
                             "to this drone with --vehicle")
     state.samples = [*state.samples[-MEMORY_ROUNDS + 1:], values]
-    state.differences = [*state.differences[-MEMORY_ROUNDS + 1:], differences]
+    state.differences = [*state.differences[-MEMORY_ROUNDS + 1:], target.differences(simulated, chosen)]
     jacobian, mean, variance = regression(np.vstack(state.samples), np.vstack(state.differences), state.values, steps,
                                           len(values))
     before = misfit(mean)
-    recorded = np.maximum(np.isfinite(target.features).sum(axis=0), 1)
-    step = least_squares_step(jacobian, mean, variance + 1.0 / recorded, levers, state.values, steps)
-    step *= 1.0 if number < rounds - LAST_ROUNDS else LAST_FACTOR
+    step = least_squares_step(jacobian, mean, variance + 1.0 / target.counts, levers, state.values, steps)
+    step *= 1.0 if number < settings.rounds - LAST_ROUNDS else LAST_FACTOR
     state.history.append({"values": state.values.tolist(), "misfit": before, "lost": diverged,
                           "cpu_s": round(time.process_time() - start_s, 1)})
-    state.values = lever_set.clipped(levers, state.values + steps * step)
+    state.values = lever_set.clip(levers, state.values + steps * step)
 
 
 def regression(samples: np.ndarray, differences: np.ndarray, centre: np.ndarray, steps: np.ndarray,

@@ -163,7 +163,7 @@ def starts(levers: Sequence[Lever]) -> np.ndarray:
     return np.array([lever.start for lever in levers])
 
 
-def clipped(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
+def clip(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
     """Values (levers,) clipped to their bounds."""
     return np.clip(values, [lever.low for lever in levers], [lever.high for lever in levers])
 

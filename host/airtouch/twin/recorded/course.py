@@ -110,7 +110,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     """
     check(log)
     edges = platform_edges(log)
-    down = median_filter(_interpolated(log["zrange_m"]), MEDIAN_ROWS)
+    down = median_filter(_interpolate(log["zrange_m"]), MEDIAN_ROWS)
     flying = airborne(log)
     entry = next((e for e in edges if e.kind == "entry"), None)
     leave = next((e for e in edges if entry and e.kind == "exit" and e.sample > entry.sample), None)
@@ -172,7 +172,7 @@ def _last_start(flying: np.ndarray, entry: int) -> int:
     return int(grounded[-1]) + 1 if len(grounded) else 0
 
 
-def _interpolated(values: np.ndarray) -> np.ndarray:
+def _interpolate(values: np.ndarray) -> np.ndarray:
     """Values (n,) with straight lines over the gaps."""
     finite = np.isfinite(values)
     return np.interp(np.arange(len(values)), np.flatnonzero(finite), values[finite])
@@ -229,5 +229,5 @@ def _gain(acc: np.ndarray) -> np.ndarray:
 def _horizontal(log: FlightLog, start: int, stop: int) -> np.ndarray:
     """Horizontal specific force of samples start to stop - 1 less its median, (n, 2) m/s^2, with gaps filled."""
     acc = level_acceleration(log)[start:stop, :2]
-    acc = np.column_stack([_interpolated(a) for a in acc.T])
+    acc = np.column_stack([_interpolate(a) for a in acc.T])
     return acc - np.median(acc, axis=0)

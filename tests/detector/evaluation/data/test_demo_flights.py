@@ -33,7 +33,7 @@ def test_a_choice_is_spread_over_the_whole_list():
 def test_each_simulated_flight_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(demo_flights, "GENERATED", 3)
     counts = []
-    flights = demo_flights.generated(tmp_path, progress=lambda *count: counts.append(count))
+    flights = demo_flights.simulate_flights(tmp_path, progress=lambda *count: counts.append(count))
     assert counts == [(0, 3), (1, 3), (2, 3), (3, 3)] and len(flights) == 3
 
 

@@ -126,6 +126,7 @@ def day_of(path: Path) -> str | None:
 
 
 def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
+    """The clean flights of a folder's manifest, or all logs in it without one. Raises AirTouchError without any."""
     if listed:
         files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
     else:
@@ -141,6 +142,7 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
 
 
 def _condition(row: dict[str, str | None], place: str) -> Condition:
+    """The condition in a manifest's row. Raises AirTouchError, naming the place, for a number that is none."""
     def text(name: str) -> str | None:
         return (row.get(name) or "").strip() or None
 

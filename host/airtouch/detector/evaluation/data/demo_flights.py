@@ -38,7 +38,7 @@ def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
     if folder is not None:
         files, origin = dataset.collect([folder], speed_mps), f"recorded flights in {folder}"
     else:
-        files, origin = generated(simulated, tell, progress), f"flights of the simulator ({simulated})"
+        files, origin = simulate_flights(simulated, tell, progress), f"flights of the simulator ({simulated})"
     if len(files) < FEWEST:
         raise AirTouchError(f"{folder or simulated}: {len(files)} flights are too few to train and to test; "
                             f"at least {FEWEST} are needed")
@@ -54,8 +54,8 @@ def split(files: Sequence[FlightFile]) -> tuple[list[FlightFile], list[FlightFil
             [f for f, out in zip(files, in_test, strict=True) if out])
 
 
-def generated(folder: Path, tell: Callable[[str], None] = lambda _: None,
-              progress: Callable[[int, int], None] = lambda *_: None) -> list[FlightFile]:
+def simulate_flights(folder: Path, tell: Callable[[str], None] = lambda _: None,
+                     progress: Callable[[int, int], None] = lambda *_: None) -> list[FlightFile]:
     """Simulate flights and write them with their manifest. The first call compiles the simulator."""
     from airtouch.simulation import batch, scenario
     from airtouch.simulation.flight import Diverged

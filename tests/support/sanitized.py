@@ -10,9 +10,9 @@ import pytest
 
 from objects import compiled
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model",
-                                                "gap8/app/src", "tests")]
+                                                "gap8/app/src", "tests/support")]
 #: both ends of the link and the networks behind it
 SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/kernels/feature_window.c",
            *sorted((ROOT / "gap8" / "kernels").glob("*.c")), *sorted((ROOT / "gap8" / "app" / "src").glob("gap8_*.c")),

@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-FOLDER = Path(__file__).parents[1] / "build" / "tests"
+FOLDER = Path(__file__).parents[2] / "build" / "tests"
 
 
 def compiled(compiler: str, flags: Sequence[str | Path], sources: Sequence[Path]) -> tuple[list[Path], str]:

@@ -18,7 +18,7 @@ TOOLS = re.compile(r"could not import|pip install|needs the extra|needs cflib|on
 
 def folder() -> Path:
     """Where recorded flights are looked for."""
-    return Path(os.environ.get("AIRTOUCH_FLIGHTS", Path(__file__).parents[2] / "shared" / "flights"))
+    return Path(os.environ.get("AIRTOUCH_FLIGHTS", Path(__file__).parents[3] / "shared" / "flights"))
 
 
 def needs(package: str) -> pytest.MarkDecorator:
@@ -31,7 +31,7 @@ def _guard(report: pytest.TestReport | pytest.CollectReport) -> None:
     if not report.skipped or hasattr(report, "wasxfail") or not isinstance(report.longrepr, tuple):
         return
     path, line, reason = report.longrepr
-    folders = [place for place in (folder(), Path(__file__).parents[2] / "shared" / "flights") if place.is_dir()]
+    folders = [place for place in (folder(), Path(__file__).parents[3] / "shared" / "flights") if place.is_dir()]
     if folders and not TOOLS.search(reason):
         report.outcome = "failed"
         report.longrepr = f"{path}:{line}: recorded flights are in {folders[0]}, and yet: {reason}"

@@ -1,4 +1,4 @@
-"""Vehicles: the built-in ones and other people's load and fly; the larger one senses further."""
+"""What the simulator makes of a vehicle: built-in ones and other people's hover; the larger one senses further."""
 
 import math
 from dataclasses import replace
@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from airtouch import vehicle as vehicles
-from airtouch.errors import AirTouchError
-from airtouch.simulation import flight, scenario
+from airtouch.simulation import flight
 from airtouch.simulation.effects.air.ground_effect import thrust_ratio
 from airtouch.simulation.plant import from_vehicle, hover_pwm
 
@@ -67,28 +66,3 @@ acc_noise_ratio = [1.0, 2.0, 3.0]
     np.testing.assert_allclose(from_vehicle(v)[0]["acc_noise"], 0.06 * np.array([1, 2, 3]))
     assert hover_pwm(v) == pytest.approx(math.sqrt(0.03 * 9.81 / 4 / 4e-11))
     assert hover_pwm(replace(v, thrust_of_pwm_n=(0.0, 1e-6, 0.0))) == pytest.approx(0.03 * 9.81 / 4 / 1e-6)
-
-
-LEVEL = """
-[mission]
-step = [{ do = "take-off", height_m = 0.5 }, { do = "hover", time_s = 1.0 }]
-"""
-
-
-def test_a_scenario_may_change_fields_of_the_vehicle():
-    fields = "range_module = 'none'\n[vehicle]\nmass_kg = { low = 0.03, high = 0.05 }\nflow_noise_mps = [0.01, 0.02]\n"
-    scene = scenario.parse(fields + LEVEL, "mine.toml")
-    vehicles_drawn = [scenario.draw_flight(scene, 0, i).with_changes(vehicles.load()) for i in range(20)]
-    assert all(0.03 <= v.mass_kg <= 0.05 for v in vehicles_drawn) and len({v.mass_kg for v in vehicles_drawn}) == 20
-    assert {v.flow_noise_mps for v in vehicles_drawn} == {(0.01, 0.02)}
-    assert {(v.range_module, v.name) for v in vehicles_drawn} == {("none", "crazyflie-2.1-flow")}
-
-
-@pytest.mark.parametrize("line, message", [
-    ("mas_kg = 1", "unknown key mas_kg"), ("mass_kg = -1", "must be positive"),
-    ("flow_noise_mps = 1", "must be 2 numbers"),
-    ("firmware = '1999'", "mine.toml"), ("name = 'other'", "every field of a vehicle but its name")])
-def test_wrong_fields_are_told_with_their_file(line, message):
-    with pytest.raises(AirTouchError, match=message) as error:
-        scenario.parse(f"[vehicle]\n{line}\n{LEVEL}", "mine.toml")
-    assert str(error.value).startswith("mine") and "\n" not in str(error.value)
