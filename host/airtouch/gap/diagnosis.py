@@ -207,6 +207,6 @@ def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = la
             gap = gap_of_rest
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
-        selection = recorded.without_names(selection)
+        selection = recorded.with_none_named(selection)
         gap = gap_of(data, selection.parts, None)
     return selection, gap

@@ -73,7 +73,7 @@ def against(selection: Selection) -> str:
 
 
 def _left(selection: Selection, gains: str, off: str) -> str:
-    """What is left, in words, with its limit; gains: the words for the gain of a model without names.
+    """What is left, in words, with its limit; gains: the words for the gain of the nameless model.
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """

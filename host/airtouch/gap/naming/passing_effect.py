@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
@@ -12,7 +13,6 @@ from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effect
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
-from airtouch.gap.unnamed.nameless import height_gain
 
 
 def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],

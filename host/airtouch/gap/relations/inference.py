@@ -1,7 +1,7 @@
 """Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect.
 
 `infer` adds effects one by one while each gains enough (`_likeliest`). What then still speaks against them is measured
-in two ways, each with its limit: what a disturbance without a name gains beside them (`_nameless`), and how far the
+in two ways, each with its limit: what a nameless disturbance gains beside them (`_nameless`), and how far the
 flight lies from them (`_distance`).
 """
 
@@ -23,13 +23,13 @@ from airtouch.simulation.effects import get
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
 #: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
-#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence; 7 was tried on
+#: nats that a nameless disturbance may gain beside the right effects, whatever their evidence; 7 was tried on
 #: 2026-11-25 and taken back after the opened set of seed 112233 (host/docs/looks.md)
 LEAST_NAMELESS = 10.0
-#: nats by which two effects must be likelier than one with a disturbance without a name beside it; 36 of 44 wrong
+#: nats by which two effects must be likelier than one with a nameless disturbance beside it; 36 of 44 wrong
 #: pairs, found where the right effect was left out, were not
 OVER_NAMELESS = 30.0
-#: shares of the effects' evidence, beside that of their classes, that a disturbance without a name may gain, because no
+#: shares of the effects' evidence, beside that of their classes, that a nameless disturbance may gain, because no
 #: curve is exact; PAIR: the same for two effects, because they are not a sum; chosen on flights of `learning.SEED`
 CRUDE_NAMELESS, PAIR_NAMELESS = 0.01, 0.01
 #: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
@@ -45,7 +45,7 @@ Shares = Mapping[tuple[str, float | None], float]  #: one number for each class,
 class Against(NamedTuple):
     """Nats that speak against effects, and those that may where the effects are right.
 
-    of_distance: whether they are the excess of a flight's distance, not the gain of a disturbance without a name.
+    of_distance: whether they are the excess of a flight's distance, not the gain of a nameless disturbance.
     """
 
     nats: float
@@ -58,8 +58,8 @@ class Inference:
     """What the relations of a flight's signals show.
 
     classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none. nameless_alone:
-    nats that a disturbance without a name gains over none. unexplained: nats that speak against the likeliest effects,
-    the gain of a disturbance without a name beside them or the excess of the flight's distance from them, whichever is
+    nats that a nameless disturbance gains over none. unexplained: nats that speak against the likeliest effects,
+    the gain of a nameless disturbance beside them or the excess of the flight's distance from them, whichever is
     nearer its limit; limit: nats that may speak against effects that are right; of_distance: see `Against`.
     readings: parameters of the likeliest effects, of those that the library is calibrated for; without_sign: those of
     these effects whose sign does not show.
@@ -119,7 +119,7 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
 
 
 def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: Shares) -> Against:
-    """What a disturbance without a name gains beside effects."""
+    """What a nameless disturbance gains beside effects."""
     share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
     return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence, False)
 

@@ -34,7 +34,7 @@ class Library:
     less the middle.
     distance: median and standard deviation of the squared length of coordinates of nominal flights that were not
     learned from.
-    nameless_share, second_share (classes,): nats that a disturbance without a name, or a second effect, gains beside
+    nameless_share, second_share (classes,): nats that a nameless disturbance, or a second effect, gains beside
     the class, over the evidence for it; four of five flights with it have at most so much.
     distance_scatter (classes,): scatter of the nats by which a flight with the class lies farther from it than nominal
     flights from none, over the evidence, beside the scatter of nominal flights.

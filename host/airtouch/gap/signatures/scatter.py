@@ -36,7 +36,7 @@ class ApparentStrengths:
     """One nominal flight compared with others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains; passing: size (`size_of`) of each effect that comes
+    chance; rate: nats a second that the nameless model gains; passing: size (`size_of`) of each effect that comes
     and goes.
     """
 
@@ -117,7 +117,7 @@ class Scatter:
         return self._rare(nominal, further) + 0.5 * float((fitted - nominal) @ precision @ (fitted - nominal))
 
     def allowed(self, seconds: float, least: float) -> float:
-        """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
+        """Log likelihood that the nameless model may gain in a nominal flight of so many seconds.
 
         least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
         """

@@ -14,12 +14,12 @@ from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data, command_torque
 from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.nameless.basis import BASIS, basis
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.basis import BASIS, basis
 
 CHANNELS = 9  #: that are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most

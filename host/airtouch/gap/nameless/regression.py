@@ -6,10 +6,10 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import BlockSet, problem_of
+from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
+from airtouch.gap.nameless.powers import Powers, gain_at_even_odds
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
-from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
 ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
 OWN_ROUNDS = 2  #: the same of one channel of a flight under fitted coefficients; chosen
