@@ -125,7 +125,7 @@ class Selection:
         The fewer nominal flights there are, the farther off may another one lie.
         """
         if self.inference is not None:
-            return self.inference.limit
+            return self.inference.against.limit
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless_alone, self.nominal_gain)
         gained = self.whole.gain if self.whole else 0.0
