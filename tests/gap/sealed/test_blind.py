@@ -64,7 +64,8 @@ def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch)
 
     def open_key(folder, answers):
         opened.append(answers)
-        return {"answers": {n: {"effects": [{"name": "mass"}]} for n in names}}
+        mass = blind_key.DrawnEffect("mass", "mass", 0, {})
+        return blind_key.Key({n: blind_key.DrawnFlight((mass,)) for n in names})
 
     for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None)):
         monkeypatch.setattr(blind_run, name, stand_in)
@@ -234,6 +235,7 @@ def test_scores_in_closed_form():
         answer("c", "none", [("none", 1.0)]), answer("e", "unknown", [("unknown", 0.7), ("none", 0.3)]),
         answer("d", "effect", [("inertia", 0.8)], [("inertia", {}), ("gust", {})]),
         answer("b", "unknown", [("unknown", 0.6), ("gust", 0.4)], withheld=["inertia"])]
+    key = blind_key.key_from(key)
     figures = blind_score.figures(key, cases)
     assert (figures["top_1"]["hits"], figures["top_1"]["n"]) == (2, 2)  # mass and thrust_coefficient are one
     assert (figures["false_alarms"]["hits"], figures["false_alarms"]["n"]) == (1, 2)
