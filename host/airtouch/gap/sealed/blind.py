@@ -18,7 +18,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
-from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
+from airtouch.gap.sealed.blind_severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
@@ -123,11 +123,11 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
     vehicle = study.vehicle
     logs = nominal(vehicle, NONE_FIRST, NONE, seed)
     without = [Data(study, list(ready_flights([log], vehicle, []))) for log in logs]
-    found = {}
+    conditions, found = Conditions(study, SCENARIO, without, stripped), {}
     asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
     for number, (name, kind) in enumerate(asked.items(), 1):
         progress(f"severities of {name}, effect {number} of {len(asked)}")
-        low = weakest(kind, study, SCENARIO, without, seed, stripped)
+        low = weakest(kind, conditions, seed)
         if low is not None:
             found[name] = three_severities(low, kind.highest)
     return found
