@@ -125,7 +125,7 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
         where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},
-        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
+        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
 
 
 def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:

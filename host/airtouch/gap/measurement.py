@@ -21,7 +21,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.command_power import CommandPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
-from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
+from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -44,7 +44,7 @@ class Measurement:
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)
     spectra: Mapping[str, Any] = field(default_factory=dict)
-    rotors: tuple[Mapping[str, float], ...] = ()
+    rotors: tuple[RotorSpeed, ...] = ()
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -57,7 +57,7 @@ class Measurement:
             "gap": dict(self.gap), "floor_from": self.map.floor_from,
             "calibration": {k: q.plain() for k, q in self.calibration.items()},
             "cannot": list(self.cannot), "notes": list(self.notes), "left_out": list(self.left_out),
-            "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra),
+            "rotors": [r._asdict() for r in self.rotors], "spectra": dict(self.spectra),
             "map": [plain_cell(c) for c in self.map.cells],
         })
 

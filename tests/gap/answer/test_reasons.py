@@ -109,5 +109,5 @@ def test_what_is_named_and_not_enough_is_held_against_itself():
 
 
 def test_the_three_that_gain_most_are_nearest():
-    assert [n["name"] for n in nearest(selection(()))] == ["mass", "wind", "gust"]
-    assert all(n["fails"] for n in nearest(selection(())))
+    assert [n.name for n in nearest(selection(()))] == ["mass", "wind", "gust"]
+    assert all(n.fails for n in nearest(selection(())))

@@ -3,6 +3,7 @@
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
+from airtouch.gap.result import Rejected
 
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
@@ -25,11 +26,11 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
     return shortfall(selection, selection.singles[name])
 
 
-def nearest(selection: Selection) -> list[dict[str, str]]:
+def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
     gaining = (j for j in selection.singles.values() if selection.gained(j) > 0.0)
     most = sorted(gaining, key=lambda j: -selection.gained(j))
-    return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
+    return [Rejected(j.name, shortfall(selection, j)) for j in most[:NEAREST]]
 
 
 def shortfall(selection: Selection, candidate: Candidate) -> str:

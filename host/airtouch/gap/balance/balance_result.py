@@ -4,13 +4,11 @@
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.pictures import pictures_of
-from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
@@ -30,7 +28,7 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, Quantity, RankedCandidate
+from airtouch.gap.result import BASELINE, Cell, Control, Diagnosis, GapMap, Quantity, RankedCandidate, Shrink
 from airtouch.gap.where import summary
 from airtouch.vehicle import Vehicle
 
@@ -77,7 +75,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
-        control=_control(total, first, shrink) if verdict == "effect" else {},
+        control=_control(total, first, shrink) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
@@ -118,13 +116,10 @@ def _gap(verdict: str, shrink: Shrink) -> dict[str, float]:
     return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
 
 
-def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> dict[str, Any]:
-    """The gap with a deliberately wrong effect, JSON-ready; empty where none of WRONG is surely wrong."""
+def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> Control | None:
+    """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
     wrong = next((n for n in WRONG if n in total and n != first and total[n] < WRONG_BELOW), None)
-    if wrong is None:
-        return {}
-    return {"name": wrong, "before": shrink[wrong].before, "after": shrink[wrong].after,
-            "shrink": shrink[wrong].share.plain()}
+    return None if wrong is None else Control(wrong, shrink[wrong])
 
 
 def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
