@@ -43,7 +43,9 @@ NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
     """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
     def any_hovers(flights_of_one_kind: Sequence[Flight]) -> bool:
+        """Whether one of the flights has a hover."""
         return any(hover_pattern(f, vehicle).known for f in flights_of_one_kind)
+
     return all(f.rates is None for f in flights) and any_hovers(nominal) and any_hovers(flights)
 
 
@@ -155,6 +157,3 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, f
 def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
     """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
     return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
-
-
-__all__ = ["applies", "diagnosis"]

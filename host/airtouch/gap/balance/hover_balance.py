@@ -112,6 +112,3 @@ def _own_power(power: np.ndarray, caused: np.ndarray) -> float:
         """Mean log10 of the power over the expected one."""
         return float(np.mean(power - np.log10(10.0 ** own + caused)))
     return LEAST_POWER if mean_over(LEAST_POWER) <= 0.0 else float(brentq(mean_over, LEAST_POWER, power.max()))
-
-
-__all__ = ["BALANCE", "POWER", "Reference", "evidence", "reference"]

@@ -147,7 +147,7 @@ class Problem:
 
     def _noise_growth(self, change: Change) -> np.ndarray:
         """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
-        before, after = change.unexplained
+        before, after = change.incoherent
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
         table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]

@@ -2,8 +2,8 @@
 
 y is the angular acceleration about roll or pitch that the gyro measures, rad/s^2; u the command in the log, N per
 motor. A source with transfers y_i and u_i, `noise_spectra.transfers`, has S_yu = strength_i y_i u_i*, and
-S_uu = strength_i |u_i|^2. What no command explains of y is S_yy - |S_yu|^2 / S_uu (Bendat and Piersol, Random Data,
-4th ed., section 6.2).
+S_uu = strength_i |u_i|^2. The part of y that is incoherent with u has the power S_yy - |S_yu|^2 / S_uu (noise output
+spectrum: Bendat and Piersol, Random Data, 4th ed., section 6.2).
 """
 
 from collections.abc import Sequence
@@ -64,9 +64,9 @@ def accelerations_per_command(c: Controller, plant: AxisPlant, strengths: np.nda
     return [ratios[s if s.power else NO_STEP] for s in steps]
 
 
-def unexplained_acceleration(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray,
+def incoherent_acceleration(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray,
                              width: float) -> np.ndarray:
-    """Power (bins,) of the angular acceleration that a logged command does not explain, rad^2/s^4/Hz.
+    """Power (bins,) of the angular acceleration that is incoherent with the logged command, rad^2/s^4/Hz.
 
     For noise of given strengths (sources,); width: as for `Spectra.smoothed`. It is the noise of the gyro, and what
     the loop does of noise between two rows of the log.

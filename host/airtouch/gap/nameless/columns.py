@@ -64,7 +64,7 @@ class Regressors:
         return self.columns.shape[1] - len(self.offsets)
 
     def precision(self, floor: NamelessFloor) -> np.ndarray:
-        """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
+        """Inverse variances (free + offsets,) of the priors of coefficients in a nominal flight, and of the offsets."""
         nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 

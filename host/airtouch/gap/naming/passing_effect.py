@@ -15,7 +15,7 @@ from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
+def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
                    ) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
@@ -24,23 +24,24 @@ def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[s
     which another vehicle is known to be overhead go before others, which are only likely. singles: candidates judged
     alone; least: nats of evidence that each needs; without: names that are left out.
     """
-    if on.data.study.scatter is None:
+    if trial.data.study.scatter is None:
         return None
-    steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
-    passing = [g for g in gated_effects(on.data, without).values()
-               if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+    data, always = trial.data, [j.gain for n, j in singles.items() if j.evidence >= least[n]]
+    steady = max([height_gain(data, trial.parts), *always])
+    passing = [g for g in gated_effects(data, without).values()
+               if g.gain >= steady + LEAST_GAIN and news(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
-    return _as_judged(on, max(overhead or passing, key=lambda g: g.gain))
+    return _as_judged(trial, max(overhead or passing, key=lambda g: g.gain))
 
 
-def _as_judged(on: Trial, effect: GatedEffect) -> Candidate:
+def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
-    gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
+    gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
-                     strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
+                     strength=effect.strength, evidence=news(trial.data, effect.key, effect.gain, effect.strength),
                      key=effect.key)
 
 

@@ -17,29 +17,29 @@ from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(on: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
+def with_shares(trial: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
     """The steps of a selection, those that are named with their `share`, nats, where there are several."""
     if sum(s.named for s in steps) < 2:
         return list(steps)
-    return [replace(s, share=steps[-1].gain - _gain_without(on, steps, place)) if s.named else s
+    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place)) if s.named else s
             for place, s in enumerate(steps)]
 
 
-def _gain_without(on: Trial, steps: Sequence[Candidate], place: int) -> float:
+def _gain_without(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
     """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
     last, dropped = steps[-1], _own(steps, place)
     others = _without(last.terms, dropped)
-    gain = clock_gains(on.data, others)
+    gain = clock_gains(trial.data, others)
     if all(t.shows_in == CLOCK for t in others):
         return gain
-    refits = [_refit(on, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
-    gain += sum(gain_of(on, test, refits[train].terms) for train, test in ROUND_TRIP)
+    refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
+    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
     cost_of_dropped = steps[place].choice_cost - (steps[place - 1].choice_cost if place else 0.0)
-    gain += _gained_while_certain(on, steps, place)
+    gain += _gained_while_certain(trial, steps, place)
     return gain - price_of(refits[-1].terms) - (last.choice_cost - cost_of_dropped)
 
 
-def _gained_while_certain(on: Trial, steps: Sequence[Candidate], place: int) -> float:
+def _gained_while_certain(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
     """`Candidate.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
     first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_newest(steps, i))), 0)
     earlier = [i for i in range(first_random) if i != place]
@@ -48,14 +48,14 @@ def _gained_while_certain(on: Trial, steps: Sequence[Candidate], place: int) -> 
     if place > first_random:
         return steps[-1].gained_while_certain
     later = frozenset().union(*(_own(steps, i) for i in range(len(steps)) if i not in earlier))
-    refits = [_refit(on, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
-    return sum(gain_of(on, test, refits[train].terms) - gain_of(on, test, refits[train].terms, True)
+    refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
+    return sum(gain_of(trial, test, refits[train].terms) - gain_of(trial, test, refits[train].terms, True)
                for train, test in ROUND_TRIP)
 
 
-def _refit(on: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
+def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     """Effects fitted to a half anew, from their values on."""
-    return fit(on.data, on.parts[half], terms, mean_parameters(terms))
+    return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
 
 
 def _newest(steps: Sequence[Candidate], place: int) -> list[Term]:

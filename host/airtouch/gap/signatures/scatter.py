@@ -80,10 +80,11 @@ class Scatter:
 
         The strength is nominal scatter, Student's with `freedom`, plus a chance error, normal with `covariance` (k, k);
         the likeliest split of the two counts, after each further parameter has paid for itself. Parameters that make
-        up for one another thus count together, and one that the data leave open says nothing. None: no chance error.
-        apart (k,): half of what two halves of the flights differ by; of
-        all strengths between theirs the one of least evidence counts. A parameter that the table does not know yet
-        scatters as the widest of its effect's others.
+        up for one another thus count together, and one that the data leave open says nothing. A parameter that the
+        table does not know yet scatters as the widest of its effect's others.
+
+        covariance: None for no chance error. apart (k,): half of what two halves of the flights differ by; of all
+        strengths between theirs the one of least evidence counts.
         """
         rms = self.rms.get(name)
         if rms is None or not len(strength):

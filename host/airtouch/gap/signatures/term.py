@@ -139,6 +139,7 @@ def mean_places(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
     ends = itertools.accumulate(len(t.free) for t in mean)
     return [(t, slice(end - len(t.free), end)) for t, end in zip(mean, ends, strict=True)]
 
+
 def parameter_of(effect: Effect, name: str) -> Parameter:
     """The parameter of an effect with a name."""
     return next(p for p in effect.parameters if p.name == name)
