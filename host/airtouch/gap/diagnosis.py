@@ -134,22 +134,27 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     pictures: whether to keep the curves that a report shows.
     """
     study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
-    effects, is_effect = list(result.effects), result.verdict == "effect"
-    terms = [candidates.term_of(e) for e in effects]
+    is_effect, terms = result.verdict == "effect", [candidates.term_of(e) for e in result.effects]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
-    steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
-                       comparison.vehicle.name)
-    return replace(
+    answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(comparison.vehicle, nominal, comparison.calibration, judged, selection, result) if is_effect else {},
+        arms=arms(_declared(comparison), judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
-        next=steps,
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
+    return replace(answer, next=next_steps(answer, usable))
+
+
+def _declared(comparison: Comparison) -> Study | None:
+    """The study of the vehicle as its file declares it, where `Comparison.study` is a calibrated one; else None."""
+    calibration = comparison.calibration
+    if calibration is None:
+        return None
+    return calibration.declared or declared_study(comparison.vehicle, comparison.nominal)
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],

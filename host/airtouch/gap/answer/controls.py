@@ -9,12 +9,10 @@ from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.selection import Candidate, Selection
-from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.nominal.calibrate import Calibration
 from airtouch.gap.result import Control, Diagnosis, Shrink
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import CLOCK, WRONG
-from airtouch.vehicle import Vehicle
 
 
 def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
@@ -28,18 +26,18 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
     return Control(name, shrink_of(data, selection.parts, Candidate(name, fits[0].terms, 0.0, fits), gap))
 
 
-def arms(vehicle: Vehicle, nominal: Sequence[Flight], calibration: Calibration | None, judged: Sequence[Flight],
-         selection: Selection, answer: Diagnosis) -> dict[str, Shrink]:
+def arms(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
+         ) -> dict[str, Shrink]:
     """The shrink with the vehicle as calibrated and as its file declares it; the latter alone without baseline.
 
-    judged: the flights that the answer comes from; answer: names an effect.
+    declared: the study of the vehicle as declared, None where the answer is held against that already; judged: the
+    flights that the answer comes from; answer: names an effect.
     """
-    assert answer.shrink is not None  # it names an effect
+    assert answer.shrink is not None and selection.chosen is not None  # it names an effect
     overall = Shrink(answer.gap["before"], answer.gap["after"], answer.shrink)
-    if not nominal or selection.chosen is None:
+    if declared is None:
         return {"declared": overall}
-    study = (calibration.declared if calibration is not None else None) or declared_study(vehicle, nominal)
-    data = Data(study, judged)
+    data = Data(declared, judged)
     parts = halves(data)
     terms = tuple(t for t in selection.chosen.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.chosen.fits[0].terms if selection.chosen.fits else ())

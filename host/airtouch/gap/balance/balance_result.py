@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -72,17 +73,17 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     cells = _cells(gap, base, vehicle, fits[first], len(flights))
     indistinguishable = alike([e.name for e in effects], total, first, probability)
     headline = summary.headline(cells, bool(effects))
-    steps = next_steps(verdict, effects, indistinguishable, headline, flights, True, vehicle.name)
-    return Diagnosis(
+    answer = Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
         control=_control(total, first, shrink) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
-        map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
+        map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)
+    return replace(answer, next=next_steps(answer, flights))
 
 
 def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
