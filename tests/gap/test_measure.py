@@ -99,7 +99,7 @@ def test_nominal_flights_have_little_gap_to_one_another(sweeps):
     measured = measure(sweeps[:1], VEHICLE, sweeps[1:], calibrated=False)
     assert measured.gap["before"] < 2.5
     assert np.mean([significant(c) for c in measured.map.cells if c.regime == "all"]) < 0.1
-    assert set(measured.spectra["roll"]) == {"flown", "nominal"}
+    assert set(measured.spectra.plain()["roll"]) == {"flown", "nominal"}
 
 
 @pytest.mark.parametrize("name", ["crazypad/pad_cut_propeller_M3_3mm_3mm_41mm_E8_log00.csv.gz",

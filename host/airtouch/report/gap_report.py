@@ -113,7 +113,7 @@ def _images(pictures: Pictures | None) -> list[dict[str, str]]:
             " A random effect cannot be predicted sample by sample: its green curve is what is "
             "left of the power." if any(s.after is not None for s in pictures.spectra) else ""),
             partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
-    if pictures.commands:
+    if pictures.commands is not None:
         drawn.append(("Spectra of the motor commands",
                       "Delays, gains and noise in the loop show here, as a shape that differs.",
                       partial(gap_figures.commands, pictures.commands)))

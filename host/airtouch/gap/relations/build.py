@@ -21,7 +21,7 @@ from scipy.linalg import solve_triangular
 
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, two_of
-from airtouch.gap.relations.effect_class import learn_class, stands_out
+from airtouch.gap.relations.effect_class import ClassFlights, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -104,8 +104,8 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     axes = directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.amount, p.shift @ axes,
-                                (p.whitened - middle) @ axes) for p in paired)
+    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
+        p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
     none = np.zeros(len(classes))
     library = Library(
         scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),

@@ -131,7 +131,7 @@ def _rms(of_sums: Sums, phase: int) -> np.ndarray:
     return np.sqrt(of_sums.power[rows].sum(axis=0) / samples[:, None, None])
 
 
-def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
+def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
           floor: np.ndarray) -> np.ndarray:
     """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
     with np.errstate(invalid="ignore"):
@@ -147,7 +147,7 @@ def _phase_tables(phase: int, before: Sums, after: Sums | None, alone: Sequence[
     if table is None:
         return None
     table_after = table_of(after, phase, seed=phase) if after is not None else None
-    best = _best([_rms(a, phase) for a in alone], effects, table.rms, floor[0]) if table_after else None
+    best = _best_effect([_rms(a, phase) for a in alone], effects, table.rms, floor[0]) if table_after else None
     return PhaseTables(KINDS[phase], table, table_after, *floor, best)
 
 
