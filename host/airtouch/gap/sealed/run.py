@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
-from airtouch.gap.sealed import blind, blind_score
-from airtouch.gap.sealed.blind import Say
-from airtouch.gap.sealed.blind_key import SEALED, answers_sha256, open_key
+from airtouch.gap.sealed import make, score
+from airtouch.gap.sealed.key import SEALED, answers_sha256, open_key
+from airtouch.gap.sealed.make import Say
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.logs.files import read, write_bytes
@@ -51,7 +51,7 @@ class Answer(NamedTuple):
 
 def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
         mapper: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
-    """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
+    """Make the set in `out` (unless it is there), diagnose it, score it: `score.figures`.
 
     unknown: how many single flights are diagnosed once more without their effect, all by default. mapper: what
     stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about 4 s of
@@ -59,7 +59,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     """
     out = Path(out)
     if not (out / SEALED).exists():
-        blind.make(out, flights, seed, progress=progress)
+        make.make(out, flights, seed, progress=progress)
     answers = out / "answers"
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
@@ -70,7 +70,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     single = [(n, drawn[n].effects[0].name) for n in names if len(drawn[n].effects) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, mapper)
-    return blind_score.score(out, answers)
+    return score.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
@@ -117,7 +117,7 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
 
 def study_in(folder: Path) -> Study:
     """The study that a sealed set's own vehicle and nominal flights give."""
-    return blind.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+    return make.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
 
 
 def _begin(study: Study | None) -> None:

@@ -30,7 +30,7 @@ class DrawnEffect:
 class DrawnFlight:
     """What acts in a flight.
 
-    nats: `blind_severity.log_ratio`, by a test that knows effect and values; None where not one effect acts.
+    nats: `severity.log_ratio`, by a test that knows effect and values; None where not one effect acts.
     """
 
     effects: tuple[DrawnEffect, ...]

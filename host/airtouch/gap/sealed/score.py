@@ -11,9 +11,9 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
-from airtouch.gap.sealed.blind_key import DrawnEffect, Key, answers_sha256, open_key
-from airtouch.gap.sealed.blind_severity import SEEN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
+from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
+from airtouch.gap.sealed.severity import SEEN
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import terms
 

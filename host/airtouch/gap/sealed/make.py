@@ -1,7 +1,7 @@
 """Sealed sets: flights whose effect is withheld, so that nobody, this package included, can look.
 
 A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose effect is drawn, and
-`sealed.json` with the SHA-256 of the key (`blind_key`). The key lies apart, in `FOLDER.key.json` beside the folder.
+`sealed.json` with the SHA-256 of the key (`key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
 import secrets
@@ -17,8 +17,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.blind_key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
-from airtouch.gap.sealed.blind_severity import Conditions, log_ratio, three_severities, weakest
+from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
+from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
@@ -98,7 +98,7 @@ def _clear(out: Path, key: Path, force: bool) -> None:
 
 
 def _log_ratio_of_one(study: Study, log: FlightLog, effects: Sequence[DrawnEffect]) -> float | None:
-    """`blind_severity.log_ratio` of a flight with one effect alone, nats; None with another number of effects."""
+    """`severity.log_ratio` of a flight with one effect alone, nats; None with another number of effects."""
     if len(effects) != 1:
         return None
     active = Active(get(effects[0].name), effects[0].values)
