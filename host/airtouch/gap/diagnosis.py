@@ -91,7 +91,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         notes.append(note)
     comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, comparison.judged)
-    selection, gap = selected(data, without, say)
+    selection, gap = selection_and_gap(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
@@ -106,7 +106,7 @@ def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterab
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    return replace(_answer(data, *selected(data, tuple(without))), flights=tuple(f.name for f in flights))
+    return replace(_answer(data, *selection_and_gap(data, tuple(without))), flights=tuple(f.name for f in flights))
 
 
 def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
@@ -193,8 +193,8 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
     return data
 
 
-def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
-             ) -> tuple[Selection, Gap]:
+def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
+                      ) -> tuple[Selection, Gap]:
     """What is chosen among the candidates, and the gap that it closes.
 
     In recorded flights some effects must close a part of the gap to be named, those of the loop also beside others: see

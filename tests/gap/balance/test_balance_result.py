@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.balance import balance_result
+from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
 from airtouch.gap.result import Quantity, Shrink
 
@@ -13,7 +14,8 @@ from airtouch.gap.result import Quantity, Shrink
 def test_the_hypotheses_of_a_name_count_together():
     """Odds of 1, 1 and 2: two rotors of one name are as probable as the weight."""
     named = [SimpleNamespace(name=n) for n in ("weak_motor", "weak_motor", "mass")]
-    assert probabilities(np.log([1.0, 1.0, 2.0]) + 900.0, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
+    evidence = Evidence(np.log([1.0, 1.0, 2.0]) + 900.0, [])
+    assert probabilities(evidence, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
 
 
 @pytest.mark.parametrize(("total", "answer"), [

@@ -62,22 +62,22 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     gap = base.difference(pattern)[BALANCE]
 
     candidates = _candidates(vehicle, without)
-    logs, weights = evidence(pattern, base, candidates)
-    total = probabilities(logs, candidates)
-    first, probability = answer_of(total)
+    judged = evidence(pattern, base, candidates)
+    probability_of = probabilities(judged, candidates)
+    first, probability = answer_of(probability_of)
     verdict = first if first in ("none", "unknown") else "effect"
-    fits = {name: likeliest_of(name, candidates, logs, weights) for name in total}
+    fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
     shrink = {name: _shrink(gap, base, fit) for name, fit in fits.items()}
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first], len(flights))
-    indistinguishable = alike([e.name for e in effects], total, first, probability)
+    indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, probability_of, shrink)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
-        control=_control(total, first, shrink) if verdict == "effect" else None,
+        control=_control(probability_of, first, shrink) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
@@ -119,15 +119,15 @@ def _gap(verdict: str, shrink: Shrink) -> dict[str, float]:
     return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
 
 
-def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> Control | None:
+def _control(probability_of: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> Control | None:
     """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
-    wrong = next((n for n in WRONG if n in total and n != first and total[n] < WRONG_BELOW), None)
+    wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, shrink[wrong])
 
 
-def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
+def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
-    chance = dict(total)
+    chance = dict(probability_of)
     weight = OFF_CENTRE if first == WEIGHT else WEIGHT
     if first in (WEIGHT, OFF_CENTRE) and weight in chance:
         chance[first], chance[weight] = chance[first] + chance[weight], 0.0
