@@ -34,7 +34,7 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
     headline = measurement.where[0] if measurement.where else None
     page = _page(
         title="Gap between flights and simulator", headline=headline,
-        answers=(words.measured(headline), words.overall(measurement.gap)),
+        answers=(words.measured_in_words(headline), words.overall_in_words(measurement.gap)),
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
         calibration=gap_tables.named(measurement.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),

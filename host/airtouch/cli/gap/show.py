@@ -54,7 +54,7 @@ def measurement(screen: Console, found: Measurement) -> None:
         screen.print(cells(found.where, "Largest cells of the gap", screen.width))
     else:
         screen.print("No cell of the gap stands out of its floor.")
-    screen.print(words.overall(found.gap))
+    screen.print(words.overall_in_words(found.gap))
     remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors])
     remarks(screen, "What these logs cannot say", found.cannot)
     remarks(screen, "Notes", found.notes)

@@ -169,12 +169,12 @@ def joined(names: list[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
-def measured(where: Cell | None) -> str:
+def measured_in_words(where: Cell | None) -> str:
     """The answer of a measurement: where most of the gap lies."""
     return f"Most of the gap lies {in_words(where)}." if where else "No gap stands out of the floor."
 
 
-def overall(gap: Mapping[str, float]) -> str:
+def overall_in_words(gap: Mapping[str, float]) -> str:
     """The gap of a measurement in a sentence."""
     return f"Overall it is {gap['before']:.2g} times the floor" + (
         f", {gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."

@@ -29,7 +29,7 @@ def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least: Mappin
     data, always = trial.data, [j.gain for n, j in singles.items() if j.evidence >= least[n]]
     steady = max([height_gain(data, trial.parts), *always])
     passing = [g for g in gated_effects(data, without).values()
-               if g.gain >= steady + LEAST_GAIN and news(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+               if g.gain >= steady + LEAST_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
@@ -40,18 +40,18 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
+    evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
-                     strength=effect.strength, evidence=news(trial.data, effect.key, effect.gain, effect.strength),
-                     key=effect.key)
+                     strength=effect.strength, evidence=evidence, key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:
     """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
-               and news(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
+               and passing_evidence(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
 
 
-def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
+def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     """Evidence, nats, for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights have as much.
 
     key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.

@@ -30,7 +30,7 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
-def related(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
+def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 

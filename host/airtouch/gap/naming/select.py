@@ -17,7 +17,7 @@ from airtouch.gap.naming.contradiction import contradicted
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
-from airtouch.gap.naming.related import inference_of, related
+from airtouch.gap.naming.related import inference_of, selection_by_relations
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
 from airtouch.gap.naming.thresholds import assumes
@@ -64,7 +64,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     It may name a wake of some seconds, what else comes and goes if the relations find it likeliest as well, and what
     has more shapes than its class.
     """
-    answer = related(search.trial, search.candidates, search.alone, inference, search.progress)
+    answer = selection_by_relations(search.trial, search.candidates, search.alone, inference, search.progress)
     if answer.explained:
         return answer
     passing = passing_effect(search.trial, search.alone, search.least, without)

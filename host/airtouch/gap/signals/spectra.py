@@ -70,7 +70,7 @@ def squared(values: np.ndarray) -> np.ndarray:
     return values.real ** 2 + values.imag ** 2
 
 
-def judged(regime: str) -> np.ndarray:
+def judged_bins(regime: str) -> np.ndarray:
     """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
 
     In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.

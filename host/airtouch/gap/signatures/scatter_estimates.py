@@ -8,7 +8,7 @@ from scipy.special import poch
 
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.posterior import LEAST, moments, standard_deviation, updated
+from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, standard_deviation, updated
 from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, table
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
@@ -72,9 +72,9 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
                              else [pooled])
     # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
-    passing = {n: moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
     roots = np.sqrt([f.rate for f in alike])
-    rate = moments(np.minimum(roots, np.quantile(roots, WINSOR)))
+    rate = mean_and_deviation(np.minimum(roots, np.quantile(roots, WINSOR)))
     return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
 
 

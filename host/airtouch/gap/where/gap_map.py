@@ -21,7 +21,7 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.where.band_sums import Sums, join, sums
+from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
@@ -73,7 +73,7 @@ def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     gap = study.residual(flight)
     after = _sums_with(study, flight, terms) if terms else None
-    return Part(flight.name, sums(flight, gap, study.vehicle), after, flight.rates is not None,
+    return Part(flight.name, block_sums(flight, gap, study.vehicle), after, flight.rates is not None,
                 tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
@@ -101,7 +101,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    gap = sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
+    gap = block_sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
     random = random_of(terms)
     if not random or not len(gap.phase):
         return gap
