@@ -145,7 +145,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
-        pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
+        pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
     return replace(answer, next=next_steps(answer, usable))
 
 

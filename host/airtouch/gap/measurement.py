@@ -150,5 +150,5 @@ def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog],
     flights = list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
+    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where)
     return replace(curves, commands=measurement.spectra)

@@ -7,11 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from airtouch.gap.answer.pictures import Signal, Spectrum
-from airtouch.gap.loop.command_spectra import frequencies
-from airtouch.gap.loop.controller import AXES
+from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
-from airtouch.gap.where.command_power import MeanSpectra
 from airtouch.logs.segments import KINDS
 from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
 
@@ -71,13 +68,13 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
 
 def commands(curves: MeanSpectra) -> bytes:
     """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis."""
-    f = frequencies()
+    f = curves.frequency_hz
     with style(PHONE):
-        figure, axes = _panes(len(AXES), 1.2, legend_in=0.25)
-        for i, (ax, name) in enumerate(zip(axes, AXES, strict=True)):
-            if curves.nominal is not None:
-                ax.loglog(f, curves.nominal[:, i], color=FLOOR, lw=1.6, label="baseline flights")
-            ax.loglog(f, curves.flown[:, i], color=BLUE, lw=1.2, label="these flights")
+        figure, axes = _panes(len(curves.flown), 1.2, legend_in=0.25)
+        for ax, (name, flown) in zip(axes, curves.flown.items(), strict=True):
+            if name in curves.nominal:
+                ax.loglog(f, curves.nominal[name], color=FLOOR, lw=1.6, label="baseline flights")
+            ax.loglog(f, flown, color=BLUE, lw=1.2, label="these flights")
             ax.set_title(f"{name} command", loc="left")
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)

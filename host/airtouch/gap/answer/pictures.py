@@ -76,16 +76,20 @@ class Pictures:
 
 
 def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-                headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
-    """The curves of a diagnosis: headline is the cell that its answer speaks of."""
+                cells: Sequence[Cell]) -> Pictures:
+    """The curves of a diagnosis.
+
+    cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
+    without any, the commands are all.
+    """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
-    if headline is None or not flights:
+    if not cells or not flights:
         return Pictures(commands=commands)
     active = [t.active() for t in mean_of(effects)]
     gaps = [FlightGap(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
-    channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
-    return Pictures(_signal(_of_median_flight(gaps, headline), headline), frequencies(AIR),
+    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
+    return Pictures(_signal(_of_median_flight(gaps, cells[0]), cells[0]), frequencies(AIR),
                     _spectra(study, gaps, effects, channels), commands)
 
 

@@ -93,6 +93,7 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
 def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
     """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
     def make() -> list[list[dict[str, np.ndarray]]]:
+        """The spectra, by flight and axis."""
         out = []
         for flight, first in zip(data.flights, data.first, strict=True):
             signals = basis(flight, data.study.vehicle)
@@ -108,6 +109,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
     Each band's alone, weighted as what is left of the torque is; made once.
     """
     def make() -> list[np.ndarray]:
+        """The spectra, by flight."""
         f, response = frequencies(AIR), data.study.response
         bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
         bands[:FIRST_BIN] = False

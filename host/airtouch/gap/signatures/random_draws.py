@@ -118,6 +118,7 @@ def _any_direction(effect: Effect) -> Callable[[float, np.random.Generator], Val
     free = [p for p in effect.parameters if p.name in free_of(effect)]
 
     def make(s: float, rng: np.random.Generator) -> Values:
+        """Values at a strength; of a parameter that lies on one side of neutral alone, on that side."""
         direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
         direction /= np.linalg.norm(direction)
         out = {}

@@ -127,6 +127,7 @@ class Term:
         return out
 
     def _parameter(self, name: str) -> Parameter:
+        """The parameter of a name."""
         return parameter_of(self.effect, name)
 
 

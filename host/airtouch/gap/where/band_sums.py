@@ -36,6 +36,7 @@ class Sums:
         row = row.ravel()
 
         def total(values: np.ndarray) -> np.ndarray:
+            """Sums (phases of flights, ...) of values (b, ...)."""
             out = np.zeros((len(keys), *values.shape[1:]))
             np.add.at(out, row, values)
             return out

@@ -1,6 +1,6 @@
 """Mean power spectra of the commands, as flown and as nominal flights have them: what a report shows of the loop."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,28 +27,26 @@ def command_power(flight: Flight, vehicle: Vehicle) -> CommandPower:
 
 @dataclass(frozen=True)
 class MeanSpectra:
-    """Mean power spectra of the commands (bins, AXES), N^2/Hz, of some flights and of nominal ones, None without these.
+    """Mean power spectra (bins,) of the command of each axis, N^2/Hz, of some flights and of nominal ones, if any."""
 
-    The bins are at `command_spectra.frequencies`.
-    """
-
-    flown: np.ndarray
-    nominal: np.ndarray | None
+    frequency_hz: np.ndarray
+    flown: Mapping[str, np.ndarray]
+    nominal: Mapping[str, np.ndarray]
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, by axis."""
-        content: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
-        for i, axis in enumerate(AXES):
-            content[axis] = {"flown": self.flown[:, i].tolist()}
-            if self.nominal is not None:
-                content[axis]["nominal"] = self.nominal[:, i].tolist()
-        return content
+        of_nominal = {axis: {"nominal": power.tolist()} for axis, power in self.nominal.items()}
+        return {"unit": "N^2/Hz", "frequency_hz": self.frequency_hz.tolist(),
+                **{axis: {"flown": power.tolist(), **of_nominal.get(axis, {})} for axis, power in self.flown.items()}}
 
 
 def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower]) -> MeanSpectra | None:
     """Mean spectra of some flights and of nominal ones; None without a steady stretch in flight."""
-    blocks, nominal_blocks = (sum(p.blocks for p in powers) for powers in (flown, nominal))
-    if not blocks:
-        return None
-    of_nominal = np.sum([p.total for p in nominal], axis=0) / nominal_blocks if nominal_blocks else None
-    return MeanSpectra(np.sum([p.total for p in flown], axis=0) / blocks, of_nominal)
+    of_flown, of_nominal = _mean_by_axis(flown), _mean_by_axis(nominal)
+    return MeanSpectra(frequencies(), of_flown, of_nominal) if of_flown else None
+
+
+def _mean_by_axis(powers: Sequence[CommandPower]) -> dict[str, np.ndarray]:
+    """Mean power (bins,) over all blocks, by axis; empty without a block."""
+    blocks = sum(p.blocks for p in powers)
+    return dict(zip(AXES, (np.sum([p.total for p in powers], axis=0) / blocks).T, strict=True)) if blocks else {}

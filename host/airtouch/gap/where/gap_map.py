@@ -43,6 +43,19 @@ class Part:
 
 
 @dataclass(frozen=True)
+class MapSums:
+    """The block sums of all flights: without effects, with those named in the model, with each of these by itself.
+
+    effects: their names; alone: in the order of these.
+    """
+
+    before: Sums
+    after: Sums | None
+    alone: Sequence[Sums]
+    effects: Sequence[str]
+
+
+@dataclass(frozen=True)
 class PhaseTables:
     """The tables of one phase, of which its cells are made.
 
@@ -87,9 +100,9 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
              else [after] if after is not None else [])
     no_gyro = not any(p.has_gyro for p in parts)
-    cells: list[Cell] = []
+    map_sums, cells = MapSums(joined, after, alone, effects), []
     for phase in range(len(KINDS)):
-        tables = _phase_tables(phase, joined, after, alone, phase_floor(floors, phase), effects)
+        tables = _phase_tables(phase, map_sums, phase_floor(floors, phase))
         if tables is not None:
             cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
@@ -140,14 +153,14 @@ def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.nd
     return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _phase_tables(phase: int, before: Sums, after: Sums | None, alone: Sequence[Sums],
-                  floor: tuple[np.ndarray, np.ndarray], effects: Sequence[str]) -> PhaseTables | None:
-    """The tables of a phase, None where no flight has it. alone: with each of the effects by itself in the model."""
-    table = table_of(before, phase, seed=phase)
+def _phase_tables(phase: int, of_map: MapSums, floor: tuple[np.ndarray, np.ndarray]) -> PhaseTables | None:
+    """The tables of a phase, None where no flight has it. floor: and its upper end, (regimes, bands, COUNT) each."""
+    table = table_of(of_map.before, phase, seed=phase)
     if table is None:
         return None
-    table_after = table_of(after, phase, seed=phase) if after is not None else None
-    best = _best_effect([_rms(a, phase) for a in alone], effects, table.rms, floor[0]) if table_after else None
+    table_after = table_of(of_map.after, phase, seed=phase) if of_map.after is not None else None
+    best = _best_effect([_rms(a, phase) for a in of_map.alone], of_map.effects, table.rms, floor[0]) \
+        if table_after else None
     return PhaseTables(KINDS[phase], table, table_after, *floor, best)
 
 
