@@ -14,6 +14,8 @@ from airtouch.logs.segments import KINDS
 from airtouch.simulation import batch, replay, scenario
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
+#: effects of the loop, which take half of a diagnosis' time: left out where they are no rivals
+LOOP = ("actuator_delay", "controller_gain", "inertia", "motor_lag", "sensor_latency")
 HOVER, TAKE_OFF = KINDS.index("hover"), KINDS.index("take-off")
 
 

@@ -11,6 +11,7 @@ from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.relations import own_effect
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
+from gap_flights import LOOP
 from hovers import STIFF
 
 PAGE = Path(__file__).parents[2] / "host/docs/effects.md"
@@ -44,7 +45,7 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     vehicle = load("crazyflie-2.1-flow")
     nominal, real = fly(4, 1), fly(1, 2, [(NAME, {"force": FORCE_N})])
     assert len(Path(PAGE).read_text().split("```python")[1].split("```")[0].splitlines()) < 60
-    diagnosis = diagnose(real, vehicle, nominal)
+    diagnosis = diagnose(real, vehicle, nominal, without=LOOP)
     assert diagnosis.verdict == "effect" and diagnosis.effects[0].name == NAME
     force = diagnosis.effects[0].parameters["force"]
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
@@ -53,7 +54,7 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     (switch_on,) = [step.command for step in diagnosis.next if NAME in step.text]
     assert f"{NAME}.py --effect {NAME}:force=" in switch_on  # without its file the command would be refused
     same_study, _ = diagnosis.calibrated
-    left_out = diagnose_with_study(same_study, list(ready_flights(real, vehicle, [])), (NAME,))
+    left_out = diagnose_with_study(same_study, list(ready_flights(real, vehicle, [])), (*LOOP, NAME))
     assert NAME not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > diagnosis.gap["after"]
     unknown, nearest, *_ = left_out.ranking
@@ -68,7 +69,7 @@ def test_a_users_effect_that_only_the_commands_show_is_fitted(tmp_path):
     try:
         vehicle = load("crazyflie-2.1-flow")
         stiff = fly(1, 4, [("stiff_climb", {"factor": 2.5})])
-        diagnosis = diagnose(stiff, vehicle, fly(4, 3), without=["controller_gain"])
+        diagnosis = diagnose(stiff, vehicle, fly(4, 3), without=LOOP)
     finally:
         effects.unregister("stiff_climb")
     assert diagnosis.ranking[0].name == "stiff_climb"

@@ -13,7 +13,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
 from airtouch.gap.loop import command_spectra, controller, identify, loop_model, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
-from airtouch.gap.loop.command_response import accelerations_per_command
+from airtouch.gap.loop.command_response import acceleration_per_command
 from airtouch.gap.loop.set_point_steps import NO_STEP
 from airtouch.gap.naming import judging
 from airtouch.gap.nominal.build_study import declared_study
@@ -180,7 +180,7 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
         part = axis_plant(row, axis)
         spectra = [noise_spectra.noise_power(c, part, f), loop_model.excess_phase(c, part)]
         if axis != "thrust":
-            spectra += [*accelerations_per_command(c, part, strengths, f, 0.0, [NO_STEP]),
+            spectra += [*acceleration_per_command(c, part, strengths, f, 0.0, [NO_STEP]).expected,
                         loop_model.torque_per_command(c, part, f)]
         return (c, part), np.concatenate([np.ravel(x) for x in spectra])
 

@@ -16,7 +16,7 @@ from airtouch.gap.signatures import candidates
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench
-from gap_flights import VEHICLE, fly
+from gap_flights import LOOP, VEHICLE, fly
 
 PUSH = 0.01  #: N s/m
 
@@ -53,7 +53,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
                       for p in halves(data)]
     np.testing.assert_allclose(push_per_speed, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, flights) > 30.0
-    with_it, nameless = (diagnose_with_study(study, flights, without, data) for without in ((), ("sideways",)))
+    with_it, nameless = (diagnose_with_study(study, flights, without, data) for without in (LOOP, (*LOOP, "sideways")))
     chance, without_name = ({r.name: r.probability for r in d.ranking}["unknown"] for d in (with_it, nameless))
     assert nameless.verdict == "unknown" and without_name > 0.85
     assert with_it.verdict == "effect" and with_it.effects[0].name == "sideways" and chance < 0.1

@@ -22,7 +22,7 @@ from airtouch.gap.signatures.signature import GATED
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
-from gap_flights import VEHICLE, fly
+from gap_flights import LOOP, VEHICLE, fly
 
 FROM_S, TO_S = 9.0, 15.0
 
@@ -58,7 +58,7 @@ def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight)
 
 
 def test_the_diagnosis_says_when(study, nominal_flight):
-    diagnosis = diagnose_with_study(study, [pushed(nominal_flight, 0.03)])
+    diagnosis = diagnose_with_study(study, [pushed(nominal_flight, 0.03)], LOOP)
     assert diagnosis.verdict == "effect"
     assert diagnosis.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
     stretches = [s for e in diagnosis.effects for s in e.seconds]
@@ -81,9 +81,9 @@ def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and
 
 def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
     wake = {"strength": 0.03, "width": 0.0, "turbulence": 1.0, "turbulence_time": 0.02, "swirl": 0.01}
-    assert diagnose_with_study(study, fly(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
+    assert diagnose_with_study(study, fly(1, 906, (("downwash", wake),)), LOOP).effects[0].name == "downwash"
     noise = {"rms": 0.02, "time": 0.02, "fast": 0.0, "fast_time": 0.01}
-    effect = diagnose_with_study(study, fly(1, 904, (("motor_noise", noise),))).effects[0]
+    effect = diagnose_with_study(study, fly(1, 904, (("motor_noise", noise),)), LOOP).effects[0]
     assert effect.name == "motor_noise"
     assert effect.parameters["rms"].value == pytest.approx(0.02, rel=0.1)
 
@@ -91,7 +91,7 @@ def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
 def test_what_adds_most_to_the_others_is_told_first(study, nominal_flight):
     both = pushed(nominal_flight, 0.06)
     both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
-    selection = select(Data(study, [both]), candidates.all_candidates())
+    selection = select(Data(study, [both]), candidates.all_candidates(LOOP))
     shares = {s.name: s.share for s in selection.named}
     assert set(shares) == {"downwash", "imu_bias"}
     assert [s.name for s in selection.named] == sorted(shares, key=lambda n: -shares[n])

@@ -6,7 +6,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop import controller, loop_model
 from airtouch.gap.loop.axis_plant import axis_plant
-from airtouch.gap.loop.command_response import accelerations_per_command
+from airtouch.gap.loop.command_response import acceleration_per_command
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.loop.set_point_steps import NO_STEP
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
@@ -101,7 +101,7 @@ def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     s = 2j * np.pi * f
     roll = axis_plant(row, "roll")
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    (expected,) = accelerations_per_command(c, roll, strengths, f, 0.0, [NO_STEP])
+    (expected,) = acceleration_per_command(c, roll, strengths, f, 0.0, [NO_STEP]).expected
     np.testing.assert_allclose(expected, -s / loop_model.loop_parts(c, roll, f).controller, rtol=1e-9)
 
 
@@ -141,8 +141,8 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     predicted = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        predicted += accelerations_per_command(
-            controller.firmware(row, "roll"), axis_plant(row, "roll"), noise_alone, f, 0.0, [NO_STEP])
+        predicted += acceleration_per_command(
+            controller.firmware(row, "roll"), axis_plant(row, "roll"), noise_alone, f, 0.0, [NO_STEP]).expected
     band = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
     ratio = (simulated / (predicted[1] / predicted[0]))[band].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)

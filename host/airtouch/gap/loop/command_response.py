@@ -46,9 +46,21 @@ class Spectra(NamedTuple):
         return Spectra(*(gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in self)) if width > 0.0 else self
 
 
-def accelerations_per_command(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray, width: float,
-                              steps: Sequence[Step]) -> list[np.ndarray]:
-    """Angular acceleration (bins,) expected per logged command, rad/s^2 per N, for each of several steps.
+class PerCommand(NamedTuple):
+    """What a logged command tells of the angular acceleration.
+
+    expected: rad/s^2 per N, complex (bins,), for each of several steps; incoherent (bins,): power that is incoherent
+    with the command without a step, rad^2/s^4/Hz: the noise of the gyro, and what the loop does of noise between two
+    rows of the log.
+    """
+
+    expected: list[np.ndarray]
+    incoherent: np.ndarray
+
+
+def acceleration_per_command(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray, width: float,
+                             steps: Sequence[Step]) -> PerCommand:
+    """Angular acceleration that a logged command tells at frequencies f (bins,), Hz, in blocks with these steps.
 
     strengths (sources,): of the noise; width: as for `Spectra.smoothed`.
     """
@@ -61,19 +73,9 @@ def accelerations_per_command(c: Controller, plant: AxisPlant, strengths: np.nda
         by_step[s] = noise.with_steps(s.power, *stepped)
     together = Spectra(*(np.array(x) for x in zip(*by_step.values(), strict=True))).smoothed(width)
     ratios = dict(zip(by_step, together.cross / together.command, strict=True))
-    return [ratios[s if s.power else NO_STEP] for s in steps]
-
-
-def incoherent_acceleration(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray,
-                             width: float) -> np.ndarray:
-    """Power (bins,) of the angular acceleration that is incoherent with the logged command, rad^2/s^4/Hz.
-
-    For noise of given strengths (sources,); width: as for `Spectra.smoothed`. It is the noise of the gyro, and what
-    the loop does of noise between two rows of the log.
-    """
-    parts = loop_parts(c, plant, np.maximum(f, LOWEST_HZ))
-    spectra = source_spectra(c, plant, f, parts).of_strengths(strengths).smoothed(width)
-    return spectra.acceleration - np.abs(spectra.cross) ** 2 / spectra.command
+    level = Spectra(*(x[0] for x in together))
+    return PerCommand([ratios[s if s.power else NO_STEP] for s in steps],
+                      level.acceleration - np.abs(level.cross) ** 2 / level.command)
 
 
 def source_spectra(c: Controller, plant: AxisPlant, f: np.ndarray, parts: LoopParts) -> Spectra:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.loop.axis_plant import AxisPlant
-from airtouch.gap.loop.command_response import accelerations_per_command, incoherent_acceleration
+from airtouch.gap.loop.command_response import acceleration_per_command
 from airtouch.gap.loop.disturbed import logged_over_flown
 from airtouch.gap.loop.loop_model import AxisLoop, torque_per_command
 from airtouch.gap.loop.set_point_steps import NO_STEP, Step, step_under
@@ -67,11 +67,10 @@ def axis_torque(loop: AxisLoop, nominal: AxisPlant, strengths: np.ndarray, nomin
     """
     motors = torque_per_command(loop.firmware, loop.plant, f)
     step = step_under(nominal_step, loop.controller, nominal, loop.plant)
-    level, stepped, stepped_as_nominal = accelerations_per_command(
-        loop.controller, loop.plant, strengths, f, SMOOTH, (NO_STEP, step, nominal_step))
-    incoherent = (incoherent_acceleration(loop.controller, loop.plant, strengths, f, SMOOTH) if loop.by_firmware
-                   else np.ones(len(f)))
-    return AxisTorque(motors, np.stack([level, stepped, stepped_as_nominal]) / motors, incoherent)
+    per_command = acceleration_per_command(loop.controller, loop.plant, strengths, f, SMOOTH,
+                                           (NO_STEP, step, nominal_step))
+    return AxisTorque(motors, np.stack(per_command.expected) / motors,
+                      per_command.incoherent if loop.by_firmware else np.ones(len(f)))
 
 
 def change_of(loop: AxisLoop, before: Sequence[AxisTorque], after: Sequence[AxisTorque], f: np.ndarray) -> Change:

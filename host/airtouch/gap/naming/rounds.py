@@ -38,6 +38,8 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
     waiting = [*looks.unseen, *random, *means_to_fit]
+    if thorough:
+        waiting = [v for v in waiting if not _is_tried_alone(v)]
     fitted = map_on_two_cores(lambda v: cross_validated(on, v.name, v.terms, chosen, v.choice_cost), waiting)
     best = best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
@@ -83,14 +85,21 @@ def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidat
     return best
 
 
+def _is_tried_alone(variant: PricedVariant) -> bool:
+    """Whether a variant frees several parameters each of which another variant frees alone."""
+    own = variant.terms[0]
+    return own.signature.alone_too and len(own.free) > 1
+
+
 def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
     """A candidate whose parameters (k,) were all tried alone, with the strength that each has there."""
     alone = {int(np.argmin(j.variance)): j for j in variants if np.isfinite(j.variance).sum() == 1}
-    together = next((j for j in variants if np.isfinite(j.variance).all()), best)
     if len(alone) < max(len(best.strength), 2):
         return best
-    return replace(together, strength=np.array([alone[i].strength[i] for i in range(len(alone))]),
-                   covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]), apart=0.0)
+    *others, own = best.terms
+    return replace(best, terms=(*others, replace(own, free=own.signature.free)), apart=0.0,
+                   strength=np.array([alone[i].strength[i] for i in range(len(alone))]),
+                   covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]))
 
 
 def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], before: float) -> dict[str, Candidate]:
