@@ -49,7 +49,7 @@ def main(folder: Path) -> None:
         top_3 += any(interchangeable(r, true) for r in ranked)
         effects = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
                                                      if q.low is not None) for e in answer.effects)
-        control = answer.control.get("shrink", {}).get("value")
+        control = None if answer.control is None else answer.control.shrink.share.value
         if answer.shrink is not None and interchangeable(ranked[0], true):
             shrinks.append(answer.shrink.value)
             controls += [control] if control is not None else []

@@ -19,8 +19,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.diagnosis import diagnose
-from airtouch.gap.sealed.blind import VEHICLE, stripped
 from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.sealed.make import VEHICLE, stripped
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, effects

@@ -37,7 +37,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import apparent, passing_sizes
-from airtouch.gap.sealed import blind
+from airtouch.gap.sealed import make as sealed
 from airtouch.gap.signatures import scatter_estimates
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, table
 from airtouch.gap.signatures.scatter_estimates import class_scatter
@@ -88,15 +88,15 @@ def groups(folder: Path) -> Iterator[Group]:
                 by_group[r["cf"], r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
     for (drone, group, of), files in by_group.items():
         yield Group(f"motion capture, uSD log, {of}", drone, group, vehicles.load(swarm / f"{of}.toml"), files)
-    vehicle = vehicles.load(blind.VEHICLE)
+    vehicle = vehicles.load(sealed.VEHICLE)
     for seed in range(SIMULATED):
-        logs = blind.nominal(vehicle, blind.CAL_FIRST, blind.CAL, seed)
+        logs = sealed.nominal(vehicle, sealed.CAL_FIRST, sealed.CAL, seed)
         simulated_logs: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log))
                                      for i, log in enumerate(logs)]
         yield Group(scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs)
     for scene in OWN_TRIM:
         every = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
-        logs = [blind.stripped(log) for log in every if isinstance(log, FlightLog)]
+        logs = [sealed.stripped(log) for log in every if isinstance(log, FlightLog)]
         named_logs: list[Log] = [(f"{scene} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
         yield Group(scatter_estimates.OWN_TRIM, scene, scene, vehicle, named_logs)
 

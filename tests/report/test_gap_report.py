@@ -15,7 +15,7 @@ from airtouch.gap.answer import advice, words
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Rejected
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -111,12 +111,10 @@ def test_pages_of_other_verdicts(pushed_flights, tmp_path, verdict, words_there)
 
 
 def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects(tmp_path):
-    entry = {"channel": "force_y", "band_hz": [0.0, 0.5], "phase": "hover", "flight": "a/log.csv", "from_s": 34.0,
-             "to_s": 42.0,
-             "over_floor": 6.1, "follows": ["height"],
-             "nearest": [{"name": "wind", "fails": "gains 3 nats, 12 are needed"}]}
-    result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(entry,))
-    steps = advice.steps("unknown", [], [], result.headline, [], True, VEHICLE.name)
+    open_cell = OpenCell("force_y", (0.0, 0.5), "hover", "a/log.csv", from_s=34.0, to_s=42.0, over_floor=6.1,
+                         follows=("height",), nearest=(Rejected("wind", "gains 3 nats, 12 are needed"),))
+    result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(open_cell,))
+    steps = advice.steps(replace(result, indistinguishable=()), [])
     path = tmp_path / "gap.html"
     gap_report.write_diagnosis(path, replace(result, next=steps), command="x")
     text, _ = checked(path)

@@ -7,7 +7,18 @@ from airtouch import vehicle
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, NamedEffect, NextStep, Quantity, RankedCandidate
+from airtouch.gap.result import (
+    BASELINE,
+    Cell,
+    Control,
+    Diagnosis,
+    GapMap,
+    NamedEffect,
+    NextStep,
+    Quantity,
+    RankedCandidate,
+    Shrink,
+)
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -35,8 +46,8 @@ def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **mor
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),
         {"before": 4.0, "after": 1.3, "floor": 1.0}, Quantity(0.9, 0.8, 0.95) if effects else None,
-        {"name": "wind", "before": 4.0, "after": 3.9, "floor": 1.0, "shrink": Quantity(0.03, -0.05, 0.1)},
-        {"declared": {"before": 4.0, "after": 1.4, "floor": 1.0}}, ("a note",),
+        Control("wind", Shrink(4.0, 3.9, Quantity(0.03, -0.05, 0.1))),
+        {"declared": Shrink(4.0, 1.4, Quantity(0.87))}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
         map=whole, headline=headline or summary.headline(cells, bool(effects)),
         next=(NextStep("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)
@@ -48,5 +59,5 @@ def of_flights(logs, effects=(FOUND,), **more):
     terms = [term_of(e) for e in effects]
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)
-    pictures = pictures_of(study, flights, [], terms, result.headline, whole.cells)
+    pictures = pictures_of(study, flights, [], terms, [result.headline, *whole.cells] if result.headline else [])
     return replace(result, where=tuple(summary.cells_to_show(whole)), pictures=pictures)

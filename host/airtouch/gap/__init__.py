@@ -12,7 +12,7 @@ loop        the closed loop: what noise, set-points and torques make of the comm
 signals     what is compared, channel by channel, and with what: the study of a vehicle
 evidence    how likely flights are under effects, and the fit of effects to them
 passing     effects that come and go: when they act
-unnamed     what no effect explains: a model without names
+nameless    what no effect explains: the nameless model, "a model without names" in answers
 features    what a flight's signals do to one another, in numbers
 relations   these numbers compared with those of simulated flights of each effect
 naming      which effects are named

@@ -91,7 +91,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         notes.append(note)
     comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, comparison.judged)
-    selection, gap = selected(data, without, say)
+    selection, gap = selection_and_gap(data, without, say)
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
@@ -106,7 +106,7 @@ def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterab
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    return replace(_answer(data, *selected(data, tuple(without))), flights=tuple(f.name for f in flights))
+    return replace(_answer(data, *selection_and_gap(data, tuple(without))), flights=tuple(f.name for f in flights))
 
 
 def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
@@ -125,7 +125,7 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
         where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},
-        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else {})
+        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
 
 
 def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
@@ -134,22 +134,27 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     pictures: whether to keep the curves that a report shows.
     """
     study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
-    effects, is_effect = list(result.effects), result.verdict == "effect"
-    terms = [candidates.term_of(e) for e in effects]
+    is_effect, terms = result.verdict == "effect", [candidates.term_of(e) for e in result.effects]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
-    steps = next_steps(result.verdict, effects, result.indistinguishable, headline, usable, bool(nominal),
-                       comparison.vehicle.name)
-    return replace(
+    answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(comparison.vehicle, nominal, comparison.calibration, judged, selection, result) if is_effect else {},
+        arms=arms(_declared(comparison), judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
-        next=steps,
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
-        pictures=pictures_of(study, usable, nominal, terms, headline, cells) if pictures else None)
+        pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
+    return replace(answer, next=next_steps(answer, usable))
+
+
+def _declared(comparison: Comparison) -> Study | None:
+    """The study of the vehicle as its file declares it, where `Comparison.study` is a calibrated one; else None."""
+    calibration = comparison.calibration
+    if calibration is None:
+        return None
+    return calibration.declared or declared_study(comparison.vehicle, comparison.nominal)
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],
@@ -188,8 +193,8 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
     return data
 
 
-def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
-             ) -> tuple[Selection, Gap]:
+def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
+                      ) -> tuple[Selection, Gap]:
     """What is chosen among the candidates, and the gap that it closes.
 
     In recorded flights some effects must close a part of the gap to be named, those of the loop also beside others: see
@@ -207,6 +212,6 @@ def selected(data: Data, without: Sequence[str], say: Callable[[str], None] = la
             gap = gap_of_rest
     if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
             data, selection, gap.named.before, gap.named.share.value):
-        selection = recorded.without_names(selection)
+        selection = recorded.with_none_named(selection)
         gap = gap_of(data, selection.parts, None)
     return selection, gap

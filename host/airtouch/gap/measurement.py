@@ -19,9 +19,9 @@ from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.signals.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import in_words
-from airtouch.gap.where.command_power import CommandPower, command_power, mean_spectra
+from airtouch.gap.where.command_power import CommandPower, MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
-from airtouch.gap.where.rotor_speeds import rotor_speeds, speeds_over_flights
+from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -31,8 +31,8 @@ class Measurement:
     """The gap map with its largest cells, and what these logs cannot say.
 
     gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
-    calibrated on them; calibration: those parameters; spectra: of the commands, as flown and as nominal flights have
-    them (`command_power`), N^2/Hz; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
+    calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
+    flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
     flights were not used.
     """
 
@@ -43,8 +43,8 @@ class Measurement:
     flights: tuple[str, ...]
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)
-    spectra: Mapping[str, Any] = field(default_factory=dict)
-    rotors: tuple[Mapping[str, float], ...] = ()
+    spectra: MeanSpectra | None = field(default=None, compare=False)
+    rotors: tuple[RotorSpeed, ...] = ()
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -57,7 +57,8 @@ class Measurement:
             "gap": dict(self.gap), "floor_from": self.map.floor_from,
             "calibration": {k: q.plain() for k, q in self.calibration.items()},
             "cannot": list(self.cannot), "notes": list(self.notes), "left_out": list(self.left_out),
-            "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra),
+            "rotors": [r._asdict() for r in self.rotors],
+            "spectra": self.spectra.plain() if self.spectra is not None else {},
             "map": [plain_cell(c) for c in self.map.cells],
         })
 
@@ -149,5 +150,5 @@ def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog],
     flights = list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
+    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where)
     return replace(curves, commands=measurement.spectra)

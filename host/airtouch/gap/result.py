@@ -22,7 +22,33 @@ class Quantity:
     unit: str = "1"
 
     def plain(self) -> dict[str, Any]:
+        """JSON-ready, without the ends of an interval that there is not."""
         return {k: v for k, v in asdict(self).items() if v is not None}
+
+
+@dataclass(frozen=True)
+class Shrink:
+    """Gap before and after in units of the floor, and the share of it that went, with 90 % interval."""
+
+    before: float
+    after: float
+    share: Quantity
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {"before": self.before, "after": self.after, "shrink": self.share.plain()}
+
+
+@dataclass(frozen=True)
+class Control:
+    """The shrink by an effect that is deliberately a wrong one."""
+
+    name: str
+    shrink: Shrink
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {"name": self.name, **self.shrink.plain()}
 
 
 @dataclass(frozen=True)
@@ -39,8 +65,11 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """A candidate: its probability, the share of the gap that it takes away on held-out data, why it is not the
-    answer, and the log likelihood (nats) that held-out data gain by it alone."""
+    """A candidate of the ranking.
+
+    shrink: share of the gap that it takes away on held-out data; why: the reason why it is not the answer; nats: log
+    likelihood that held-out data gain by it alone.
+    """
 
     name: str
     probability: float
@@ -49,6 +78,7 @@ class RankedCandidate:
     nats: float | None = None
 
     def plain(self) -> dict[str, Any]:
+        """JSON-ready, without a reason or nats that there are not."""
         more = ({"why": self.why} if self.why else {}) | ({} if self.nats is None else {"nats": self.nats})
         return {"name": self.name, "probability": self.probability, "shrink": self.shrink.plain(), **more}
 
@@ -90,15 +120,46 @@ class GapMap:
 
 
 @dataclass(frozen=True)
+class Rejected:
+    """An effect that is not named though it gains much, and in words what it fails by."""
+
+    name: str
+    fails: str
+
+
+@dataclass(frozen=True)
+class OpenCell:
+    """A cell of the map that no effect named explains, and when.
+
+    from_s, to_s: stretch of a flight in which most of its gap is, over_floor: rms over the floor there at most;
+    follows: signals that its power ranks like; nearest: effects that gain most.
+    """
+
+    channel: str
+    band_hz: tuple[float, float]
+    phase: str
+    flight: str
+    from_s: float
+    to_s: float
+    over_floor: float
+    follows: tuple[str, ...] = ()
+    nearest: tuple[Rejected, ...] = ()
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
 class NextStep:
-    """What to do next: a sentence, the command that does it, the heading of a page that says how;
-    "" where there is none."""
+    """What to do next: a sentence, the command that does it, the heading of a page; "" where there is none."""
 
     text: str
     command: str = ""
     page: str = ""
 
     def plain(self) -> dict[str, str]:
+        """JSON-ready, without what is ""."""
         return {k: v for k, v in asdict(self).items() if v}
 
 
@@ -108,7 +169,7 @@ class Diagnosis:
 
     verdict: "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
     unit (dimensionless, floor 1 per bin), judged on held-out blocks; control: the same with
-    a deliberately wrong effect; arms: shrink with the vehicle as declared and as calibrated.
+    a deliberately wrong effect, None where none was wrong; arms: shrink with the vehicle as declared and as calibrated.
     Terminal, report and JSON show this and compute nothing of their own.
     """
 
@@ -119,12 +180,12 @@ class Diagnosis:
     where: tuple[Cell, ...]
     gap: Mapping[str, float]
     shrink: Quantity | None
-    control: Mapping[str, Any]
-    arms: Mapping[str, Any] = field(default_factory=dict)
+    control: Control | None
+    arms: Mapping[str, Shrink] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     flights: tuple[str, ...] = ()
-    unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
+    unexplained: tuple[OpenCell, ...] = ()  #: what no named effect explains, largest first
     map: GapMap | None = None  #: every cell, of which `where` has the largest
     headline: Cell | None = None  #: the cell that the answer speaks of
     next: tuple[NextStep, ...] = ()  #: what to do next
@@ -169,9 +230,10 @@ class Diagnosis:
             "indistinguishable": [list(g) for g in self.indistinguishable],
             "where": [plain_cell(c) for c in self.where],
             "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None,
-            "control": dict(self.control), "advice": self.advice, "arms": dict(self.arms),
+            "control": self.control.plain() if self.control else {}, "advice": self.advice,
+            "arms": {name: arm.plain() for name, arm in self.arms.items()},
             "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),
-            "unexplained": [dict(u) for u in self.unexplained], "next": [s.plain() for s in self.next],
+            "unexplained": [u.plain() for u in self.unexplained], "next": [s.plain() for s in self.next],
             "headline": plain_cell(self.headline) if self.headline else None, "vehicle": self.vehicle,
             "baseline": list(self.baseline), "calibration": {k: q.plain() for k, q in self.calibration.items()},
             "floor_from": self.map.floor_from if self.map else None,

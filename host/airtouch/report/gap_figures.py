@@ -1,14 +1,13 @@
 """Plots of the gap without and with the named effects in the model, each as the bytes of a PNG."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from airtouch.gap.answer.pictures import Signal, Spectrum
+from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
 from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
@@ -67,19 +66,15 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
         return png(figure, PHONE_DPI)
 
 
-def commands(curves: Mapping[str, Any]) -> bytes:
-    """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis.
-
-    curves: "frequency_hz", and for each axis "flown" and, with baseline flights, "nominal", in N^2/Hz.
-    """
-    f = np.array(curves["frequency_hz"])
-    axes_named = [k for k in curves if isinstance(curves[k], Mapping)]
+def commands(curves: MeanSpectra) -> bytes:
+    """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis."""
+    f = curves.frequency_hz
     with style(PHONE):
-        figure, axes = _panes(len(axes_named), 1.2, legend_in=0.25)
-        for ax, name in zip(axes, axes_named, strict=True):
-            if "nominal" in curves[name]:
-                ax.loglog(f, curves[name]["nominal"], color=FLOOR, lw=1.6, label="baseline flights")
-            ax.loglog(f, curves[name]["flown"], color=BLUE, lw=1.2, label="these flights")
+        figure, axes = _panes(len(curves.flown), 1.2, legend_in=0.25)
+        for ax, (name, flown) in zip(axes, curves.flown.items(), strict=True):
+            if name in curves.nominal:
+                ax.loglog(f, curves.nominal[name], color=FLOOR, lw=1.6, label="baseline flights")
+            ax.loglog(f, flown, color=BLUE, lw=1.2, label="these flights")
             ax.set_title(f"{name} command", loc="left")
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)

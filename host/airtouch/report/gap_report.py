@@ -34,7 +34,7 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
     headline = measurement.where[0] if measurement.where else None
     page = _page(
         title="Gap between flights and simulator", headline=headline,
-        answers=(words.measured(headline), words.overall(measurement.gap)),
+        answers=(words.measured_in_words(headline), words.overall_in_words(measurement.gap)),
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
         calibration=gap_tables.parameter_rows(measurement.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),
@@ -114,7 +114,7 @@ def _images(pictures: Pictures | None) -> list[dict[str, str]]:
             " A random effect cannot be predicted sample by sample: its green curve is what is "
             "left of the power." if any(s.after is not None for s in pictures.spectra) else ""),
             partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
-    if pictures.commands:
+    if pictures.commands is not None:
         drawn.append(("Spectra of the motor commands",
                       "Delays, gains and noise in the loop show here, as a shape that differs.",
                       partial(gap_figures.commands, pictures.commands)))

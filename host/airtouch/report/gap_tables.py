@@ -113,11 +113,10 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
     named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
     if diagnosis.gap:
         sources.append((named, {**diagnosis.gap, "shrink": diagnosis.shrink}))
-    if diagnosis.control:
-        sources.append((f"wrong effect: {diagnosis.control.get('name', 'control')}", diagnosis.control))
-    sources += [(f"{named}, vehicle as {name}", arm) for name, arm in diagnosis.arms.items()
-                if isinstance(arm, Mapping)
-                and arm.get("shrink") != (diagnosis.shrink.plain() if diagnosis.shrink else None)]
+    if diagnosis.control is not None:
+        sources.append((f"wrong effect: {diagnosis.control.name}", diagnosis.control.plain()))
+    sources += [(f"{named}, vehicle as {name}", arm.plain()) for name, arm in diagnosis.arms.items()
+                if arm.share != diagnosis.shrink]
     starts = [figure(some.get("before")) for _, some in sources]
     rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys],
              "why": OTHER_START if start not in ("-", starts[0]) else ""}

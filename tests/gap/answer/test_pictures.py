@@ -14,6 +14,6 @@ def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():
     lost = np.arange(1500) % 100 < 3
     whole, poor = (flight(15.0, np.array([0.5, 0.0, 0.0]), lost=rows) for rows in (None, lost))
     headline = cell("force_x", "hover", 0.5)
-    power, poorer = (pictures_of(declared_study(VEHICLE, ()), [f], [], [], headline, [headline]).spectra[0].before
+    power, poorer = (pictures_of(declared_study(VEHICLE, ()), [f], [], [], [headline]).spectra[0].before
                      for f in (whole, poor))
     assert poorer == pytest.approx(power, abs=1e-9) and power[3:].max() < 1e-9

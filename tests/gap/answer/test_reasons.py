@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
 from airtouch.gap.naming.selection import Candidate, Selection
-from airtouch.gap.relations.inference import LEAST_EVIDENCE
+from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
 TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
@@ -28,7 +28,7 @@ def selection(named=("mass",), inference=False, of_distance=False, **more):
     for n in named:
         total += EVIDENCE[n]
         steps.append(judged(n, total, share=0.25 * EVIDENCE[n]))
-    evidence = SimpleNamespace(evidence=EVIDENCE, limit=30.0, of_distance=of_distance) if inference else None
+    evidence = SimpleNamespace(evidence=EVIDENCE, against=Against(4.0, 30.0, of_distance)) if inference else None
     settings = {"nameless_alone": 150.0, "nameless_beside": 4.0, "parts": (None, None),
                 "least": dict.fromkeys(EVIDENCE, 8.0),
                 "nominal": 5, "assumed": False, "nominal_gain": 0.0, **more}
@@ -109,5 +109,5 @@ def test_what_is_named_and_not_enough_is_held_against_itself():
 
 
 def test_the_three_that_gain_most_are_nearest():
-    assert [n["name"] for n in nearest(selection(()))] == ["mass", "wind", "gust"]
-    assert all(n["fails"] for n in nearest(selection(())))
+    assert [n.name for n in nearest(selection(()))] == ["mass", "wind", "gust"]
+    assert all(n.fails for n in nearest(selection(())))

@@ -53,9 +53,9 @@ def test_an_entry_tells_flight_and_seconds_of_the_strongest_gap():
     flights = [hover(0.1, name="calm.csv"), hover(strength, name="windy.csv")]
     (entry,) = unexplained(STUDY, flights, selection(), [cell("force_x", "ground", 9.0), CELL,
                                                          cell("force_x", "hover", 1.0, regime="low")])
-    assert entry["flight"] == "windy.csv" and entry["channel"] == "force_x" and entry["phase"] == "hover"
-    assert entry["from_s"] == pytest.approx(20.0, abs=LENGTH[AIR] / 100.0)
-    assert entry["to_s"] == pytest.approx(28.0, abs=LENGTH[AIR] / 100.0)
+    assert entry.flight == "windy.csv" and entry.channel == "force_x" and entry.phase == "hover"
+    assert entry.from_s == pytest.approx(20.0, abs=LENGTH[AIR] / 100.0)
+    assert entry.to_s == pytest.approx(28.0, abs=LENGTH[AIR] / 100.0)
 
 
 def test_the_seconds_of_an_entry_are_of_its_phase():
@@ -68,9 +68,9 @@ def test_the_seconds_of_an_entry_are_of_its_phase():
     phase = np.where(t >= 25.0, KINDS.index("cruise"), KINDS.index("hover"))
     cells = [CELL, replace(CELL, phase="cruise"), replace(CELL, phase="landing")]
     hovering, cruising, landing = unexplained(STUDY, [hover(strength, phase=phase)], selection(), cells)
-    assert (hovering["from_s"], hovering["to_s"]) == pytest.approx((8.0, 14.0), abs=LENGTH[AIR] / 100.0)
-    assert hovering["over_floor"] < 0.5 * cruising["over_floor"] and cruising["from_s"] > 22.0
-    assert landing["from_s"] == cruising["from_s"] and landing["over_floor"] == cruising["over_floor"]
+    assert (hovering.from_s, hovering.to_s) == pytest.approx((8.0, 14.0), abs=LENGTH[AIR] / 100.0)
+    assert hovering.over_floor < 0.5 * cruising.over_floor and cruising.from_s > 22.0
+    assert landing.from_s == cruising.from_s and landing.over_floor == cruising.over_floor
 
 
 def test_five_cells_are_told_at_most():

@@ -9,7 +9,7 @@ from airtouch.cli.gap import show as gap_show
 from airtouch.cli.shared import scores
 from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.ranking import agreeing
-from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Shrink
 from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
 from airtouch.gap.where import summary
 from airtouch.report import gap_report, gap_tables
@@ -80,9 +80,8 @@ def test_closing_figures_are_one(pushed_flights, tmp_path):
     """Sentence, JSON and page have one share and one before and after;
     the calibrated arm, which is the same, is not told again."""
     result = of_flights(pushed_flights)
-    same = {"before": 4.0, "after": 1.3, "shrink": result.shrink.plain()}
-    result = replace(result, arms={"declared": {"before": 5.0, "after": 2.0, "shrink": Quantity(0.7).plain()},
-                                   "calibrated": same})
+    result = replace(result, arms={"declared": Shrink(5.0, 2.0, Quantity(0.7)),
+                                   "calibrated": Shrink(4.0, 1.3, result.shrink)})
     fields = result.plain()
     assert fields["shrink"] == fields["ranking"][0]["shrink"] and fields["gap"]["before"] == 4.0
     assert "from 4 to 1.3 times the floor" in words.sentences(result)[2]
@@ -127,10 +126,9 @@ def test_advised_commands_can_be_given():
 
 
 def test_phases_with_the_same_worst_seconds_share_a_line():
-    entry = {"channel": "force_z", "band_hz": (0.0, 0.5), "over_floor": 6.0, "from_s": 1.0, "to_s": 3.0,
-             "flight": "a.csv", "follows": [], "nearest": []}
-    lines = words.all_open_in_words([{**entry, "phase": "cruise"}, {**entry, "phase": "landing"},
-                                     {**entry, "phase": "hover", "from_s": 2.0}])
+    cruise = OpenCell("force_z", (0.0, 0.5), "cruise", "a.csv", from_s=1.0, to_s=3.0, over_floor=6.0)
+    lines = words.all_open_in_words([cruise, replace(cruise, phase="landing"),
+                                     replace(cruise, phase="hover", from_s=2.0)])
     assert [line.split(":")[0] for line in lines] == ["lift, 0-0.5 Hz, cruise and landing", "lift, 0-0.5 Hz, hover"]
 
 

@@ -5,16 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance import balance_result
+from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Quantity, Shrink
 
 
 def test_the_hypotheses_of_a_name_count_together():
     """Odds of 1, 1 and 2: two rotors of one name are as probable as the weight."""
     named = [SimpleNamespace(name=n) for n in ("weak_motor", "weak_motor", "mass")]
-    assert probabilities(np.log([1.0, 1.0, 2.0]) + 900.0, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
+    evidence = Evidence(np.log([1.0, 1.0, 2.0]) + 900.0, [])
+    assert probabilities(evidence, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
 
 
 @pytest.mark.parametrize(("total", "answer"), [
@@ -43,5 +44,5 @@ def test_names_of_half_the_probability_fit_alike():
 def test_the_wrong_effect_of_the_control_is_improbable():
     shrink = {n: Shrink(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
     total = {"com_offset": 0.2, "slung_load": 0.05, "mass": 0.7, "weak_motor": 0.05}
-    assert balance_result._control(total, "mass", shrink)["name"] == "slung_load"
-    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", shrink) == {}
+    assert balance_result._control(total, "mass", shrink).name == "slung_load"
+    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", shrink) is None

@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.sealed.blind import SCENARIO
+from airtouch.gap.sealed.make import SCENARIO
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.simulation import replay, scenario

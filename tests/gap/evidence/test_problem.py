@@ -14,7 +14,7 @@ def test_without_a_response_torque_counts_in_the_means_alone():
     """Whoever makes the data: the arm of the declared vehicle, the seconds of a known wake."""
     assert problem_of(data := Data(declared_study(VEHICLE, ()), [flight(20.0)]), whole_of(data)).layout.keep[AIR][
         FIRST_BIN:, TORQUE].sum() == 0
-    assert data.slow and problem_of(data, whole_of(data)).layout.keep[AIR][:FIRST_BIN, TORQUE].all()
+    assert data.means_only and problem_of(data, whole_of(data)).layout.keep[AIR][:FIRST_BIN, TORQUE].all()
 
 
 def test_all_blocks_of_some_flights_are_flattened_once(monkeypatch):

@@ -107,7 +107,7 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
 def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flights(name):
     """Once taken for the same in every loop: late sensors then left noise that no effect explained."""
     f = frequencies(AIR)
-    before, after = nominal().controller.torque_change(active_effects(name), f).unexplained[:, :, 1]
+    before, after = nominal().controller.torque_change(active_effects(name), f).incoherent[:, :, 1]
     band = (f > 2.0) & (f < 45.0)
     predicted, simulated = (in_bands(x[band]) for x in (after / before, beside(name) / beside(None)))
     np.testing.assert_allclose(predicted, simulated, rtol=0.2)
@@ -115,7 +115,7 @@ def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flight
 
 def test_what_the_commands_do_not_tell_of_the_torque_is_noise_of_the_loop():
     f = frequencies(AIR)
-    predicted = nominal().controller.torque_change(active_effects("late sensors"), f).unexplained[0, :, 1]
+    predicted = nominal().controller.torque_change(active_effects("late sensors"), f).incoherent[0, :, 1]
     band = (f > 2.0) & (f < 25.0)
     predicted, simulated = (in_bands(x[band]) for x in (predicted, beside(None)))
     np.testing.assert_allclose(predicted, simulated, rtol=0.25)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 import airtouch.gap.diagnosis as diagnose
-from airtouch.gap.answer.shrink import Shrink, gap_of
+from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Quantity, Shrink
 from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import fly
 

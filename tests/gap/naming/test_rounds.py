@@ -115,13 +115,13 @@ def by_relations(monkeypatch, explained, likeliest="mass"):
     answer, judgements = SimpleNamespace(explained=explained), []
     inference = SimpleNamespace(likeliest=likeliest, evidence={likeliest: 100.0})
 
-    def related(on, candidates, alone, given, progress):
+    def selection_by_relations(trial, candidates, alone, given, progress):
         assert given is inference
         judgements.append(alone)
         return answer
 
     monkeypatch.setattr(select, "inference_of", lambda data, names: inference)
-    monkeypatch.setattr(select, "related", related)
+    monkeypatch.setattr(select, "selection_by_relations", selection_by_relations)
     return answer, judgements
 
 

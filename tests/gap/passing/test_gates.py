@@ -150,19 +150,19 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
     selection = select(Data(study, [odd]), {}, without=tuple(GATED))
     cell = Cell("force_y", (2.0, 6.0), "cruise", 0.5, 0.1, "m/s^2")
     first, = unexplained(study, [odd], selection, [cell])
-    assert (first["channel"], first["flight"]) == ("force_y", nominal_flight.name)
-    assert FROM_S - 2.0 < first["from_s"] < first["to_s"] < TO_S + 2.0
-    assert first["over_floor"] > 3.0
+    assert (first.channel, first.flight) == ("force_y", nominal_flight.name)
+    assert FROM_S - 2.0 < first.from_s < first.to_s < TO_S + 2.0
+    assert first.over_floor > 3.0
 
 
 def test_words_say_when_and_what_is_open():
     from airtouch.gap.answer import words
-    from airtouch.gap.result import NamedEffect, Quantity
+    from airtouch.gap.result import NamedEffect, OpenCell, Quantity
     assert words.effect_in_words(NamedEffect("wind", {"x": Quantity(0.3, unit="m/s")}, (("a/b.csv", 2.0, 5.04),))) \
         == "wind: x 0.3 m/s; acts from 2.0 to 5.0 s of b.csv"
-    entry = {"channel": "force_z", "band_hz": [0.5, 2.0], "phase": "cruise", "flight": "a/b.csv", "from_s": 12.0,
-             "to_s": 18.4, "over_floor": 6.08, "follows": ["height", "speed"], "nearest": []}
-    assert words.open_in_words(entry) \
+    cell = OpenCell("force_z", (0.5, 2.0), "cruise", "a/b.csv", from_s=12.0, to_s=18.4, over_floor=6.08,
+                    follows=("height", "speed"))
+    assert words.open_in_words(cell) \
         == "lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of b.csv; follows height and speed"
 
 

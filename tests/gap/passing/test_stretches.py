@@ -9,7 +9,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.passing.bursts import FORCE, bursts
-from airtouch.gap.passing.stretches import MOST_STRETCHES, best_stretches, price_of_stretches
+from airtouch.gap.passing.stretches import MOST_STRETCHES, best_stretches, cost_of_stretch
 from hovers import FLOOR, hover
 
 
@@ -24,7 +24,7 @@ def test_the_best_stretch_is_the_best_of_all_within_one_flight(seed):
     assert best in found and best_stretches(gain, flight, 1.01 * sums[best]) == []
 
 
-def test_stretches_do_not_overlap_and_each_is_worth_its_price():
+def test_stretches_do_not_overlap_and_each_is_worth_its_cost():
     gain = np.array([5.0, -1.0, 5.0, -20.0, 3.0, -20.0, 6.0])
     assert best_stretches(gain, np.zeros(7, int), 4.0) == [(0, 2), (6, 6)]
     assert best_stretches(gain, np.array([0, 0, 1, 1, 1, 1, 1]), 4.0) == [(0, 0), (2, 2), (6, 6)]
@@ -48,11 +48,11 @@ def shaken(since_s, until_s, factor):
 
 
 def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
-    gate, price = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]), FORCE)
+    gate, cost = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]), FORCE)
     (name, since, until), = gate
     assert name == "shaken"
     assert (since, until) == pytest.approx((12.0, 14.0), abs=FORCE.piece_s)
-    assert price == pytest.approx(price_of_stretches(int(30.0 / FORCE.piece_s)))
+    assert cost == pytest.approx(cost_of_stretch(int(30.0 / FORCE.piece_s)))
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(FORCE.lively)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.relations.effect_class import EffectClass, learn_class, stands_out
+from airtouch.gap.relations.effect_class import ClassFlights, EffectClass, learn_class, stands_out
 
 Q, N = 20, 400
 
@@ -16,7 +16,7 @@ def test_a_bent_curve_and_its_scatter_are_recovered():
     shift[:, 0], shift[:, 1] = strength, 0.02 * strength ** 1.5
     shift[:, 2] = 0.2 * rng.normal(size=N) * np.linalg.norm(shift[:, :2], axis=1)
     features = shift + rng.normal(size=(N, Q))
-    effect_class = learn_class("one", "one", None, 0.01 * strength[:, None], shift, features)
+    effect_class = learn_class("one", "one", None, ClassFlights(0.01 * strength[:, None], shift, features))
     assert not effect_class.signed and effect_class.parameters == 1
     for s in (5.0, 20.0, 80.0):
         expected = np.zeros(Q)
@@ -34,7 +34,8 @@ def test_two_signs_are_two_branches():
     strength = np.exp(rng.uniform(np.log(3.0), np.log(50.0), N)) * rng.choice([-1.0, 1.0], N)
     shift = np.zeros((N, Q))
     shift[:, 0], shift[:, 1] = strength, 0.5 * np.abs(strength)
-    effect_class = learn_class("one", "one", None, strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
+    flights = ClassFlights(strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
+    effect_class = learn_class("one", "one", None, flights)
     assert effect_class.signed
     up, down = effect_class.mean(np.array([[20.0], [-20.0]]))
     assert up[0] == pytest.approx(-down[0], rel=0.05)
@@ -47,7 +48,7 @@ def test_a_plane_of_two_parameters():
     way = rng.normal(size=(N, 2))
     strength = way / np.linalg.norm(way, axis=1, keepdims=True) * np.exp(rng.uniform(0.0, 3.0, N))[:, None]
     shift = strength @ plane
-    effect_class = learn_class("two", "two", None, strength, shift, shift + 0.1 * rng.normal(size=(N, Q)))
+    effect_class = learn_class("two", "two", None, ClassFlights(strength, shift, shift + 0.1 * rng.normal(size=(N, Q))))
     strength_pair = np.array([[0.6, -0.8]])
     middle = np.median(np.abs(strength))  # what strengths are scaled by
     assert effect_class.mean(strength_pair)[0] == pytest.approx(middle * strength_pair[0] @ plane, rel=0.05, abs=0.05)
@@ -59,7 +60,7 @@ def test_flights_that_hit_something_do_not_bend_the_curve():
     strength = np.exp(rng.uniform(np.log(5.0), np.log(50.0), N))
     shift = strength[:, None] * np.eye(Q)[0] + 0.01 * rng.normal(size=(N, Q))
     shift[::20, 1] += 10.0 * strength[::20]
-    effect_class = learn_class("one", "one", None, strength[:, None], shift, shift)
+    effect_class = learn_class("one", "one", None, ClassFlights(strength[:, None], shift, shift))
     direction = effect_class.mean(np.array([[20.0]]))[0]
     assert abs(direction[1]) < 0.02 * abs(direction[0])
     assert effect_class.variances.size == 0  # no scatter is learned from them
@@ -90,7 +91,7 @@ def test_scatter_is_that_beyond_nominal_flights():
     strength = np.full((4000, 1), 5.0) * np.exp(0.01 * rng.normal(size=(4000, 1)))
     shift = strength * np.eye(Q)[0]
     flights = shift + rng.normal(size=(4000, Q)) + 1.5 * rng.normal(size=(4000, 1)) * np.eye(Q)[2]
-    effect_class = learn_class("one", "one", None, strength, shift, flights)
+    effect_class = learn_class("one", "one", None, ClassFlights(strength, shift, flights))
     assert np.sqrt(effect_class.variances) == pytest.approx([1.5 / 5.0], rel=0.08)
 
 
@@ -98,7 +99,7 @@ def test_a_curve_has_a_knot_for_every_factor_of_three():
     """Strengths over a factor of 3^6, but for the weakest hundredth: six stretches, each of nearly that factor."""
     strength = np.geomspace(1.0, 3.0 ** 6, N)
     shift = strength[:, None] * np.eye(Q)[0]
-    knots = learn_class("one", "one", None, strength[:, None], shift, shift).knots
+    knots = learn_class("one", "one", None, ClassFlights(strength[:, None], shift, shift)).knots
     assert len(knots) == 7
     assert np.diff(knots) == pytest.approx(np.log(3.0), rel=0.02)
 
@@ -111,7 +112,7 @@ def test_no_more_than_the_sixteen_widest_directions_of_scatter_are_learned():
     shift = 50.0 * np.exp(0.01 * rng.normal(size=(many, 1))) * np.eye(dimensions)[0]
     flights = shift + rng.normal(size=(many, dimensions))
     flights[:, 1:21] += 50.0 * spread * rng.normal(size=(many, 20))
-    learned = learn_class("one", "one", None, shift[:, :1], shift, flights)
+    learned = learn_class("one", "one", None, ClassFlights(shift[:, :1], shift, flights))
     assert np.sqrt(learned.variances) == pytest.approx(spread[:16], rel=0.15)
 
 
@@ -121,4 +122,4 @@ def test_a_class_has_two_signs_from_a_tenth_of_negative_strengths_on(negative, s
     strength = np.geomspace(3.0, 50.0, N) * np.where(np.arange(N) % (N // negative) == 0, -1.0, 1.0)
     strength[np.flatnonzero(strength < 0.0)[negative:]] *= -1.0
     shift = strength[:, None] * np.eye(Q)[0]
-    assert learn_class("one", "one", None, np.abs(strength[:, None]), shift, shift).signed is signed
+    assert learn_class("one", "one", None, ClassFlights(np.abs(strength[:, None]), shift, shift)).signed is signed

@@ -54,7 +54,7 @@ def test_inference_names_what_is_there(true):
     values = noise() + sum(size * np.eye(Q)[NAMES.index(n)] for size, n in zip(SIZE, true, strict=False))
     inference = infer(library(), values[None])
     assert {c.name for c in inference.classes} == set(true)
-    assert inference.unexplained < inference.limit
+    assert inference.against.nats < inference.against.limit
     chance = inference.probabilities()
     assert sum(chance.values()) == pytest.approx(1.0)
     assert max(chance, key=chance.__getitem__) == (true[0] if true else "none")
@@ -63,7 +63,7 @@ def test_inference_names_what_is_there(true):
 def test_a_withheld_effect_is_left():
     values = (noise() + 45.0 * np.eye(Q)[0])[None]
     inference = infer(library().without(["mass"]), values)
-    assert not inference.classes and inference.unexplained > 10.0 * inference.limit
+    assert not inference.classes and inference.against.nats > 10.0 * inference.against.limit
     assert inference.evidence.keys() == set(NAMES[1:])
 
 
@@ -75,7 +75,7 @@ def test_a_name_fails_where_the_flight_lies_off_it_by_more_than_right_names_do(o
     values[60:] = np.sqrt((Q + 2.0 * off * scatter) / 40.0)  # as far from the effect as nominal flights, and more
     inference = infer(library(), values[None])
     assert [c.name for c in inference.classes] == ["mass"]
-    assert (inference.unexplained < inference.limit) is (off < 3.5)
+    assert (inference.against.nats < inference.against.limit) is (off < 3.5)
 
 
 def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
@@ -84,10 +84,10 @@ def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
     exact = replace(library(), nameless_share=np.ones(len(NAMES)))  # so that the distance alone speaks
     inexact = replace(exact, distance_scatter=np.full(len(NAMES), 0.1))
     far, near = (infer(of, values[None]) for of in (exact, inexact))
-    assert far.unexplained == pytest.approx(near.unexplained)
-    assert far.limit < far.unexplained < near.limit
+    assert far.against.nats == pytest.approx(near.against.nats)
+    assert far.against.limit < far.against.nats < near.against.limit
     evidence = near.evidence["mass"]
-    assert near.limit == pytest.approx(3.5 * np.hypot(0.5 * np.sqrt(2.0 * Q), 0.1 * evidence))
+    assert near.against.limit == pytest.approx(3.5 * np.hypot(0.5 * np.sqrt(2.0 * Q), 0.1 * evidence))
 
 
 def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(monkeypatch):
@@ -152,8 +152,8 @@ def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_t
             best = flight.with_two(*wide.model.classes[:2])
         result = infer(wide, values[None])
         assert len(result.classes) == len(true)
-        assert result.limit == pytest.approx(10.0 + share * best.evidence, rel=1e-3)
-        assert result.unexplained == pytest.approx(flight.nameless_evidence(best) - best.evidence, rel=1e-2)
+        assert result.against.limit == pytest.approx(10.0 + share * best.evidence, rel=1e-3)
+        assert result.against.nats == pytest.approx(flight.nameless_evidence(best) - best.evidence, rel=1e-2)
 
 
 def test_two_parameters_of_one_effect_have_no_readings():
@@ -194,7 +194,7 @@ def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
 def test_probabilities_are_those_of_half_the_evidence():
     """Tails are heavier than normal ones; what has the least evidence of an effect is as likely as none."""
     evidence = {"mass": inference.LEAST_EVIDENCE, "wind": inference.LEAST_EVIDENCE - 4.0}
-    chance = inference.Inference((), evidence, 0.0, 0.0, 1.0).probabilities()
+    chance = inference.Inference((), evidence, 0.0, inference.Against(0.0, 1.0, False)).probabilities()
     assert chance["mass"] == pytest.approx(chance["none"])
     assert chance["wind"] == pytest.approx(chance["mass"] * np.exp(-2.0))
 

@@ -18,8 +18,13 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
-from airtouch.gap.sealed import blind, blind_key, blind_run, blind_score, blind_severity, intervals
-from airtouch.gap.sealed.blind_severity import three_severities
+from airtouch.gap.sealed import intervals
+from airtouch.gap.sealed import key as blind_key
+from airtouch.gap.sealed import make as blind
+from airtouch.gap.sealed import run as blind_run
+from airtouch.gap.sealed import score as blind_score
+from airtouch.gap.sealed import severity as blind_severity
+from airtouch.gap.sealed.severity import three_severities
 from airtouch.gap.signatures.random_draws import KINDS
 
 ROOT = Path(__file__).parents[3]
@@ -64,11 +69,12 @@ def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch)
 
     def open_key(folder, answers):
         opened.append(answers)
-        return {"answers": {n: {"effects": [{"name": "mass"}]} for n in names}}
+        mass = blind_key.DrawnEffect("mass", "mass", 0, {})
+        return blind_key.Key({n: blind_key.DrawnFlight((mass,)) for n in names})
 
     for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None)):
         monkeypatch.setattr(blind_run, name, stand_in)
-    monkeypatch.setattr(blind_run.blind_score, "score", lambda *_: {})
+    monkeypatch.setattr(blind_run.score, "score", lambda *_: {})
     for _ in range(2):  # the second time with the answers without an effect
         blind_run.run(tmp_path)
     assert opened == 2 * [blind_key.answers_sha256([{"flight": n, "without": []} for n in names])]
@@ -234,6 +240,7 @@ def test_scores_in_closed_form():
         answer("c", "none", [("none", 1.0)]), answer("e", "unknown", [("unknown", 0.7), ("none", 0.3)]),
         answer("d", "effect", [("inertia", 0.8)], [("inertia", {}), ("gust", {})]),
         answer("b", "unknown", [("unknown", 0.6), ("gust", 0.4)], withheld=["inertia"])]
+    key = blind_key.key_from(key)
     figures = blind_score.figures(key, cases)
     assert (figures["top_1"]["hits"], figures["top_1"]["n"]) == (2, 2)  # mass and thrust_coefficient are one
     assert (figures["false_alarms"]["hits"], figures["false_alarms"]["n"]) == (1, 2)

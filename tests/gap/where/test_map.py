@@ -9,7 +9,7 @@ from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.signals.channels import CHANNELS
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.where import gap_map as maps
-from airtouch.gap.where.band_sums import stretches, sums
+from airtouch.gap.where.band_sums import block_sums, stretches
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES, regimes
@@ -178,7 +178,7 @@ def test_of_several_effects_each_cell_names_the_one_that_takes_most():
 
 
 def test_sums_of_phases_are_sums_of_blocks():
-    per_block = sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
+    per_block = block_sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
     per_phase = per_block.by_phase()
     assert len(per_block.phase) > 5 and len(per_phase.phase) == 1
     assert per_phase.weight[0, REGIMES.index("all")] == 2000

@@ -37,7 +37,7 @@ def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool
     make_folder(out)
     click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
     with Bar(line_s=Steps.LINE_S) as bar:
-        from airtouch.gap.sealed import blind as sealed
+        from airtouch.gap.sealed import make as sealed
 
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
     click.echo(f"{flights} flights in {out}; the key in {written}")
@@ -57,7 +57,7 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
                 force: bool) -> None:
     """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
     from airtouch.extras import need
-    from airtouch.gap.sealed import blind_score as sealed
+    from airtouch.gap.sealed import score as sealed
 
     need("plots", "scoring a sealed set")
     check_free(json_path, plot, force)
@@ -88,7 +88,7 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     if not (out / "sealed.json").exists():
         click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
     with Bar() as bar:
-        from airtouch.gap.sealed import blind_run as check
+        from airtouch.gap.sealed import run as check
 
         figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)

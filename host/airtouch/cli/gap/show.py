@@ -52,7 +52,7 @@ def measurement(screen: Console, result: Measurement) -> None:
         screen.print(cell_table(result.where, "Largest cells of the gap", screen.width))
     else:
         screen.print("No cell of the gap stands out of its floor.")
-    screen.print(words.overall(result.gap))
+    screen.print(words.overall_in_words(result.gap))
     remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in result.rotors])
     remarks(screen, "What these logs cannot say", result.cannot)
     remarks(screen, "Notes", result.notes)

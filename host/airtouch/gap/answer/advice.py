@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.result import Cell, NamedEffect, NextStep
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect, NextStep
 from airtouch.gap.signatures.alike import confusion_among
 from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
@@ -15,24 +15,22 @@ URI = "radio://0/80/2M/E7E7E7E7E7"
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def steps(verdict: str, effects: Sequence[NamedEffect], alike: Sequence[tuple[str, ...]], headline: Cell | None,
-          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[NextStep, ...]:
+def steps(answer: Diagnosis, flights: Sequence[Flight]) -> tuple[NextStep, ...]:
     """What to do next, most useful first.
 
-    effects: those named; alike: sets of names that these logs cannot tell apart; headline: the cell that the answer
-    speaks of; baseline: whether there were nominal flights.
+    answer: complete but for these steps; flights: which it is about.
     """
-    next_steps = [_to_tell_apart(group) for group in alike]
-    if verdict == "unknown":
-        next_steps += _for_an_open_gap(headline, vehicle)
-    if verdict == "effect":
-        named = " and ".join(e.name for e in effects)
+    next_steps = [_to_tell_apart(group) for group in answer.indistinguishable]
+    if answer.verdict == "unknown":
+        next_steps += _for_an_open_gap(answer.headline, answer.vehicle)
+    if answer.verdict == "effect":
+        named = " and ".join(e.name for e in answer.effects)
         next_steps.append(NextStep(
             f"Switch on {named} with these parameters in the simulator, and fly it again.",
-            switched_on(effects, vehicle)))
-    if verdict == "none":
+            switched_on(answer.effects, answer.vehicle)))
+    if answer.verdict == "none":
         next_steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
-    if not baseline:
+    if not answer.baseline:
         next_steps.append(NextStep(
             "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
             "of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))

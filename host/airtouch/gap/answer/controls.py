@@ -1,53 +1,46 @@
 """What the answer is compared with: a deliberately wrong effect, and the vehicle as its file declares it."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from airtouch.gap.answer.ranking import alike_of
-from airtouch.gap.answer.shrink import Gap, Shrink, gap_of, shrink_of
+from airtouch.gap.answer.shrink import Gap, gap_of, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.selection import Candidate, Selection
-from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.nominal.calibrate import Calibration
-from airtouch.gap.result import Diagnosis
+from airtouch.gap.result import Control, Diagnosis, Shrink
+from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import CLOCK, WRONG
-from airtouch.vehicle import Vehicle
 
 
-def control(data: Data, selection: Selection, gap: Gap) -> dict[str, Any]:
-    """The gap with a deliberately wrong effect in the model, JSON-ready; empty where none of WRONG is wrong."""
+def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
+    """The gap with a deliberately wrong effect in the model; None where none of WRONG is wrong."""
     right = {name for group in alike_of(selection) for name in group} | {s.name for s in selection.named}
     variants = candidates.all_candidates()
     name = next((n for n in WRONG if n in variants and n not in right), None)
     if name is None:
-        return {}
+        return None
     fits = tuple(fit(data, part, variants[name][0]) for part in selection.parts)
-    return {"name": name, **_plain(shrink_of(data, selection.parts, Candidate(name, fits[0].terms, 0.0, fits), gap))}
+    return Control(name, shrink_of(data, selection.parts, Candidate(name, fits[0].terms, 0.0, fits), gap))
 
 
-def arms(vehicle: Vehicle, nominal: Sequence[Flight], calibration: Calibration | None, judged: Sequence[Flight],
-         selection: Selection, answer: Diagnosis) -> dict[str, Any]:
-    """The shrink with the vehicle as calibrated and as its file declares it, JSON-ready; the latter without baseline.
+def arms(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
+         ) -> dict[str, Shrink]:
+    """The shrink with the vehicle as calibrated and as its file declares it; the latter alone without baseline.
 
-    judged: the flights that the answer comes from.
+    declared: the study of the vehicle as declared, None where the answer is held against that already; judged: the
+    flights that the answer comes from; answer: names an effect.
     """
-    overall = {"before": answer.gap["before"], "after": answer.gap["after"],
-               "shrink": answer.shrink.plain() if answer.shrink else {}}
-    if not nominal or selection.chosen is None:
+    assert answer.shrink is not None and selection.chosen is not None  # it names an effect
+    overall = Shrink(answer.gap["before"], answer.gap["after"], answer.shrink)
+    if declared is None:
         return {"declared": overall}
-    study = (calibration.declared if calibration is not None else None) or declared_study(vehicle, nominal)
-    data = Data(study, judged)
+    data = Data(declared, judged)
     parts = halves(data)
     terms = tuple(t for t in selection.chosen.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.chosen.fits[0].terms if selection.chosen.fits else ())
     fits = tuple(fit(data, part, terms, start) for part in parts)
     gap = gap_of(data, parts, Candidate(selection.chosen.name, terms, 0.0, fits))
-    return {"declared": _plain(gap.named), "calibrated": overall}
-
-
-def _plain(shrink: Shrink) -> dict[str, Any]:
-    return {"before": shrink.before, "after": shrink.after, "shrink": shrink.share.plain()}
+    return {"declared": gap.named, "calibrated": overall}

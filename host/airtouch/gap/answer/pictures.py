@@ -1,8 +1,7 @@
 """The curves of a report, computed where everything else is: signals of the headline's cell, spectra, commands."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.where.band_sums import stretches
-from airtouch.gap.where.command_power import command_spectra
+from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
@@ -73,20 +72,24 @@ class Pictures:
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     spectra: tuple[Spectrum, ...] = ()
-    commands: Mapping[str, Any] = field(default_factory=dict)  #: `command_power.command_spectra`
+    commands: MeanSpectra | None = None
 
 
 def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-                headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
-    """The curves of a diagnosis: headline is the cell that its answer speaks of."""
-    commands = command_spectra(flights, nominal, study.vehicle)
-    if headline is None or not flights:
+                cells: Sequence[Cell]) -> Pictures:
+    """The curves of a diagnosis.
+
+    cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
+    without any, the commands are all.
+    """
+    commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
+    if not cells or not flights:
         return Pictures(commands=commands)
     active = [t.active() for t in mean_of(effects)]
     gaps = [FlightGap(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
-    channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
-    return Pictures(_signal(_of_median_flight(gaps, headline), headline), frequencies(AIR),
+    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
+    return Pictures(_signal(_of_median_flight(gaps, cells[0]), cells[0]), frequencies(AIR),
                     _spectra(study, gaps, effects, channels), commands)
 
 

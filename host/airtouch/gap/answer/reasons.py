@@ -3,6 +3,7 @@
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
+from airtouch.gap.result import Rejected
 
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
@@ -25,11 +26,11 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
     return shortfall(selection, selection.singles[name])
 
 
-def nearest(selection: Selection) -> list[dict[str, str]]:
+def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
     gaining = (j for j in selection.singles.values() if selection.gained(j) > 0.0)
     most = sorted(gaining, key=lambda j: -selection.gained(j))
-    return [{"name": j.name, "fails": shortfall(selection, j)} for j in most[:NEAREST]]
+    return [Rejected(j.name, shortfall(selection, j)) for j in most[:NEAREST]]
 
 
 def shortfall(selection: Selection, candidate: Candidate) -> str:
@@ -73,12 +74,12 @@ def against(selection: Selection) -> str:
 
 
 def _left(selection: Selection, gains: str, off: str) -> str:
-    """What is left, in words, with its limit; gains: the words for the gain of a model without names.
+    """What is left, in words, with its limit; gains: the words for the gain of the nameless model.
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
     nats = f"{max(selection.nameless_beside, 0.0):.0f}"
-    if selection.inference is not None and selection.inference.of_distance:
+    if selection.inference is not None and selection.inference.against.of_distance:
         farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
         return f"the flight lies {nats} nats farther {farther}, up to {selection.allowed:.0f} may be chance"
     return f"{gains.format(nats)}, up to {selection.allowed:.0f} may be left"

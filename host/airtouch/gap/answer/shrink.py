@@ -17,7 +17,7 @@ from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.selection import Candidate
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Quantity, Shrink
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
@@ -32,15 +32,6 @@ INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % i
 LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
 LEAST_EXCESS = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
 JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
-
-
-@dataclass(frozen=True)
-class Shrink:
-    """Gap before and after in units of the floor, and the share of it that went, with 90 % interval."""
-
-    before: float
-    after: float
-    share: Quantity
 
 
 @dataclass(frozen=True)

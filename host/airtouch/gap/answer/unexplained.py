@@ -1,7 +1,6 @@
 """What a diagnosis leaves open: in which cells, when, and which signals of the flight the gap there follows."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
-from airtouch.gap.result import Cell
+from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.gap.signals.study import Study
@@ -25,19 +24,16 @@ TINY = 1e-9  #: ratio to the floor at least, of which a logarithm is taken
 
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
-                ) -> list[dict[str, Any]]:
-    """What the effects leave in the cells with most of the gap before any, JSON-ready (host/docs/gap.md, "The JSON").
+                ) -> list[OpenCell]:
+    """What the effects leave in the cells with most of the gap before any, with the flight in which it is largest.
 
-    cells: the headline, then the others, largest first. Each entry has the stretch of time in which most of the gap is,
-    of the flight in which it is largest, and in the phase of the cell; how far it is over the floor there; signals that
-    the cell's power follows from block to block; and the effects that gain most, with the reason why they were not
-    named.
+    cells: the headline, then the others, largest first. The stretch of time lies in the phase of the cell.
     """
     terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
     active = [t.active() for t in mean_of(terms)]
     chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
     gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []
-    near = nearest(selection)
+    near = tuple(nearest(selection))
     out = []
     for cell in chosen:
         ratios = _in_phase([(f, over_floor(study, f, gap, cell)) for f, gap in gaps], cell.phase)
@@ -46,10 +42,10 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
         flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
         first, last = worst_stretch(ratio)
         begin = starts(flight, AIR)
-        out.append({"channel": cell.channel, "band_hz": list(cell.band_hz), "phase": cell.phase, "flight": flight.name,
-                    "from_s": float(begin[first] * PERIOD_S), "to_s": float((begin[last] + LENGTH[AIR]) * PERIOD_S),
-                    "over_floor": float(ratio[first:last + 1].max()), "follows": followed_signals(study, ratios),
-                    "nearest": near})
+        out.append(OpenCell(
+            cell.channel, cell.band_hz, cell.phase, flight.name, from_s=float(begin[first] * PERIOD_S),
+            to_s=float((begin[last] + LENGTH[AIR]) * PERIOD_S), over_floor=float(ratio[first:last + 1].max()),
+            follows=tuple(followed_signals(study, ratios)), nearest=near))
     return out
 
 

@@ -1,13 +1,14 @@
 """A diagnosis in sentences, for the terminal, the report and the JSON alike."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from airtouch.gap.result import Cell, Diagnosis, NamedEffect, Quantity, RankedCandidate
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, ratio, short
+from airtouch.gap.where.rotor_speeds import RotorSpeed
 
 MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
 
@@ -96,7 +97,7 @@ def remaining_in_words(cells: Sequence[Cell]) -> list[str]:
     return [_after_in_words(c) + (": worse than before" if summary.got_worse(c) else "") for c in cells]
 
 
-def band_in_words(cell: Cell) -> str:
+def band_in_words(cell: Cell | OpenCell) -> str:
     """The band in words, as `0-0.5 Hz`."""
     return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
@@ -118,22 +119,19 @@ def seconds_in_words(effect: NamedEffect) -> str:
     return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
 
 
-def all_open_in_words(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+def all_open_in_words(cells: Sequence[OpenCell]) -> list[str]:
     """One line for each place where the gap stays open. Phases that share their worst seconds share a line."""
-    lines: dict[str, tuple[Mapping[str, Any], list[str]]] = {}
-    for entry in entries:
-        line_without_phase = open_in_words({**entry, "phase": ""})
-        lines.setdefault(line_without_phase, (entry, []))[1].append(entry["phase"])
-    return [open_in_words({**entry, "phase": joined(phases)}) for entry, phases in lines.values()]
+    lines: dict[str, list[OpenCell]] = {}
+    for cell in cells:
+        lines.setdefault(open_in_words(replace(cell, phase="")), []).append(cell)
+    return [open_in_words(replace(alike[0], phase=joined([c.phase for c in alike]))) for alike in lines.values()]
 
 
-def open_in_words(entry: Mapping[str, Any]) -> str:
+def open_in_words(cell: OpenCell) -> str:
     """What stays open, as `lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv`."""
-    low, high = entry["band_hz"]
-    follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
-    return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to "
-            f"{entry['over_floor']:.1f} times the floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of "
-            f"{Path(entry['flight']).name}{follows}")
+    follows = f"; follows {joined(list(cell.follows))}" if cell.follows else ""
+    return (f"{CHANNEL_WORDS[cell.channel]}, {band_in_words(cell)}, {cell.phase}: up to {cell.over_floor:.1f} times "
+            f"the floor from {cell.from_s:.1f} to {cell.to_s:.1f} s of {Path(cell.flight).name}{follows}")
 
 
 def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
@@ -141,8 +139,8 @@ def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.unexplained:
         return []
     shown = {r.name for r in leading(diagnosis.ranking) if r.why}
-    near = [n for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
-    return [f"{name_in_words(n['name'])}: {n['fails']}" for n in near]
+    near = [r for r in diagnosis.unexplained[0].nearest if r.name not in shown]
+    return [f"{name_in_words(r.name)}: {r.fails}" for r in near]
 
 
 def leading(ranking: Sequence[RankedCandidate]) -> list[RankedCandidate]:
@@ -171,19 +169,19 @@ def joined(names: list[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
-def measured(where: Cell | None) -> str:
+def measured_in_words(where: Cell | None) -> str:
     """The answer of a measurement: where most of the gap lies."""
     return f"Most of the gap lies {in_words(where)}." if where else "No gap stands out of the floor."
 
 
-def overall(gap: Mapping[str, float]) -> str:
+def overall_in_words(gap: Mapping[str, float]) -> str:
     """The gap of a measurement in a sentence."""
     return f"Overall it is {gap['before']:.2g} times the floor" + (
         f", {gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."
         if "calibrated" in gap else ".")
 
 
-def rotor_in_words(rotor: Mapping[str, float]) -> str:
+def rotor_in_words(speed: RotorSpeed) -> str:
     """A rotor's speeds, as `rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
-    return (f"rotor {rotor['rotor']}: {rotor['logged']:.0f} rpm logged, {rotor['ratio']:.3f} of the model's "
-            f"({rotor['low']:.3f} to {rotor['high']:.3f} over {rotor['flights']} flights)")
+    return (f"rotor {speed.rotor}: {speed.logged:.0f} rpm logged, {speed.ratio:.3f} of the model's "
+            f"({speed.low:.3f} to {speed.high:.3f} over {speed.flights} flights)")

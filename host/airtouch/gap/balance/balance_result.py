@@ -4,13 +4,12 @@
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.pictures import pictures_of
-from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
@@ -30,7 +29,7 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Diagnosis, GapMap, Quantity, RankedCandidate
+from airtouch.gap.result import BASELINE, Cell, Control, Diagnosis, GapMap, Quantity, RankedCandidate, Shrink
 from airtouch.gap.where import summary
 from airtouch.vehicle import Vehicle
 
@@ -45,7 +44,9 @@ NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
     """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
     def any_hovers(flights_of_one_kind: Sequence[Flight]) -> bool:
+        """Whether one of the flights has a hover."""
         return any(hover_pattern(f, vehicle).known for f in flights_of_one_kind)
+
     return all(f.rates is None for f in flights) and any_hovers(nominal) and any_hovers(flights)
 
 
@@ -61,28 +62,29 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     gap = base.difference(pattern)[BALANCE]
 
     candidates = _candidates(vehicle, without)
-    logs, weights = evidence(pattern, base, candidates)
-    total = probabilities(logs, candidates)
-    first, probability = answer_of(total)
+    judged = evidence(pattern, base, candidates)
+    probability_of = probabilities(judged, candidates)
+    first, probability = answer_of(probability_of)
     verdict = first if first in ("none", "unknown") else "effect"
-    fits = {name: likeliest_of(name, candidates, logs, weights) for name in total}
+    fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
     shrink = {name: _shrink(gap, base, fit) for name, fit in fits.items()}
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first], len(flights))
-    indistinguishable = alike([e.name for e in effects], total, first, probability)
+    indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
-    steps = next_steps(verdict, effects, indistinguishable, headline, flights, True, vehicle.name)
-    return Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, total, shrink)),
+    answer = Diagnosis(
+        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, probability_of, shrink)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
         shrink=shrink[first].share if verdict == "effect" else None,
-        control=_control(total, first, shrink) if verdict == "effect" else {},
+        control=_control(probability_of, first, shrink) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
-        map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline, next=steps,
+        map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], headline, cells) if pictures else None)
+        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
+        if pictures else None)
+    return replace(answer, next=next_steps(answer, flights))
 
 
 def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
@@ -118,18 +120,15 @@ def _gap(verdict: str, shrink: Shrink) -> dict[str, float]:
     return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
 
 
-def _control(total: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> dict[str, Any]:
-    """The gap with a deliberately wrong effect, JSON-ready; empty where none of WRONG is surely wrong."""
-    wrong = next((n for n in WRONG if n in total and n != first and total[n] < WRONG_BELOW), None)
-    if wrong is None:
-        return {}
-    return {"name": wrong, "before": shrink[wrong].before, "after": shrink[wrong].after,
-            "shrink": shrink[wrong].share.plain()}
+def _control(probability_of: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> Control | None:
+    """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
+    wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
+    return None if wrong is None else Control(wrong, shrink[wrong])
 
 
-def _ranking(first: str, total: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
+def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
-    chance = dict(total)
+    chance = dict(probability_of)
     weight = OFF_CENTRE if first == WEIGHT else WEIGHT
     if first in (WEIGHT, OFF_CENTRE) and weight in chance:
         chance[first], chance[weight] = chance[first] + chance[weight], 0.0
@@ -160,6 +159,3 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, f
 def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
     """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
     return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
-
-
-__all__ = ["applies", "diagnosis"]

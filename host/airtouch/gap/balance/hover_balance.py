@@ -9,6 +9,7 @@ the log shows; what is judged is the log10 of the power over that.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -56,20 +57,28 @@ def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Refe
     return Reference(table.mean(axis=0), variance * (1.0 + 1.0 / n), own_power)
 
 
-def evidence(pattern: HoverPattern, base: Reference, candidates: Sequence[Hypothesis],
-             priors: Priors = PRIORS) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Log evidence of each hypothesis for a pattern, its prior probability included, and the weights of its samples.
+class Evidence(NamedTuple):
+    """How likely each of some hypotheses makes a pattern.
 
-    In nats, without the constants that all hypotheses share.
+    log (hypotheses,): logarithm of the evidence, its prior probability included, nats, without the constants that all
+    share; weights: of the samples of each (samples,), of sum 1.
     """
+
+    log: np.ndarray
+    weights: list[np.ndarray]
+
+
+def evidence(pattern: HoverPattern, base: Reference, candidates: Sequence[Hypothesis],
+             priors: Priors = PRIORS) -> Evidence:
+    """The evidence of each hypothesis for a pattern."""
     difference = base.difference(pattern)
-    logs, weights = [], []
+    of_each, weights = [], []
     for h in candidates:
         variance = base.variance[BALANCE] + (np.array(priors.maintenance) ** 2 if h.after_maintenance else 0.0)
         log, weight = _of_balance(h, difference[BALANCE], variance, priors.freedom)
-        logs.append(_with_power(log, h, difference[POWER], base.variance[POWER]))
+        of_each.append(_with_power(log, h, difference[POWER], base.variance[POWER]))
         weights.append(weight)
-    return np.array(logs), weights
+    return Evidence(np.array(of_each), weights)
 
 
 def _of_balance(h: Hypothesis, difference: np.ndarray, variance: np.ndarray, nu: float) -> tuple[float, np.ndarray]:
@@ -112,6 +121,3 @@ def _own_power(power: np.ndarray, caused: np.ndarray) -> float:
         """Mean log10 of the power over the expected one."""
         return float(np.mean(power - np.log10(10.0 ** own + caused)))
     return LEAST_POWER if mean_over(LEAST_POWER) <= 0.0 else float(brentq(mean_over, LEAST_POWER, power.max()))
-
-
-__all__ = ["BALANCE", "POWER", "Reference", "evidence", "reference"]

@@ -53,7 +53,7 @@ def hypotheses(vehicle: Vehicle, priors: Priors = PRIORS) -> list[Hypothesis]:
     """No effect, one or two weak rotors, a weight at its place, a weight on a thread, something else."""
     samples = samples_of(vehicle, priors)
     return [*no_effect(), *weak_rotors(samples, priors), weight_on_board(samples, priors),
-            weight_on_thread(samples, priors, vehicle.mass_kg), moved_centre(samples, priors), without_name(priors)]
+            weight_on_thread(samples, priors, vehicle.mass_kg), moved_centre(samples, priors), nameless_change(priors)]
 
 
 def samples_of(vehicle: Vehicle, priors: Priors) -> Samples:
@@ -107,7 +107,7 @@ def moved_centre(samples: Samples, priors: Priors) -> Hypothesis:
     return Hypothesis("com_offset", PRIOR_PROBABILITY["com_offset"], (effect,), change, STEADY)
 
 
-def without_name(priors: Priors) -> Hypothesis:
+def nameless_change(priors: Priors) -> Hypothesis:
     """Something that changes all four numbers of the balance, each by itself."""
     from scipy.stats import qmc  # slow to import, and seldom needed
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import Hypothesis
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.alike import names_alike
@@ -30,44 +31,43 @@ class Likeliest:
         return self.weight @ self.hypothesis.change
 
 
-def likeliest_of(name: str, candidates: Sequence[Hypothesis], logs: np.ndarray, weights: Sequence[np.ndarray],
-                 ) -> Likeliest:
-    """The likeliest hypothesis of a name. logs, weights: `hover_balance.evidence` of the candidates."""
-    best = max((i for i, h in enumerate(candidates) if h.name == name), key=logs.__getitem__)
-    return Likeliest(candidates[best], weights[best])
+def likeliest_of(name: str, candidates: Sequence[Hypothesis], evidence: Evidence) -> Likeliest:
+    """The likeliest hypothesis of a name, by the evidence of the candidates."""
+    best = max((i for i, h in enumerate(candidates) if h.name == name), key=evidence.log.__getitem__)
+    return Likeliest(candidates[best], evidence.weights[best])
 
 
-def probabilities(logs: np.ndarray, candidates: Sequence[Hypothesis]) -> dict[str, float]:
-    """Posterior probability of each name, all its hypotheses together. logs: log evidence of each hypothesis."""
-    chance = np.exp(logs - logs.max())
+def probabilities(evidence: Evidence, candidates: Sequence[Hypothesis]) -> dict[str, float]:
+    """Posterior probability of each name, all its hypotheses together, by the evidence of the candidates."""
+    chance = np.exp(evidence.log - evidence.log.max())
     chance /= chance.sum()
     return {name: float(sum(c for c, h in zip(chance, candidates, strict=True) if h.name == name))
             for name in dict.fromkeys(h.name for h in candidates)}
 
 
-def answer_of(total: Mapping[str, float]) -> tuple[str, float]:
+def answer_of(probability_of: Mapping[str, float]) -> tuple[str, float]:
     """The likeliest name, and the probability that other names are held against.
 
     A weight on the vehicle and one off centre count as one; of the two the likelier is the answer. The probability is
     that of both for the one on the vehicle, its own for the one off centre, with which the other may compete.
     """
-    family = dict(total)
+    family = dict(probability_of)
     if WEIGHT in family:
         family[WEIGHT] += family.get(OFF_CENTRE, 0.0)
     first = max(family, key=family.__getitem__)
-    if first == WEIGHT and total.get(OFF_CENTRE, 0.0) > total[WEIGHT]:
+    if first == WEIGHT and probability_of.get(OFF_CENTRE, 0.0) > probability_of[WEIGHT]:
         first = OFF_CENTRE
     return first, family[first]
 
 
-def alike(effects: Iterable[str], total: Mapping[str, float], first: str, probability: float,
+def alike(effects: Iterable[str], probability_of: Mapping[str, float], first: str, probability: float,
           ) -> tuple[tuple[str, ...], ...]:
     """Sets of names that the flights cannot tell apart: names of one thing, and those that COMPETE with the answer.
 
     effects: names of the answer's; first, probability: `answer_of`.
     """
     sets = [tuple(sorted(group[0])) for name in effects if (group := names_alike(name))]
-    others = [n for n in total if n not in (first, "unknown") and total[n] > COMPETES * probability]
+    others = [n for n in probability_of if n not in (first, "unknown") and probability_of[n] > COMPETES * probability]
     if others:
         sets.append(tuple(sorted({first, *others})))
     return tuple(dict.fromkeys(sets))

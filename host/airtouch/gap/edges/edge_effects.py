@@ -56,7 +56,7 @@ class Crossing(NamedTuple):
     length_m: float
 
 
-def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
+def added_response(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
     """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
     total = np.zeros(COUNT)
     for a in active:
@@ -65,15 +65,16 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
         term = terms(a.effect.name)[0]
         for name, amount in zip(term.free, term.scaled(a.values), strict=True):
             if amount:
-                total += amount * template(floor, flight, a.effect.name, name)[edge.kind]
+                total += amount * response_per_step(floor, flight, a.effect.name, name)[edge.kind]
     return total
 
 
-def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
+def response_per_step(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
     """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
     crossing = crossing_of(flight)
 
     def make() -> dict[str, np.ndarray]:
+        """The difference of simulated flights with one natural step and without."""
         term = terms(effect)[0]
         step = term.step(parameter)
         neutral = term.effect.scaled(term.effect.values(), 0.0)

@@ -1,6 +1,7 @@
 """Effects on the logged times alone: how far the clock and the losses are from nominal flights'."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,34 +17,41 @@ SAMPLES_OF_ONE = 2.0  #: samples that count as one independent value of being lo
 CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
 
 
-def jitter(data: Data) -> tuple[float, float]:
-    """Rms (s) of the logged times beyond that of nominal flights, and the log likelihood that it gains."""
+class TimesFault(NamedTuple):
+    """Size of a fault of the logged times, and the log likelihood that it gains over nominal flights'."""
+
+    size: float
+    gain: float
+
+
+def jitter(data: Data) -> TimesFault:
+    """Jitter of the logged times: its size is their rms (s) beyond that of nominal flights."""
     nominal = max(data.study.floor.clock_s, LEAST_JITTER_S)
     clock = np.concatenate([f.clock_s for f in data.flights])
     measured = max(float(np.std(clock)), 1e-9)
     if measured <= nominal:
-        return 0.0, 0.0
+        return TimesFault(0.0, 0.0)
     n = len(clock) * PERIOD_S / CORRELATION_S
-    return float(np.sqrt(measured ** 2 - nominal ** 2)), float(
-        0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal)))
+    gain = 0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal))
+    return TimesFault(float(np.sqrt(measured ** 2 - nominal ** 2)), float(gain))
 
 
-def loss(data: Data) -> tuple[float, float]:
-    """Share of lost samples, and the log likelihood that it gains over the share in nominal flights."""
+def loss(data: Data) -> TimesFault:
+    """Loss of rows: its size is the share of lost samples."""
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
     least = LEAST_LOST if data.study.controller is None else LEAST_LOST_OF_LOOP
     share, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if share <= nominal:
-        return share, 0.0
+        return TimesFault(share, 0.0)
     n = len(missing) / SAMPLES_OF_ONE
     arrived = (1.0 - share) * np.log((1.0 - share) / (1.0 - nominal))
-    return share, float(n * (share * np.log(share / nominal) + arrived))
+    return TimesFault(share, float(n * (share * np.log(share / nominal) + arrived)))
 
 
 def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
     """An effect on the logged times with its parameter as measured, and its gain, nats."""
-    measured, gain = loss(data) if term.signature.loses_rows else jitter(data)
-    return term.fitted(np.array([measured / term.step(term.free[0])])), gain
+    fault = loss(data) if term.signature.loses_rows else jitter(data)
+    return term.fitted(np.array([fault.size / term.step(term.free[0])])), fault.gain
 
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
@@ -54,4 +62,4 @@ def clock_gains(data: Data, terms: Sequence[Term]) -> float:
 def clock_left(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood of the logged times that effects do not explain."""
     explained = {t.signature.loses_rows for t in terms if t.shows_in == CLOCK}
-    return (0.0 if False in explained else jitter(data)[1]) + (0.0 if True in explained else loss(data)[1])
+    return (0.0 if False in explained else jitter(data).gain) + (0.0 if True in explained else loss(data).gain)

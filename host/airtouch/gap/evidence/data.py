@@ -39,7 +39,7 @@ class Data:
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
     @property
-    def slow(self) -> bool:
+    def means_only(self) -> bool:
         """Whether torque counts in the means alone: nobody knows what commands above them are, aliases or torque."""
         return self.study.response is None
 

@@ -98,6 +98,7 @@ def tail(freedom: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _tail(nu: float) -> float:
+    """`tail` for one number of degrees of freedom."""
     return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
 
 

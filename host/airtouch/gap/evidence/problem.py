@@ -17,7 +17,7 @@ from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
-from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged, squared
+from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged_bins, squared
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.signatures.term import Term
@@ -76,7 +76,7 @@ class Problem:
     def __init__(self, data: Data, part: BlockSet) -> None:
         # the data keeps its problems: no cycle, no garbage to wait for
         self.data, self.workspace = weakref.proxy(data), Workspace()
-        self.layout = Layout(part.pieces, _counted(data.slow))
+        self.layout = Layout(part.pieces, _counted(data.means_only))
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
         #: power (replay,) of the floor, without what lost rows add
         self.noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
@@ -147,7 +147,7 @@ class Problem:
 
     def _noise_growth(self, change: Change) -> np.ndarray:
         """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
-        before, after = change.unexplained
+        before, after = change.incoherent
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
         table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
@@ -194,12 +194,12 @@ def _beside_edges(active: Sequence[Active]) -> list[Active]:
     return [a for a in active if not signature_of(a.effect).edges_only]
 
 
-def _counted(slow: bool) -> dict[str, np.ndarray]:
-    """Bins and channels (bins, COUNT) of the replay view that count, by regime. slow: `Data.slow`."""
-    keep = {r: judged(r) for r in (AIR, REST)}
+def _counted(means_only: bool) -> dict[str, np.ndarray]:
+    """Bins and channels (bins, COUNT) of the replay view that count, by regime. means_only: `Data.means_only`."""
+    keep = {r: judged_bins(r) for r in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
-    if slow:
+    if means_only:
         keep[AIR][FIRST_BIN:, TORQUE] = False
     return keep
 

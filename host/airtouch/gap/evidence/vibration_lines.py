@@ -124,7 +124,7 @@ class _Sample:
 
     def gain(self, spread_hz: float, shift: int) -> float:
         """Twice the log likelihood that lines of the best strength gain over none."""
-        return _best(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
+        return _best_strength(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
 
 
 def _judged() -> np.ndarray:
@@ -141,7 +141,7 @@ def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return over, 1.0 / (1.0 / floor).mean(axis=1)
 
 
-def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
+def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """Twice the log likelihood that lines of the best strength gain over none, and that strength (power).
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1.
@@ -165,7 +165,7 @@ def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]
     """Lines of several flights, each with its share of the power; 1 on average."""
     if len(power) < 2:
         return power
-    share = np.array([_best(over, p[:, _judged()] / floor)[1] if len(p) else 0.0
+    share = np.array([_best_strength(over, p[:, _judged()] / floor)[1] if len(p) else 0.0
                       for p, (over, floor) in ((p, _over_floor(data, b[AIR][:, :, :3]))
                                                for p, b in zip(power, data.base, strict=True))])
     mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0

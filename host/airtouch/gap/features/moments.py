@@ -15,7 +15,7 @@ from airtouch.gap.features.flight_signals import (
     FlightSignals,
 )
 from airtouch.gap.flights.clock import LEAST_JITTER_S
-from airtouch.gap.unnamed.basis import BASIS, basis
+from airtouch.gap.nameless.basis import BASIS, basis
 from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
@@ -50,7 +50,7 @@ def table() -> tuple[Feature, ...]:
 def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
     """Scores, means and variances (len(table()),) of a flight; NaN where there is nothing to tell by.
 
-    What force, torque and estimated speed have of the flight's own signals (`unnamed.basis`); means and logarithms of
+    What force, torque and estimated speed have of the flight's own signals (`nameless.basis`); means and logarithms of
     variances in each phase; what the second half has over the first; means and noise at rest; and what the log did to
     its times.
     """

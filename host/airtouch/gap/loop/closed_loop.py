@@ -96,6 +96,7 @@ class ClosedLoop:
             return None
 
         def make() -> Change:
+            """The change at the frequencies."""
             loop = self._loops(self._nominal_row)[AXES.index("roll")]
             return change_of(loop, self._torques(self._nominal_row, f), self._torques(row, f), f)
 
@@ -135,6 +136,7 @@ class ClosedLoop:
             return replace(self)
 
         def of_axis(i: int) -> Step:
+            """The steps of the set-point of an axis, a place in AXES."""
             loop = self._loops(self._nominal_row)[i]
             measured = share[:, i - 1] * torque_per_command(loop.firmware, loop.plant, f)
             return fitted_step(loop.firmware, loop.plant, self.strengths[i], f, excess[:, i - 1], measured)
@@ -149,6 +151,7 @@ class ClosedLoop:
     def _plant(self, active: Sequence[Active]) -> PlantUnderEffects:
         """The vehicle as calibrated, with effects; cached."""
         def make() -> PlantUnderEffects:
+            """The plant row with effects."""
             row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
             return PlantUnderEffects(row, not _same_loop(row, self._nominal_row))
 
@@ -157,6 +160,7 @@ class ClosedLoop:
     def _loops(self, row: PlantRow) -> list[AxisLoop]:
         """The loops of AXES under a plant row; cached."""
         def make() -> list[AxisLoop]:
+            """The loops, one for each of AXES."""
             by_firmware = firmware_of(row)
             controllers = by_firmware if self.by_firmware else self.controllers
             return [AxisLoop(axis_plant(row, axis), own, c)

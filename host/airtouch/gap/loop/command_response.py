@@ -2,8 +2,8 @@
 
 y is the angular acceleration about roll or pitch that the gyro measures, rad/s^2; u the command in the log, N per
 motor. A source with transfers y_i and u_i, `noise_spectra.transfers`, has S_yu = strength_i y_i u_i*, and
-S_uu = strength_i |u_i|^2. What no command explains of y is S_yy - |S_yu|^2 / S_uu (Bendat and Piersol, Random Data,
-4th ed., section 6.2).
+S_uu = strength_i |u_i|^2. The part of y that is incoherent with u has the power S_yy - |S_yu|^2 / S_uu (noise output
+spectrum: Bendat and Piersol, Random Data, 4th ed., section 6.2).
 """
 
 from collections.abc import Sequence
@@ -49,13 +49,13 @@ class Spectra(NamedTuple):
 class PerCommand(NamedTuple):
     """What a logged command tells of the angular acceleration.
 
-    expected: rad/s^2 per N, complex (bins,), for each of several steps; unexplained (bins,): power that the command
-    does not explain without a step, rad^2/s^4/Hz: the noise of the gyro, and what the loop does of noise between two
+    expected: rad/s^2 per N, complex (bins,), for each of several steps; incoherent (bins,): power that is incoherent
+    with the command without a step, rad^2/s^4/Hz: the noise of the gyro, and what the loop does of noise between two
     rows of the log.
     """
 
     expected: list[np.ndarray]
-    unexplained: np.ndarray
+    incoherent: np.ndarray
 
 
 def acceleration_per_command(c: Controller, plant: AxisPlant, strengths: np.ndarray, f: np.ndarray, width: float,

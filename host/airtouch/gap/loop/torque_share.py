@@ -32,8 +32,8 @@ class Change(NamedTuple):
     motors, complex (bins, 1): ratio of torque to command. share, complex (2, bins, 3): ratio of the share of the
     commanded torque that turns the vehicle, level and stepped; before: that share in the loop model without effects.
     cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
-    logged (bins, 1): `disturbed.logged_over_flown`. unexplained (2, bins, 3): power of the torque that the commands do
-    not explain, without and with effects, (rad/s^2)^2/Hz.
+    logged (bins, 1): `disturbed.logged_over_flown`. incoherent (2, bins, 3): power of the torque that is not coherent
+    with the commands, without and with effects, (rad/s^2)^2/Hz.
     """
 
     motors: np.ndarray
@@ -41,7 +41,7 @@ class Change(NamedTuple):
     before: np.ndarray
     cut: np.ndarray
     logged: np.ndarray
-    unexplained: np.ndarray
+    incoherent: np.ndarray
 
 
 class AxisTorque(NamedTuple):
@@ -49,13 +49,13 @@ class AxisTorque(NamedTuple):
 
     motors, complex (bins,): torque that the motors make of a command, rad/s^2 per N. shares, complex (3, bins): share
     of it that turns the vehicle: level, stepped, and stepped if the limits of the command cut as much as in nominal
-    flights. unexplained (bins,): power of the torque that the commands do not explain, (rad/s^2)^2/Hz; 1 for a
+    flights. incoherent (bins,): power of the torque that is not coherent with the command, (rad/s^2)^2/Hz; 1 for a
     controller that is not the firmware's.
     """
 
     motors: np.ndarray
     shares: np.ndarray
-    unexplained: np.ndarray
+    incoherent: np.ndarray
 
 
 def axis_torque(loop: AxisLoop, nominal: AxisPlant, strengths: np.ndarray, nominal_step: Step, f: np.ndarray,
@@ -67,9 +67,10 @@ def axis_torque(loop: AxisLoop, nominal: AxisPlant, strengths: np.ndarray, nomin
     """
     motors = torque_per_command(loop.firmware, loop.plant, f)
     step = step_under(nominal_step, loop.controller, nominal, loop.plant)
-    shares, unexplained = acceleration_per_command(loop.controller, loop.plant, strengths, f, SMOOTH,
-                                                   (NO_STEP, step, nominal_step))
-    return AxisTorque(motors, np.stack(shares) / motors, unexplained if loop.by_firmware else np.ones(len(f)))
+    per_command = acceleration_per_command(loop.controller, loop.plant, strengths, f, SMOOTH,
+                                           (NO_STEP, step, nominal_step))
+    return AxisTorque(motors, np.stack(per_command.expected) / motors,
+                      per_command.incoherent if loop.by_firmware else np.ones(len(f)))
 
 
 def change_of(loop: AxisLoop, before: Sequence[AxisTorque], after: Sequence[AxisTorque], f: np.ndarray) -> Change:
@@ -84,7 +85,7 @@ def change_of(loop: AxisLoop, before: Sequence[AxisTorque], after: Sequence[Axis
     return Change(
         motors=(after[0].motors / before[0].motors)[:, None], share=share[:2], before=share_before[:2],
         cut=np.abs(stepped - stepped_as_nominal), logged=logged_over_flown(loop.firmware, f)[:, None],
-        unexplained=np.stack([_with_yaw([x.unexplained for x in torques]) for torques in (before, after)]))
+        incoherent=np.stack([_with_yaw([x.incoherent for x in torques]) for torques in (before, after)]))
 
 
 def _with_yaw(roll_and_pitch: Sequence[np.ndarray]) -> np.ndarray:

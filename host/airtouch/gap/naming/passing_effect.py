@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
@@ -12,10 +13,9 @@ from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effect
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
-from airtouch.gap.unnamed.nameless import height_gain
 
 
-def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
+def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
                    ) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
@@ -24,33 +24,34 @@ def passing_effect(on: Trial, singles: Mapping[str, Candidate], least: Mapping[s
     which another vehicle is known to be overhead go before others, which are only likely. singles: candidates judged
     alone; least: nats of evidence that each needs; without: names that are left out.
     """
-    if on.data.study.scatter is None:
+    if trial.data.study.scatter is None:
         return None
-    steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
-    passing = [g for g in gated_effects(on.data, without).values()
-               if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+    data, always = trial.data, [j.gain for n, j in singles.items() if j.evidence >= least[n]]
+    steady = max([height_gain(data, trial.parts), *always])
+    passing = [g for g in gated_effects(data, without).values()
+               if g.gain >= steady + LEAST_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
-    return _as_judged(on, max(overhead or passing, key=lambda g: g.gain))
+    return _as_judged(trial, max(overhead or passing, key=lambda g: g.gain))
 
 
-def _as_judged(on: Trial, effect: GatedEffect) -> Candidate:
+def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
-    gain = sum(gain_of(on, half, terms) for half in (0, 1)) - effect.cost
+    gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
+    evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
-                     strength=effect.strength, evidence=news(on.data, effect.key, effect.gain, effect.strength),
-                     key=effect.key)
+                     strength=effect.strength, evidence=evidence, key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:
     """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
-               and news(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
+               and passing_evidence(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
 
 
-def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
+def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     """Evidence, nats, for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights have as much.
 
     key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.

@@ -39,8 +39,8 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
     return closed < LEAST_CLOSED and (changes_the_loop(data, selection) or gap > STANDS_OUT)
 
 
-def without_names(selection: Selection) -> Selection:
-    """The same flights with no effect named; what a model without names gains is that of none."""
+def with_none_named(selection: Selection) -> Selection:
+    """The same flights with no effect named; what the nameless model gains is that of none."""
     return replace(selection, steps=(), nameless_beside=selection.nameless_alone, assumed=False)
 
 

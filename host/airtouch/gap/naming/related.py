@@ -30,7 +30,7 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
-def related(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
+def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
             inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
@@ -45,7 +45,7 @@ def related(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapp
             steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
     return Selection(
         singles=alone, steps=tuple(steps), nameless_alone=inference.nameless_alone,
-        nameless_beside=inference.unexplained, parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN),
+        nameless_beside=inference.against.nats, parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN),
         nominal=trial.data.study.nominal, assumed=False, nominal_gain=0.0, simulated=True, same_models=True,
         inference=inference)
 

@@ -1,6 +1,6 @@
 """Which effect: candidates are judged one against another and added one by one while held-out data ask for them.
 
-`none` is the hypothesis of no effect. `unknown` is a model without names (gap.unnamed.nameless): it needs more
+`none` is the hypothesis of no effect. `unknown` is the nameless model (gap.nameless.model): it needs more
 parameters, so a named effect that is right beats it; where it gains much on top of the named effects, something is left
 that they do not explain.
 """
@@ -12,11 +12,12 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.contradiction import contradicted
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
-from airtouch.gap.naming.related import inference_of, related
+from airtouch.gap.naming.related import inference_of, selection_by_relations
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
 from airtouch.gap.naming.thresholds import assumes
@@ -24,7 +25,6 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
 from airtouch.gap.signatures.term import Terms
-from airtouch.gap.unnamed.nameless import nameless_gain
 from airtouch.simulation import effects
 
 #: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
@@ -64,7 +64,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     It may name a wake of some seconds, what else comes and goes if the relations find it likeliest as well, and what
     has more shapes than its class.
     """
-    answer = related(search.trial, search.candidates, search.alone, inference, search.progress)
+    answer = selection_by_relations(search.trial, search.candidates, search.alone, inference, search.progress)
     if answer.explained:
         return answer
     passing = passing_effect(search.trial, search.alone, search.least, without)
@@ -111,13 +111,13 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
 
 
 def nameless(trial: Trial, chosen: Candidate | None) -> float:
-    """Held-out nats that a model without names adds to a hypothesis, those of the logged times included."""
+    """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
-    of_spectra = max(sum(nameless_gain(trial.data, trial.parts, fits)), 0.0)
+    of_spectra = max(sum(held_out_gains(trial.data, trial.parts, fits)), 0.0)
     return of_spectra + clock_left(trial.data, chosen.terms if chosen else ())
 
 
 def _nominal_gain(data: Data) -> float:
-    """Nats that a model without names gains in nominal flights as long as these."""
+    """Nats that the nameless model gains in nominal flights as long as these."""
     scatter = data.study.scatter
     return scatter.allowed(data.seconds, UNKNOWN_GAIN) if scatter else 0.0

@@ -11,7 +11,7 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Terms
 
-#: nats that a nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
+#: nats that the nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
 #: floor, and where none did; both chosen (host/docs/gap.md, "What `unknown` means")
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
@@ -67,12 +67,12 @@ class Selection:
     """The result of a selection of effects; gains are in held-out nats.
 
     singles: the best variant of every candidate; steps: effects added one after another. nameless_alone,
-    nameless_beside: gain of a model without names over no effect and over the last step; left_of_times: of the latter,
+    nameless_beside: gain of the nameless model over no effect and over the last step; left_of_times: of the latter,
     what the logged times hold; contradicted: what the effects named lose in cells where they say what the flights do
     not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: nats that
     each candidate must gain as the first; inference: what named the effects, where the relations of signals did.
 
-    Of the study: nominal: how many flights gave the floor; nominal_gain: what a model without names gains in nominal
+    Of the study: nominal: how many flights gave the floor; nominal_gain: what the nameless model gains in nominal
     flights as long as these; assumed: whether a chosen effect is random, or changes the loop in recorded flights;
     simulated, same_models: as the study has them.
     """
@@ -120,12 +120,12 @@ class Selection:
 
     @property
     def allowed(self) -> float:
-        """Log likelihood that a nameless model may gain on top of the effects named where they are right.
+        """Log likelihood that the nameless model may gain on top of the effects named where they are right.
 
         The fewer nominal flights there are, the farther off may another one lie.
         """
         if self.inference is not None:
-            return self.inference.limit
+            return self.inference.against.limit
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless_alone, self.nominal_gain)
         gained = self.whole.gain if self.whole else 0.0

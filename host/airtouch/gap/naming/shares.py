@@ -1,39 +1,79 @@
-"""What each of several effects adds to the others: the gain of all, less that of all but one."""
+"""What each of several effects adds to the others: the gain of all, less that of all but one.
+
+Both are gains as `judging.cross_validated` has them: effects before the first random one are not charged with what they
+gain less once the commands' floor is less certain.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.clock import clock_gains
-from airtouch.gap.evidence.fit import fit, mean_parameters
+from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
 from airtouch.gap.naming.judging import Trial, gain_of, price_of
 from airtouch.gap.naming.selection import Candidate
-from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
+from airtouch.gap.signatures.candidates import random_of
+from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(on: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
+def with_shares(trial: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
     """The steps of a selection, those that are named with their `share`, nats, where there are several."""
     if sum(s.named for s in steps) < 2:
         return list(steps)
-    return [replace(s, share=steps[-1].gain - _gain_without(on, steps, s)) if s.named else s for s in steps]
+    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place)) if s.named else s
+            for place, s in enumerate(steps)]
 
 
-def _gain_without(on: Trial, steps: Sequence[Candidate], dropped: Candidate) -> float:
-    """Held-out nats of the last step's hypothesis without one of its effects, the others fitted anew."""
-    last, place = steps[-1], [s.name for s in steps].index(dropped.name)
-    others = _others(last.terms, dropped.name)
-    gain = clock_gains(on.data, others)
+def _gain_without(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
+    """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
+    last, dropped = steps[-1], _own(steps, place)
+    others = _without(last.terms, dropped)
+    gain = clock_gains(trial.data, others)
     if all(t.shows_in == CLOCK for t in others):
         return gain
-    for train, test in ROUND_TRIP:
-        known = _others(last.fits[train].terms, dropped.name)
-        refit = fit(on.data, on.parts[train], known, mean_parameters(known))
-        gain += gain_of(on, test, refit.terms)
-    cost_of_dropped = dropped.choice_cost - (steps[place - 1].choice_cost if place else 0.0)
-    return gain - price_of(refit.terms) - (last.choice_cost - cost_of_dropped)
+    refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
+    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
+    cost_of_dropped = steps[place].choice_cost - (steps[place - 1].choice_cost if place else 0.0)
+    gain += _gained_while_certain(trial, steps, place)
+    return gain - price_of(refits[-1].terms) - (last.choice_cost - cost_of_dropped)
 
 
-def _others(terms: Sequence[Term], name: str) -> list[Term]:
-    """The terms that are neither an effect's nor its companion's."""
-    return [t for t in terms if not (t.name == name or t.companion and t.name == COMPANIONS.get(name))]
+def _gained_while_certain(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
+    """`Candidate.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
+    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_newest(steps, i))), 0)
+    earlier = [i for i in range(first_random) if i != place]
+    if not earlier:
+        return 0.0
+    if place > first_random:
+        return steps[-1].gained_while_certain
+    later = frozenset().union(*(_own(steps, i) for i in range(len(steps)) if i not in earlier))
+    refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
+    return sum(gain_of(trial, test, refits[train].terms) - gain_of(trial, test, refits[train].terms, True)
+               for train, test in ROUND_TRIP)
+
+
+def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
+    """Effects fitted to a half anew, from their values on."""
+    return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
+
+
+def _newest(steps: Sequence[Candidate], place: int) -> list[Term]:
+    """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
+    before = {_key(t) for t in steps[place - 1].terms} if place else set()
+    return [t for t in steps[place].terms if _key(t) not in before]
+
+
+def _own(steps: Sequence[Candidate], place: int) -> frozenset[tuple]:
+    """Keys of the terms that the step at a place has added."""
+    return frozenset(_key(t) for t in _newest(steps, place))
+
+
+def _without(terms: Sequence[Term], dropped: frozenset[tuple]) -> list[Term]:
+    """The terms whose key is not among those that are dropped."""
+    return [t for t in terms if _key(t) not in dropped]
+
+
+def _key(term: Term) -> tuple:
+    """What tells a term from a hypothesis's others: its effect (of which rotor), and whether it is a companion."""
+    return term.identity, term.companion

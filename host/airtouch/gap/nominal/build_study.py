@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,17 @@ from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
-from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
+from airtouch.gap.signals.spectra import (
+    AIR,
+    REST,
+    Floor,
+    NominalBlocks,
+    blocks,
+    floor_of,
+    frequencies,
+    sensor_power,
+    starts,
+)
 from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -38,13 +49,10 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
     if not flights:
         return study_without_flights(vehicle, calibration)
     loop = identify.identify(flights, vehicle, calibration)
-    residuals = [np.nan_to_num(residual(f, vehicle, calibration)) for f in flights]
-    first = [{r: starts(f, r) for r in (AIR, REST)} for f in flights]
-    spectra = [{r: blocks(x, begin[r], r) for r in begin} for x, begin in zip(residuals, first, strict=True)]
-    response, quiet = _response(vehicle, calibration, loop, flights, first, spectra)
-    bridging = [bridging_power(f, vehicle, calibration, begin[AIR], q, response)
-                for f, begin, q in zip(flights, first, quiet, strict=True)]
-    floor = floor_of(flights, residuals, first, spectra, sensor_noise(vehicle), bridging)
+    replayed = [_replayed_blocks(f, vehicle, calibration) for f in flights]
+    response = _response(vehicle, calibration, loop, replayed)
+    nominal = [_under_response(n, vehicle, calibration, response) for n in replayed]
+    floor = floor_of(nominal, sensor_noise(vehicle))
     if loop is not None and response is not None and response.stepped_law is not None:
         over = response.stepped_law.power / np.maximum(response.quiet_law.power, 1e-30)
         loop = loop.with_steps(response.stepped_law.coherent, over, frequencies(AIR))
@@ -68,23 +76,37 @@ def sensor_noise(vehicle: Vehicle) -> np.ndarray:
     return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - COMMAND.start)])
 
 
-def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_loop.ClosedLoop | None,
-              flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
-              spectra: Sequence[dict[str, np.ndarray]]) -> tuple[Response | None, Sequence[np.ndarray | None]]:
-    """How the gyro follows the commands, and by flight the blocks (blocks, 3) in which no set-point stepped.
+def _replayed_blocks(flight: Flight, vehicle: Vehicle, calibration: tuple[Active, ...]) -> NominalBlocks:
+    """A flight's blocks as the replay leaves them, without what lost rows add."""
+    first = {r: starts(flight, r) for r in (AIR, REST)}
+    gap = np.nan_to_num(residual(flight, vehicle, calibration))
+    spectra = {r: blocks(gap, begin, r) for r, begin in first.items()}
+    return NominalBlocks(flight, gap, first, spectra, bridging=np.zeros(spectra[AIR].shape))
 
-    first, spectra: of each flight's blocks by regime the first samples and the spectra of the residual, whose torque in
-    the air is put in place as the response explains it. Without gyro or loop model None, and None for every flight.
-    """
-    nothing = [None] * len(flights)
-    if loop is None or any(f.rates is None for f in flights):
-        return None, nothing
+
+def _torque(nominal: NominalBlocks) -> TorqueSpectra:
+    """Torque of a flight's blocks in the air, measured and as the replay leaves it."""
+    measured = blocks(angular_acceleration(nominal.flight), nominal.first[AIR], AIR)
+    return TorqueSpectra(measured, nominal.spectra[AIR][:, :, TORQUE])
+
+
+def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_loop.ClosedLoop | None,
+              replayed: Sequence[NominalBlocks]) -> Response | None:
+    """How the gyro follows the commands; None without gyro or loop model, and for too few blocks."""
+    if loop is None or any(n.flight.rates is None for n in replayed):
+        return None
     outside = disturbed(loop.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
-    measured = [blocks(angular_acceleration(f), begin[AIR], AIR) for f, begin in zip(flights, first, strict=True)]
-    response = response_of(measured, [s[AIR][:, :, TORQUE] for s in spectra], outside)
-    if response is None:
-        return None, nothing
-    quiet = [response.quiet(m - s[AIR][:, :, TORQUE]) for m, s in zip(measured, spectra, strict=True)]
-    for q, m, s in zip(quiet, measured, spectra, strict=True):
-        s[AIR] = response.with_residual(s[AIR], q, TorqueSpectra(m, s[AIR][:, :, TORQUE]))
-    return response, quiet
+    torques = [_torque(n) for n in replayed]
+    return response_of([t.measured for t in torques], [t.residual for t in torques], outside)
+
+
+def _under_response(replayed: NominalBlocks, vehicle: Vehicle, calibration: tuple[Active, ...],
+                    response: Response | None) -> NominalBlocks:
+    """A flight's blocks, their torque in the air as the response explains it, with what lost rows add."""
+    spectra, quiet = replayed.spectra, None
+    if response is not None:
+        torque = _torque(replayed)
+        quiet = response.quiet(torque.measured - torque.residual)
+        spectra = {**spectra, AIR: response.with_residual(spectra[AIR], quiet, torque)}
+    bridging = bridging_power(replayed.flight, vehicle, calibration, replayed.first[AIR], quiet, response)
+    return replace(replayed, spectra=spectra, bridging=bridging)

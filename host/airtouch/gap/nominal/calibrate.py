@@ -17,6 +17,7 @@ from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import Flight
+from airtouch.gap.nameless.model import nameless_floor
 from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
 from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, split_unlike
@@ -25,7 +26,6 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.nameless import nameless_floor
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 

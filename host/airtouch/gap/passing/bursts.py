@@ -13,7 +13,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, price_of_stretches
+from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, cost_of_stretch
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects.effect import Gate
@@ -46,18 +46,18 @@ LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is s
 def bursts(data: Data, signal: Signal) -> tuple[Gate, float]:
     """The bursts of a signal in all flights, and nats that their choice costs; none where they fill the flights."""
     gate: list[tuple[str, float, float]] = []
-    price = 0.0
+    cost = 0.0
     for flight in data.flights:
         gain = _gains(_powers(data.study, flight, signal), signal)
         known = int(np.isfinite(gain).sum())
         if known < LEAST_PIECES:
             continue
-        stretches = best_stretches(gain, np.zeros(len(gain), int), price_of_stretches(known))
+        stretches = best_stretches(gain, np.zeros(len(gain), int), cost_of_stretch(known))
         gate += [(flight.name, a * signal.piece_s, (b + 1) * signal.piece_s) for a, b in stretches]
-        price += price_of_stretches(known) * len(stretches)
+        cost += cost_of_stretch(known) * len(stretches)
     seconds = sum(end - begin for _, begin, end in gate)
     whole = seconds > WHOLE * data.seconds
-    return ((), 0.0) if whole else (tuple(gate), price)
+    return ((), 0.0) if whole else (tuple(gate), cost)
 
 
 def unsteady_yaw(data: Data) -> float:

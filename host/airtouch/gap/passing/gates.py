@@ -2,7 +2,7 @@
 
 An effect is tried in the stretches of blocks that it explains best (`stretches`) and in bursts that are shorter than a
 block (`bursts`). A stretch may lie in one half of a split, so a gated effect is judged on what it is fitted on, at the
-price of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the choice of its gate.
+cost of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the choice of its gate.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,14 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import FORCE, YAW, bursts
-from airtouch.gap.passing.stretches import LEAST_BLOCKS, each_block, stretches_of
+from airtouch.gap.passing.stretches import LEAST_BLOCKS, GateTrial, each_block, stretches_of
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects.effect import Gate
 
-PARAMETER_PRICE = 0.5  #: nats of each parameter, times the logarithm of the number of blocks (Schwarz 1978)
+PARAMETER_COST = 0.5  #: nats of each parameter, times the logarithm of the number of blocks (Schwarz 1978)
 KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle is known to be overhead
 
 
@@ -73,35 +73,40 @@ def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEff
     base = no_effect(data)
     if base is None:
         return {}
-    lively, out = [bursts(data, signal) for signal in (FORCE, YAW)], {}
+    in_bursts, out = [bursts(data, signal) for signal in (FORCE, YAW)], {}
     for name, variants in candidates.gated_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
-            out[KNOWN_OVERHEAD] = replace(_best(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
-        where = [tried for v in variants for tried in (stretches_of(data, base.whole, base.each, v),
-                                                       *((v, gate, cost) for gate, cost in lively))]
-        acting = [_in_gate(base, name, terms, gate, cost) for terms, gate, cost in where if gate]
+            out[KNOWN_OVERHEAD] = replace(_best_variant(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
+        acting = [_in_gate(base, name, trial) for v in variants for trial in _trials(base, v, in_bursts)]
         if acting:
             out[name] = max(acting, key=lambda effect: effect.gain)
     return out
 
 
-def within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
+def _trials(base: NoEffect, terms: Sequence[Term], in_bursts: Sequence[tuple[Gate, float]]) -> list[GateTrial]:
+    """An effect in the stretches that it explains best and in the bursts of each signal, as far as there are any."""
+    trials = [stretches_of(base.data, base.whole, base.each, terms),
+              *(GateTrial(terms, gate, cost) for gate, cost in in_bursts)]
+    return [trial for trial in trials if trial.gate]
+
+
+def effect_within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
     """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
     base = no_effect(data)
-    return _best(base, name, candidates.gated_variants()[name], gate) if base is not None else None
+    return _best_variant(base, name, candidates.gated_variants()[name], gate) if base is not None else None
 
 
-def _best(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
+def _best_variant(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
     """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
-    return max((_in_gate(base, name, v, gate, 0.0) for v in variants), key=lambda effect: effect.gain)
+    return max((_in_gate(base, name, GateTrial(v, gate, 0.0)) for v in variants), key=lambda effect: effect.gain)
 
 
-def _in_gate(base: NoEffect, name: str, terms: Sequence[Term], gate: Gate, cost: float) -> GatedEffect:
-    """An effect fitted within a gate, whose choice costs `cost` nats."""
-    acting = [replace(t, gate=gate) for t in terms]
+def _in_gate(base: NoEffect, name: str, trial: GateTrial) -> GatedEffect:
+    """An effect fitted within the gate in which it is tried."""
+    acting = [replace(t, gate=trial.gate) for t in trial.terms]
     fitted = fit(base.data, base.whole, acting)
     free = sum(len(t.free) for t in acting)
     level_without = base.level[bool(random_of(acting))]
-    price = PARAMETER_PRICE * free * np.log(len(base.each))
-    gain = judge(base.data, base.whole, fitted.terms) - level_without - cost - price
-    return GatedEffect(name, fitted, gain, cost, name)
+    cost_of_parameters = PARAMETER_COST * free * np.log(len(base.each))
+    gain = judge(base.data, base.whole, fitted.terms) - level_without - trial.cost - cost_of_parameters
+    return GatedEffect(name, fitted, gain, trial.cost, name)

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.passing.gates import KNOWN_OVERHEAD, within
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, effect_within
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -56,6 +56,7 @@ def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tup
     time = np.arange(begin, log["t_s"][-1], PERIOD_S)
 
     def path(one: FlightLog) -> np.ndarray:
+        """Position (n, 3) at the times, m; NaN where the log has none."""
         return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in PLACE])
 
     acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(path(log), path(p)) for p in partners)])
@@ -89,7 +90,7 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
 
 def _size(data: Data, gate: Gate) -> float:
     """Size (`size_of`) that what acts overhead seems to have within a gate."""
-    wake = within(data, OVERHEAD, gate)
+    wake = effect_within(data, OVERHEAD, gate)
     return size_of(wake.gain / data.seconds, wake.strength) if wake is not None else 0.0
 
 

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,46 +29,54 @@ WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come a
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 
 
-def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: Sequence[Term],
-                 ) -> tuple[Sequence[Term], Gate, float]:
-    """An effect as fitted where it acts, the stretches of blocks in which it does, and nats that their choice costs.
+class GateTrial(NamedTuple):
+    """An effect to be tried in a gate, none where it does not come and go; cost: nats, of the gate's choice."""
 
-    No stretch where it acts nowhere or everywhere. whole: all blocks of the flights; level_without (b,): log
-    likelihood of each in the air without the effect. The effect is fitted to the blocks that are explained worst, then
-    to those in which it gains, ROUNDS times at most; then the stretches' ends are moved.
+    terms: Sequence[Term]
+    gate: Gate
+    cost: float
+
+
+def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: Sequence[Term]) -> GateTrial:
+    """An effect as fitted where it acts, with the stretches of blocks in which it does.
+
+    No gate where it acts nowhere or everywhere. whole: all blocks of the flights; level_without (b,): log likelihood of
+    each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
+    which it gains, ROUNDS times at most; then the stretches' ends are moved.
     """
-    air, price = problem_of(data, whole).air, price_of_stretches(len(level_without))
+    air, cost = problem_of(data, whole).air, cost_of_stretch(len(level_without))
     at_the_ends = _at_the_ends(data, air)
     acting = _explained_worst(air, level_without)
     for _ in range(ROUNDS):
         fitted = fit(data, _part(whole, acting), terms)
         gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - level_without)
-        stretches = best_stretches(gain, air.flight, price)
+        stretches = best_stretches(gain, air.flight, cost)
         chosen = np.zeros(len(level_without), bool)
         for first, last in stretches:
             chosen[first:last + 1] = True
         if not stretches or chosen.mean() > WHOLE:
-            return terms, (), 0.0
+            return GateTrial(terms, (), 0.0)
         if (chosen == acting).all():
             break
         acting = chosen
     gate = tuple((data.flights[air.flight[a]].name, *_seconds(air, a, b)) for a, b in stretches)
-    return fitted.terms, _sharpened(data, whole, fitted.terms, gate), price * len(stretches)
+    return GateTrial(fitted.terms, _sharpened(data, whole, fitted.terms, gate), cost * len(stretches))
 
 
-def price_of_stretches(blocks: int) -> float:
+def cost_of_stretch(blocks: int) -> float:
     """Nats that the choice of one stretch among so many blocks costs: log n for each of its ends."""
     return 2.0 * np.log(blocks)
 
 
-def best_stretches(gain: np.ndarray, flight: np.ndarray, price: float) -> list[tuple[int, int]]:
-    """Disjoint stretches (first, last) of blocks of one flight with the largest sums of gain, each over its price.
+def best_stretches(gain: np.ndarray, flight: np.ndarray, cost: float) -> list[tuple[int, int]]:
+    """Disjoint stretches (first, last) of blocks of one flight with the largest sums of gain, each over its cost.
 
-    gain (b,): nats of each block; flight (b,): its flight's number. MOST_STRETCHES times the number of flights at most.
+    gain (b,): nats of each block; flight (b,): its flight's number; cost: nats of each stretch. There are at most
+    MOST_STRETCHES times the number of flights.
     """
     remaining, out = gain.copy(), []
     while len(out) < MOST_STRETCHES * (int(flight.max()) + 1):
-        stretch = _best_stretch(remaining, flight, price)
+        stretch = _best_stretch(remaining, flight, cost)
         if stretch is None:
             break
         out.append(stretch)
@@ -75,9 +84,9 @@ def best_stretches(gain: np.ndarray, flight: np.ndarray, price: float) -> list[t
     return sorted(out)
 
 
-def _best_stretch(gain: np.ndarray, flight: np.ndarray, price: float) -> tuple[int, int] | None:
-    """The stretch (first, last) of the largest sum of gain over a price, in one pass (Kadane); None without one."""
-    best, stretch = price, None
+def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[int, int] | None:
+    """The stretch (first, last) of the largest sum of gain over a cost, in one pass (Kadane); None without one."""
+    best, stretch = cost, None
     total, begin = 0.0, 0
     for k in range(len(gain)):
         if total <= 0.0 or (k and flight[k] != flight[k - 1]):

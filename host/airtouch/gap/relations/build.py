@@ -21,7 +21,7 @@ from scipy.linalg import solve_triangular
 
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, two_of
-from airtouch.gap.relations.effect_class import learn_class, stands_out
+from airtouch.gap.relations.effect_class import ClassFlights, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -41,7 +41,7 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import load
 
 NOMINAL_FLIGHTS = 5000  #: twice as many as there are features, of which they give the covariance
-NAMELESS_FLIGHTS = 3000  #: flights in which something acts that has no name
+NAMELESS_FLIGHTS = 3000  #: flights with a nameless disturbance
 FLIGHTS_OF_TWO = 300  #: flights with two effects
 PER_KNOT = 60  #: flights of a class for each KNOT of its strength (a factor of three); twice as many for a direction
 FACTOR_OF_KNOT = 3.0  #: in strength, that of `effect_class.KNOT`
@@ -98,14 +98,14 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     nominal = dict(zip(flown, whitening(features), strict=True))
     middle = np.mean(list(nominal.values()), axis=0)
     paired = [_paired_flights(scene, whitening, nominal, d, say) for d in all_drawings()]
-    say("flights without a name")
+    say("flights with nameless disturbances")
     nameless = np.array([whitening(f)[0] - nominal[i]
                          for i, f in disturbed_flights(scene, NAMELESS_FLIGHTS) if i in nominal])
     axes = directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.amount, p.shift @ axes,
-                                (p.whitened - middle) @ axes) for p in paired)
+    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
+        p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
     none = np.zeros(len(classes))
     library = Library(
         scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),

@@ -97,7 +97,7 @@ class CalibrationFlight:
     """A flight that shows an effect, with the class of that effect fitted to it.
 
     strength (s,): of the class, as fitted; amount (p,): true parameters (`learning.scaled`). In nats: evidence for the
-    class; what a disturbance without a name gains beside it (nameless) and what a second effect gains (second, None
+    class; what a nameless disturbance gains beside it (nameless) and what a second effect gains (second, None
     where none was tried); excess, by which the flight lies farther from the class than the median nominal flight from
     none.
     """

@@ -7,6 +7,7 @@ Thresholds without another source were chosen on flights of `learning.SEED` (hos
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,24 +98,37 @@ def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     return out
 
 
-def learn_class(name: str, effect: str, shape: float | None, amount: np.ndarray, shift: np.ndarray, flights: np.ndarray,
-                ) -> EffectClass:
-    """A class from n flights.
+class ClassFlights(NamedTuple):
+    """Flights with an effect, each beside the same flight without it.
 
-    amount (n, parameters): true parameters, scaled; shift (n, Q): from the same flights without the effect; flights
-    (n, Q): the flights themselves less the nominal mean.
+    amount (n, parameters): true parameters, scaled, or the strengths that they have; shift (n, Q): from the flight
+    without the effect; coordinates (n, Q): of the flight itself, less the nominal mean.
+    """
+
+    amount: np.ndarray
+    shift: np.ndarray
+    coordinates: np.ndarray
+
+    def chosen(self, which: np.ndarray) -> "ClassFlights":
+        """Some of the flights. which (n,): bool."""
+        return ClassFlights(*(values[which] for values in self))
+
+
+def learn_class(name: str, effect: str, shape: float | None, flights: ClassFlights) -> EffectClass:
+    """A class from flights of it; name, effect, shape: as `EffectClass` has them.
+
     With one parameter the strength is the shift along the class's main direction: what else of a flight makes the
     effect stronger or weaker (a battery's charge, the phase of four rotors) counts as its strength.
     """
+    amount = flights.amount
     if amount.shape[1] == 1:
-        strength = _along_main_direction(shift, np.sign(amount[:, 0]))[:, None]
-        shows = np.abs(strength[:, 0]) > LEAST_SHIFT
-        strength, shift, flights = strength[shows], shift[shows], flights[shows]
+        strength = _along_main_direction(flights.shift, np.sign(amount[:, 0]))
+        flights = flights._replace(amount=strength[:, None]).chosen(np.abs(strength) > LEAST_SHIFT)
     else:
-        strength = amount / np.median(np.abs(amount[amount != 0.0]))
+        flights = flights._replace(amount=amount / np.median(np.abs(amount[amount != 0.0])))
     for _ in range(FITS):
-        learned, near = _fitted(name, effect, shape, strength, shift, flights)
-        strength, shift, flights = strength[near], shift[near], flights[near]
+        learned, near = _fitted(name, effect, shape, flights)
+        flights = flights.chosen(near)
     return learned
 
 
@@ -125,9 +139,9 @@ def _along_main_direction(shift: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return shift @ (direction * np.sign((unit @ direction).sum()))
 
 
-def _fitted(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flights: np.ndarray,
-            ) -> tuple[EffectClass, np.ndarray]:
-    """The class of these flights, and which of them lie about its curve as most do, bool (n,)."""
+def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights) -> tuple[EffectClass, np.ndarray]:
+    """The class of flights whose amounts are strengths, and which of them lie about its curve as most do, bool (n,)."""
+    strength, shift, coordinates = flights
     size = np.linalg.norm(strength, axis=1)
     signed = bool((strength < 0.0).mean() > SIGNED)
     low, high = np.log(np.quantile(size, [WEAKEST_QUANTILE, 1.0]))
@@ -140,7 +154,7 @@ def _fitted(name: str, effect: str, shape: float | None, strength: np.ndarray, s
     length = np.linalg.norm(expected, axis=1)
     distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHED)
     near = distance < OUTLIER * np.median(distance)
-    axes, variances = _scatter(flights[near] - expected[near], length[near], columns.shape[1])
+    axes, variances = _scatter(coordinates[near] - expected[near], length[near], columns.shape[1])
     return EffectClass(name, effect, shape, strength.shape[1], signed, knots,
                        table.reshape(parts.shape[1], len(knots), -1), axes, variances), near
 

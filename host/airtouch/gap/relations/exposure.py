@@ -1,4 +1,4 @@
-"""Disturbances without a name: what flights look like in which something acts that no effect of the registry is.
+"""Nameless disturbances: what flights look like in which something acts that no effect of the registry is.
 
 A random force and torque that follows one of the flight's own signals, a wave or coloured noise, for the whole flight
 or for some seconds; or a property of the plant that no effect of the registry changes. Such flights say what `unknown`
@@ -123,7 +123,7 @@ def _number(name: str) -> Parameter:
     return Parameter(name, "1", 0.0, -FOR_EVER, FOR_EVER, 0.0, name)
 
 
-DISTURBANCE = Effect("disturbance", "a force and torque without a name", tuple(_number(n) for n in NAMES),
+DISTURBANCE = Effect("disturbance", "a nameless force and torque", tuple(_number(n) for n in NAMES),
                      wrench=_disturbance)
 
 

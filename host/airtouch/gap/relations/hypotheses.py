@@ -1,4 +1,4 @@
-"""Hypotheses on a flight and their evidence: effects together, or a disturbance without a name.
+"""Hypotheses on a flight and their evidence: effects together, or a nameless disturbance.
 
 A flight's coordinates are Q values, of which nominal flights have the covariance 1; evidence is in nats.
 """
@@ -20,10 +20,10 @@ SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance in nominal de
 
 @dataclass(frozen=True)
 class LearnedModel:
-    """What was learned from simulated flights: classes of effects, their interaction, disturbances without a name.
+    """What was learned from simulated flights: classes of effects, their interaction, nameless disturbances.
 
     interaction (Q, r): directions, times the standard deviation, in which two effects are not their sum, relative to
-    the size of the smaller one; nameless (Q, r): the same of disturbances without a name, relative to their size.
+    the size of the smaller one; nameless (Q, r): the same of nameless disturbances, relative to their size.
     """
 
     classes: tuple[EffectClass, ...]
@@ -111,7 +111,7 @@ class FlightHypotheses:
         return float(residual @ residual)
 
     def nameless_evidence(self, hypothesis: Hypothesis) -> float:
-        """Evidence over none of a hypothesis with a disturbance without a name beside it, nats."""
+        """Evidence over none of a hypothesis with a nameless disturbance beside it, nats."""
         known = self.rescaling(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
         residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
         axes, size, _ = np.linalg.svd(known(self.model.nameless.T).T, full_matrices=False)

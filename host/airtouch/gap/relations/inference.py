@@ -1,7 +1,7 @@
 """Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect.
 
 `infer` adds effects one by one while each gains enough (`_likeliest`). What then still speaks against them is measured
-in two ways, each with its limit: what a disturbance without a name gains beside them (`_nameless`), and how far the
+in two ways, each with its limit: what a nameless disturbance gains beside them (`_nameless`), and how far the
 flight lies from them (`_distance`).
 """
 
@@ -23,13 +23,13 @@ from airtouch.simulation.effects import get
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
 #: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
-#: nats that a disturbance without a name may gain beside the right effects, whatever their evidence; 7 was tried on
+#: nats that a nameless disturbance may gain beside the right effects, whatever their evidence; 7 was tried on
 #: 2026-11-25 and taken back after the opened set of seed 112233 (host/docs/looks.md)
 LEAST_NAMELESS = 10.0
-#: nats by which two effects must be likelier than one with a disturbance without a name beside it; 36 of 44 wrong
+#: nats by which two effects must be likelier than one with a nameless disturbance beside it; 36 of 44 wrong
 #: pairs, found where the right effect was left out, were not
 OVER_NAMELESS = 30.0
-#: shares of the effects' evidence, beside that of their classes, that a disturbance without a name may gain, because no
+#: shares of the effects' evidence, beside that of their classes, that a nameless disturbance may gain, because no
 #: curve is exact; PAIR: the same for two effects, because they are not a sum; chosen on flights of `learning.SEED`
 CRUDE_NAMELESS, PAIR_NAMELESS = 0.01, 0.01
 #: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
@@ -39,13 +39,13 @@ FAR = 3.5
 MOST_EFFECTS = 3  #: effects that a flight is named to have, at most; chosen
 BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn; chosen
 TEMPERATURE = 2.0  #: divisor of the evidence in probabilities: the densities' tails are heavier than normal; chosen
-Shares = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
+ByClass = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
 
 
 class Against(NamedTuple):
     """Nats that speak against effects, and those that may where the effects are right.
 
-    of_distance: whether they are the excess of a flight's distance, not the gain of a disturbance without a name.
+    of_distance: whether they are the excess of a flight's distance, not the gain of a nameless disturbance.
     """
 
     nats: float
@@ -57,20 +57,17 @@ class Against(NamedTuple):
 class Inference:
     """What the relations of a flight's signals show.
 
-    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none. nameless_alone:
-    nats that a disturbance without a name gains over none. unexplained: nats that speak against the likeliest effects,
-    the gain of a disturbance without a name beside them or the excess of the flight's distance from them, whichever is
-    nearer its limit; limit: nats that may speak against effects that are right; of_distance: see `Against`.
-    readings: parameters of the likeliest effects, of those that the library is calibrated for; without_sign: those of
-    these effects whose sign does not show.
+    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; nameless_alone:
+    nats that a nameless disturbance gains over none; against: what speaks against the likeliest effects, the gain of a
+    nameless disturbance beside them or the flight's distance from them, whichever is nearer its limit; readings:
+    parameters of the likeliest effects, of those that the library is calibrated for; without_sign: those of these
+    effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
     nameless_alone: float
-    unexplained: float
-    limit: float
-    of_distance: bool = False
+    against: Against
     readings: Mapping[str, Reading] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
 
@@ -97,13 +94,12 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
                   key=lambda a: a.nats / a.limit)
     return Inference(
         classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles),
-        nameless_alone=flight.nameless_evidence(flight.none), unexplained=against.nats, limit=against.limit,
-        of_distance=against.of_distance,
-        readings=_readings(best), without_sign=tuple(
-            f.of.effect for f in best.fits if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
+        nameless_alone=flight.nameless_evidence(flight.none), against=against, readings=_readings(best),
+        without_sign=tuple(f.of.effect for f in best.fits
+                           if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
 
 
-def _by_class(library: Library, numbers: np.ndarray) -> Shares:
+def _by_class(library: Library, numbers: np.ndarray) -> ByClass:
     """Numbers (classes,) by the name and shape of their class."""
     return {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, numbers, strict=True)}
 
@@ -118,19 +114,19 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
             for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: Shares) -> Against:
-    """What a disturbance without a name gains beside effects."""
+def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: ByClass) -> Against:
+    """What a nameless disturbance gains beside effects."""
     share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
     return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence, False)
 
 
-def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: Shares, library: Library) -> Against:
+def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: ByClass, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
     share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
     return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence), True)
 
 
-def _largest(of: Hypothesis, shares: Shares) -> float:
+def _largest(of: Hypothesis, shares: ByClass) -> float:
     """Largest share of the classes of a hypothesis, 0 for no class."""
     return max((shares[f.of.name, f.of.shape] for f in of.fits), default=0.0)
 
@@ -146,7 +142,7 @@ def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], second: Shares) -> Hypothesis:
+def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], second: ByClass) -> Hypothesis:
     """The likeliest hypothesis, with no more effects than its evidence supports."""
     best, beam = (singles[0] if singles else flight.none), singles[:BEAM]
     if best.evidence < LEAST_EVIDENCE:

@@ -1,4 +1,4 @@
-"""Flights simulated to learn from: nominal ones, ones with each effect, ones with something that has no name."""
+"""Flights simulated to learn from: nominal ones, ones with each effect, ones with a nameless disturbance."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float]
 
 
 def disturbed_flights(scene: Scene, count: int) -> Iterator[tuple[int, np.ndarray]]:
-    """Number and features of flights in which something acts that has no name."""
+    """Number and features of flights with a nameless disturbance."""
     for number in range(count):
         made = fly(scene, number, exposure.draw(np.random.default_rng([SEED, number, 1])))
         if made is not None:

@@ -34,7 +34,7 @@ class Library:
     less the middle.
     distance: median and standard deviation of the squared length of coordinates of nominal flights that were not
     learned from.
-    nameless_share, second_share (classes,): nats that a disturbance without a name, or a second effect, gains beside
+    nameless_share, second_share (classes,): nats that a nameless disturbance, or a second effect, gains beside
     the class, over the evidence for it; four of five flights with it have at most so much.
     distance_scatter (classes,): scatter of the nats by which a flight with the class lies farther from it than nominal
     flights from none, over the evidence, beside the scatter of nominal flights.
@@ -77,7 +77,7 @@ class Library:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
         return 0.5 * (squared - self.distance[0])
 
-    def nominal(self, coordinates: np.ndarray) -> bool:
+    def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
         middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
         return self.excess(middle) < MOST_DEVIATIONS * self.nominal_scatter
@@ -158,4 +158,4 @@ def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Libra
     found = shipped()
     if not known or len(known) < len(nominal) or replace(load(found.vehicle), name=vehicle.name) != vehicle:
         return None
-    return found if found.nominal(found.coordinates(np.array(known))) else None
+    return found if found.lies_as_nominal(found.coordinates(np.array(known))) else None

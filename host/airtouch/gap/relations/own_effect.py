@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.gap.relations.build import HALVINGS, WEAKEST_SHIFT
 from airtouch.gap.relations.calibration import HIGHEST_START, ClassCalibration, calibrate_class, with_calibrations
-from airtouch.gap.relations.effect_class import learn_class
+from airtouch.gap.relations.effect_class import ClassFlights, learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, halved, scaled
 from airtouch.gap.relations.library import SHARES, Library
 from airtouch.gap.second_process import map_on_two_cores
@@ -59,7 +59,7 @@ def _with_class(library: Library, scene: Scene, name: str) -> Library:
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))
     amount = amount[:, np.abs(amount).max(axis=0) > 0.0]
-    own = learn_class(name, name, None, amount, flight - nominal, flight)
+    own = learn_class(name, name, None, ClassFlights(amount, flight - nominal, flight))
     known = [ClassCalibration(c.readout, *shares) for c, *shares in zip(
         library.model.classes, library.nameless_share, library.second_share, library.distance_scatter, strict=True)]
     uncalibrated = with_calibrations(

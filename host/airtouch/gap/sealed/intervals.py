@@ -1,14 +1,27 @@
 """Shares, medians and areas of a score, each with n and a 95 % interval."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 DRAWS = 1000  #: bootstrap samples; chosen, the ends of an interval then vary little
 ENDS = (2.5, 97.5)  #: percentiles of the bootstrap between which the 95 % interval lies
 
-Figure = dict[str, float | None]
+
+class Figure(TypedDict, total=False):
+    """A figure of a score, JSON-ready: its value with a 95 % interval, None where nothing is known, of n cases.
+
+    hits: cases that count, of a share; median: over cases, of a pooled share; probability: that was said, of a bin.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
+    n: int
+    hits: int
+    median: float | None
+    probability: float
 
 
 def share(values: Iterable[Any]) -> Figure:

@@ -19,6 +19,7 @@ def mapper(address: str, plugins: Sequence[str] = ()) -> Callable[[Callable, Ite
     client = cluster.connect(address)
 
     def run(function: Callable, items: Iterable[Any]) -> Iterator[Any]:
+        """`map`, by the workers of the cluster."""
         return in_order(lambda item: client.submit(_one, function, item, tuple(plugins), pure=False, retries=3), items,
                         AHEAD)
 
@@ -26,6 +27,7 @@ def mapper(address: str, plugins: Sequence[str] = ()) -> Callable[[Callable, Ite
 
 
 def _one(function: Callable, item: Any, plugins: Sequence[str]) -> Any:
+    """The function of one item, on a worker that registers the effects first."""
     for text in plugins:
         load_text(text)
     return function(item)

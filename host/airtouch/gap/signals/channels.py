@@ -125,6 +125,7 @@ def angular_acceleration(flight: Flight) -> np.ndarray:
     Worked out once for a flight, and not to be changed.
     """
     def make() -> np.ndarray:
+        """Differences to the next sample, straight lines over those that bridge lost rows."""
         out = np.zeros((len(flight), 3))
         if flight.rates is not None:
             out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S

@@ -98,6 +98,7 @@ class CommandView:
     def _of_blocks(self, number: int, spectra: np.ndarray) -> CommandElements:
         """The elements of a flight's blocks (blocks, bins, AXES)."""
         def each(table: np.ndarray) -> np.ndarray:
+            """The table's entry for each element."""
             return np.broadcast_to(table, spectra.shape).ravel()
 
         return CommandElements(
@@ -135,7 +136,7 @@ class CommandView:
         out = self.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT
         for flight, _, e in self.edges:
-            out[at:at + edge_response.COUNT] -= edge_effects.expected(self._edge_floor, flight, e, active)
+            out[at:at + edge_response.COUNT] -= edge_effects.added_response(self._edge_floor, flight, e, active)
             at += edge_response.COUNT
         return out
 

@@ -72,6 +72,7 @@ def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
 def _without(flight: Flight, rows: np.ndarray) -> Flight:
     """The flight as if some rows, bool (n,), had been lost as well."""
     def bridged(values: np.ndarray) -> np.ndarray:
+        """Values (n, c) with straight lines over the rows."""
         return interpolate_missing(np.where(rows[:, None], np.nan, values))
 
     rates = None if flight.rates is None else bridged(flight.rates)

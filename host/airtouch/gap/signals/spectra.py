@@ -70,7 +70,7 @@ def squared(values: np.ndarray) -> np.ndarray:
     return values.real ** 2 + values.imag ** 2
 
 
-def judged(regime: str) -> np.ndarray:
+def judged_bins(regime: str) -> np.ndarray:
     """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
 
     In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
@@ -112,39 +112,53 @@ class Floor:
         return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least)
 
 
-def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: Sequence[dict[str, np.ndarray]],
-             spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray, bridging: Sequence[np.ndarray]) -> Floor:
-    """The floor of flights declared nominal, from what the calibrated model leaves of them.
+@dataclass(frozen=True)
+class NominalBlocks:
+    """A flight declared nominal and its blocks.
 
-    flights: one or more. residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first
-    samples and the spectra; least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz
-    (angular acceleration: of its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT)
-    that lost rows add in the air; it is taken off, as each flight has its own, but for what is left by chance.
+    residual (n, COUNT): what the calibrated model leaves of it; first, spectra: by regime the first samples (blocks,)
+    and the spectra (blocks, bins, COUNT) of the blocks; bridging (blocks, bins, COUNT): power that lost rows add in the
+    air.
     """
-    powers = {r: np.abs(np.concatenate([s[r] for s in spectra])) ** 2 for r in (AIR, REST)}
-    in_air, slopes = _power_in_air(flights, first, powers[AIR], bridging)
+
+    flight: Flight
+    residual: np.ndarray
+    first: dict[str, np.ndarray]
+    spectra: dict[str, np.ndarray]
+    bridging: np.ndarray
+
+
+def floor_of(nominal: Sequence[NominalBlocks], least: np.ndarray) -> Floor:
+    """The floor of flights declared nominal, one or more, from what the calibrated model leaves of them.
+
+    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
+    its difference), below which the floor never goes. What lost rows add is taken off, as each flight has its own, but
+    for what is left by chance.
+    """
+    flights = [n.flight for n in nominal]
+    powers = {r: np.abs(np.concatenate([n.spectra[r] for n in nominal])) ** 2 for r in (AIR, REST)}
+    in_air, slopes = _power_in_air(nominal, powers[AIR])
     power = {AIR: _floor_power(in_air, sensor_power(least, AIR)),
              REST: _floor_power(powers[REST], sensor_power(least, REST))}
-    offset, beyond = _between(flights, residuals, power[AIR][0])
+    offset, beyond = _between(nominal, power[AIR][0])
     return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
                  clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
                  lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
                  slopes=slopes, least=LEAST_FLOOR * sensor_power(least, AIR))
 
 
-def _power_in_air(flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]], power: np.ndarray,
-                  bridging: Sequence[np.ndarray]) -> tuple[np.ndarray, Slopes | None]:
+def _power_in_air(nominal: Sequence[NominalBlocks], power: np.ndarray) -> tuple[np.ndarray, Slopes | None]:
     """Power (blocks, bins, COUNT) as if all blocks were flown alike, and its slopes with how hard they are flown.
 
-    power: of all blocks in the air; bridging: what lost rows add to them, taken off. As it is, without slopes, for too
-    few blocks.
+    power: of all blocks in the air, from which what lost rows add is taken off. As it is, without slopes, for too few
+    blocks.
     """
     if len(power) < FEWEST_BLOCKS:
         return power, None
-    hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR]) for f, s in zip(flights, first, strict=True)])
+    hardness = np.concatenate([hardness_of(n.flight, n.first[AIR], LENGTH[AIR]) for n in nominal])
     trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= TORQUE.start)
     slopes = slopes_of(power, hardness, frequencies(AIR), trim)
-    own = np.maximum(power - np.concatenate(bridging), LEAST_LEFT * power)
+    own = np.maximum(power - np.concatenate([n.bridging for n in nominal]), LEAST_LEFT * power)
     return own / slopes.level(hardness), slopes
 
 
@@ -155,16 +169,15 @@ def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0))), LEAST_FLOOR * sensor)
 
 
-def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest: np.ndarray,
-             ) -> tuple[np.ndarray, np.ndarray]:
+def _between(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviation (COUNT,) of flights' means in the air, as measured and beyond chance.
 
-    Chance is what the power in the lowest bin gives the means.
+    Chance is what the floor's power in the lowest bin, lowest (COUNT,), gives the means.
     """
-    if len(flights) < 2:
+    if len(nominal) < 2:
         return np.zeros(COUNT), np.zeros(COUNT)
-    air = [(f.phase != GROUND) & f.usable for f in flights]
-    means = np.array([r[a].mean(axis=0) for r, a in zip(residuals, air, strict=True)])
+    air = [(n.flight.phase != GROUND) & n.flight.usable for n in nominal]
+    means = np.array([n.residual[a].mean(axis=0) for n, a in zip(nominal, air, strict=True)])
     variance = np.nan_to_num(means.var(axis=0, ddof=1))
     chance = HANN_POWER * lowest * np.mean([1.0 / max(a.sum() * PERIOD_S, PERIOD_S) for a in air])
     return np.sqrt(variance), np.sqrt(np.maximum(variance - chance, 0.0))

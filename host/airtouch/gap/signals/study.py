@@ -17,8 +17,8 @@ from airtouch.simulation.effects.effect import Gate
 from airtouch.vehicle import Vehicle
 
 if TYPE_CHECKING:  # folders below this one
+    from airtouch.gap.nameless.columns import NamelessFloor
     from airtouch.gap.relations.library import Library
-    from airtouch.gap.unnamed.columns import NamelessFloor
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Study:
 
     vehicle, calibration: the model without effects; controller: the nominal loops, None without them; floor: power of
     the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; nameless_floor:
-    scatter of nominal flights in the nameless model (`unnamed.columns.NamelessFloor`); nominal: how many nominal
+    scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`); nominal: how many nominal
     flights there are; scatter: how strong effects seem to be in them, None without any; relations: what was learned of
     such flights (`relations.library.Library`), if anything; overhead: when another vehicle is known to be overhead,
     none where nobody knows.

@@ -89,6 +89,7 @@ def term_of(effect: NamedEffect) -> Term:
     values = {k: q.value for k, q in effect.parameters.items()}
 
     def distance(term: Term) -> float:
+        """How far the values that a fit of the term leaves alone are from the named ones."""
         return sum(abs(values.get(k, v) - v) for k, v in term.values.items() if k not in term.free)
 
     nearest = min(terms(effect.name), key=distance)

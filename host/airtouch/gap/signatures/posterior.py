@@ -48,6 +48,6 @@ def updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, wort
     return float(max(mean, class_mean)), max(spread, least)
 
 
-def moments(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
+def mean_and_deviation(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
     """Mean and standard deviation (unbiased) of values."""
     return float(np.mean(values)), float(np.std(values, ddof=1))

@@ -41,12 +41,12 @@ class Kind:
         return Active(effect, effect.values(neutral | self.make(strength, rng)))
 
 
-def _one(parameter: str, signed: bool = False) -> Callable[[float, np.random.Generator], Values]:
+def _equal(parameter: str, signed: bool = False) -> Callable[[float, np.random.Generator], Values]:
     """A parameter equal to the strength, with a random sign where it is signed."""
     return lambda s, rng: {parameter: s * (rng.choice([-1.0, 1.0]) if signed else 1.0)}
 
 
-def _times(parameter: str, signed: bool = True) -> Callable[[float, np.random.Generator], Values]:
+def _factor(parameter: str, signed: bool = True) -> Callable[[float, np.random.Generator], Values]:
     """A parameter that is a factor: 1 + s, or, where it is signed, that or 1 / (1 + s) by chance."""
     return lambda s, rng: {parameter: (1.0 + s) ** (rng.choice([-1.0, 1.0]) if signed else 1.0)}
 
@@ -57,7 +57,7 @@ def _in_classes(effect: str, parameter: str) -> Callable[[float, np.random.Gener
     return lambda s, rng: {parameter: s, signature.class_by: float(rng.choice(signature.class_values))}
 
 
-def _around(s: float, rng: np.random.Generator) -> Values:
+def _horizontal(s: float, rng: np.random.Generator) -> Values:
     """A horizontal vector of length s and random direction."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     return {"x": s * float(np.cos(angle)), "y": s * float(np.sin(angle))}
@@ -74,30 +74,30 @@ def _bias(s: float, rng: np.random.Generator) -> Values:
 #: chosen for a small quadrotor that still flies; no measurement
 KINDS: dict[str, Kind] = {
     "ground_effect": Kind("ground_effect", 2.0, lambda s, rng: {"strength": s, "turbulence": 0.3}),
-    "rotor_drag": Kind("rotor_drag", 0.06, _one("horizontal")),
-    "wind": Kind("wind", 0.8, _around),
+    "rotor_drag": Kind("rotor_drag", 0.06, _equal("horizontal")),
+    "wind": Kind("wind", 0.8, _horizontal),
     "gust": Kind("gust", 1.0, _in_classes("gust", "rms")),
-    "blade_flapping": Kind("blade_flapping", 0.1, _one("tilt")),
-    "motor_lag": Kind("motor_lag", 1.0, _times("factor")),
+    "blade_flapping": Kind("blade_flapping", 0.1, _equal("tilt")),
+    "motor_lag": Kind("motor_lag", 1.0, _factor("factor")),
     "motor_noise": Kind("motor_noise", 0.1, _in_classes("motor_noise", "rms")),
-    "thrust_coefficient": Kind("thrust_coefficient", 0.2, _one("loss", signed=True)),
+    "thrust_coefficient": Kind("thrust_coefficient", 0.2, _equal("loss", signed=True)),
     "weak_motor": Kind("weak_motor", 0.3, _in_classes("weak_motor", "thrust_loss")),
     "battery_sag": Kind("battery_sag", 1.5, lambda s, rng: {"strength": s, "charge": float(rng.uniform(0.6, 0.95))}),
-    "mass": Kind("mass", 0.25, _one("fraction")),
-    "com_offset": Kind("com_offset", 0.006, _around),
-    "inertia": Kind("inertia", 1.0, _one("fraction")),
+    "mass": Kind("mass", 0.25, _equal("fraction")),
+    "com_offset": Kind("com_offset", 0.006, _horizontal),
+    "inertia": Kind("inertia", 1.0, _equal("fraction")),
     "slung_load": Kind("slung_load", 0.008, _in_classes("slung_load", "load")),
     "imu_bias": Kind("imu_bias", 3.0, _bias),
-    "imu_noise": Kind("imu_noise", 4.0, _times("factor", signed=False)),
-    "vibration": Kind("vibration", 3.0, _one("amplitude")),
-    "sensor_latency": Kind("sensor_latency", 0.012, _one("delay")),
-    "actuator_delay": Kind("actuator_delay", 0.02, _one("delay")),
-    "time_jitter": Kind("time_jitter", 0.01, _one("rms")),
-    "packet_loss": Kind("packet_loss", 0.1, _one("share")),
+    "imu_noise": Kind("imu_noise", 4.0, _factor("factor", signed=False)),
+    "vibration": Kind("vibration", 3.0, _equal("amplitude")),
+    "sensor_latency": Kind("sensor_latency", 0.012, _equal("delay")),
+    "actuator_delay": Kind("actuator_delay", 0.02, _equal("delay")),
+    "time_jitter": Kind("time_jitter", 0.01, _equal("rms")),
+    "packet_loss": Kind("packet_loss", 0.1, _equal("share")),
     "range_step": Kind("range_step", 0.12,
                        lambda s, rng: {"residual": s * float(rng.choice([-1.0, 1.0])), "kick": 0.0}),
-    "flow_scale": Kind("flow_scale", 0.3, _one("share")),
-    **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop))
+    "flow_scale": Kind("flow_scale", 0.3, _equal("share")),
+    **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _factor(loop))
        for loop in ("rate", "attitude", "position", "height")},
 }
 STEPS = 3.0  #: natural steps of a parameter up to which an effect that KINDS lacks is drawn; chosen
@@ -118,6 +118,7 @@ def _any_direction(effect: Effect) -> Callable[[float, np.random.Generator], Val
     free = [p for p in effect.parameters if p.name in free_of(effect)]
 
     def make(s: float, rng: np.random.Generator) -> Values:
+        """Values at a strength; of a parameter that lies on one side of neutral alone, on that side."""
         direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
         direction /= np.linalg.norm(direction)
         out = {}

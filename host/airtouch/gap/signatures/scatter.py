@@ -36,7 +36,7 @@ class ApparentStrengths:
     """One nominal flight compared with others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains; passing: size (`size_of`) of each effect that comes
+    chance; rate: nats a second that the nameless model gains; passing: size (`size_of`) of each effect that comes
     and goes.
     """
 
@@ -80,10 +80,11 @@ class Scatter:
 
         The strength is nominal scatter, Student's with `freedom`, plus a chance error, normal with `covariance` (k, k);
         the likeliest split of the two counts, after each further parameter has paid for itself. Parameters that make
-        up for one another thus count together, and one that the data leave open says nothing. None: no chance error.
-        apart (k,): half of what two halves of the flights differ by; of
-        all strengths between theirs the one of least evidence counts. A parameter that the table does not know yet
-        scatters as the widest of its effect's others.
+        up for one another thus count together, and one that the data leave open says nothing. A parameter that the
+        table does not know yet scatters as the widest of its effect's others.
+
+        covariance: None for no chance error. apart (k,): half of what two halves of the flights differ by; of all
+        strengths between theirs the one of least evidence counts.
         """
         rms = self.rms.get(name)
         if rms is None or not len(strength):
@@ -117,7 +118,7 @@ class Scatter:
         return self._rare(nominal, further) + 0.5 * float((fitted - nominal) @ precision @ (fitted - nominal))
 
     def allowed(self, seconds: float, least: float) -> float:
-        """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
+        """Log likelihood that the nameless model may gain in a nominal flight of so many seconds.
 
         least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
         """

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import poch
 
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.posterior import LEAST, moments, standard_deviation, updated
+from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, standard_deviation, updated
 from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, table
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
@@ -44,8 +45,9 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
         best = max(likelihood, key=likelihood.__getitem__)
         own, simulated = classes[best], best == SIMULATED  # whose flights are all drawn alike
     worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
-    middle = _updated_middle(own, known, worth)
-    rms = _updated_rms(own, known, middle, math.sqrt(widening), worth, LEAST if simulated else LEAST_RECORDED)
+    update = Update(own, known, worth)
+    middle = _updated_middle(update)
+    rms = _updated_rms(update, middle, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
     passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
     rate = updated(own.rate, np.sqrt([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=middle, exact=simulated)
@@ -72,9 +74,9 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
                              else [pooled])
     # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
-    passing = {n: moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
     roots = np.sqrt([f.rate for f in alike])
-    rate = moments(np.minimum(roots, np.quantile(roots, WINSOR)))
+    rate = mean_and_deviation(np.minimum(roots, np.quantile(roots, WINSOR)))
     return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
 
 
@@ -86,9 +88,17 @@ def _possible_classes(recorded: bool, vehicle: str, one_trim: bool | None) -> di
     return of_vehicle if vehicle and of_vehicle else classes
 
 
-def _updated_middle(own: Scatter, known: Sequence[ApparentStrengths], worth: float) -> dict[str, np.ndarray]:
-    """Mean strength (k,) of each random effect: of the class, which counts as `worth` flights, and of the baseline."""
-    middle = {}
+class Update(NamedTuple):
+    """A class's scatter, which counts as `worth` flights, and the flights of the baseline by which it is updated."""
+
+    own: Scatter
+    known: Sequence[ApparentStrengths]
+    worth: float
+
+
+def _updated_middle(update: Update) -> dict[str, np.ndarray]:
+    """Mean strength (k,) of each random effect, of the class and of the baseline."""
+    middle, (own, known, worth) = {}, update
     for name in own.rms:
         if name in own.middle:
             rows = [f for f in known if name in f.strengths]
@@ -97,14 +107,14 @@ def _updated_middle(own: Scatter, known: Sequence[ApparentStrengths], worth: flo
     return middle
 
 
-def _updated_rms(own: Scatter, known: Sequence[ApparentStrengths], middle: Mapping[str, np.ndarray], widening: float,
-                 worth: float, least: float) -> dict[str, np.ndarray]:
+def _updated_rms(update: Update, middle: Mapping[str, np.ndarray], widening: float, least: float,
+                 ) -> dict[str, np.ndarray]:
     """Scatter (k,) of each effect's strength about its middle, by the baseline's flights, at least `least`.
 
     widening: factor of the baseline's scatter. The log's times are known exactly and differ from day to day: their
     scatter is not less than the class's.
     """
-    rms = {}
+    rms, (own, known, worth) = {}, update
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
         centre = middle.get(name, np.zeros(len(prior)))
@@ -164,6 +174,7 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
 
     def highest(rates: Iterable[Pair]) -> Pair:
+        """The pair that reaches highest: mean and one standard deviation."""
         return max(rates, key=lambda r: r[0] + r[1])
 
     passing = {n: highest(c.passing[n] for c in classes if n in c.passing)

@@ -132,6 +132,7 @@ class Term:
         return out
 
     def _parameter(self, name: str) -> Parameter:
+        """The parameter of a name."""
         return parameter_of(self.effect, name)
 
 
@@ -143,6 +144,7 @@ def mean_places(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
     mean = [t for t in terms if t.shows_in == MEAN]
     ends = itertools.accumulate(len(t.free) for t in mean)
     return [(t, slice(end - len(t.free), end)) for t, end in zip(mean, ends, strict=True)]
+
 
 def parameter_of(effect: Effect, name: str) -> Parameter:
     """The parameter of an effect with a name."""

@@ -36,6 +36,7 @@ class Sums:
         row = row.ravel()
 
         def total(values: np.ndarray) -> np.ndarray:
+            """Sums (phases of flights, ...) of values (b, ...)."""
             out = np.zeros((len(keys), *values.shape[1:]))
             np.add.at(out, row, values)
             return out
@@ -54,7 +55,7 @@ def join(parts: Sequence[Sums]) -> Sums:
                 *(np.concatenate([getattr(p, key) for p in parts]) for key in ("weight", "power", "mean")))
 
 
-def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
+def block_sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
     """Block sums of one flight's residual (n, COUNT), in the channels' units; lost samples are left out."""
     member = regimes(flight, vehicle)
     parts: list[tuple] = []

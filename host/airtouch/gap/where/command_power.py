@@ -1,6 +1,7 @@
 """Mean power spectra of the commands, as flown and as nominal flights have them: what a report shows of the loop."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,21 +25,28 @@ def command_power(flight: Flight, vehicle: Vehicle) -> CommandPower:
     return CommandPower((np.abs(spectra) ** 2).sum(axis=0), len(spectra))
 
 
-def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower]) -> dict[str, Any]:
-    """Mean spectra of some flights and of nominal ones, JSON-ready; empty without a steady stretch in flight."""
-    blocks, nominal_blocks = (sum(p.blocks for p in powers) for powers in (flown, nominal))
-    if not blocks:
-        return {}
-    content: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
-    mean = np.sum([p.total for p in flown], axis=0) / blocks
-    of_nominal = np.sum([p.total for p in nominal], axis=0) / nominal_blocks if nominal_blocks else None
-    for i, axis in enumerate(AXES):
-        content[axis] = {"flown": mean[:, i].tolist()}
-        if of_nominal is not None:
-            content[axis]["nominal"] = of_nominal[:, i].tolist()
-    return content
+@dataclass(frozen=True)
+class MeanSpectra:
+    """Mean power spectra (bins,) of the command of each axis, N^2/Hz, of some flights and of nominal ones, if any."""
+
+    frequency_hz: np.ndarray
+    flown: Mapping[str, np.ndarray]
+    nominal: Mapping[str, np.ndarray]
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready, by axis."""
+        of_nominal = {axis: {"nominal": power.tolist()} for axis, power in self.nominal.items()}
+        return {"unit": "N^2/Hz", "frequency_hz": self.frequency_hz.tolist(),
+                **{axis: {"flown": power.tolist(), **of_nominal.get(axis, {})} for axis, power in self.flown.items()}}
 
 
-def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:
-    """`mean_spectra` of flights."""
-    return mean_spectra(*([command_power(f, vehicle) for f in some] for some in (flights, nominal)))
+def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower]) -> MeanSpectra | None:
+    """Mean spectra of some flights and of nominal ones; None without a steady stretch in flight."""
+    of_flown, of_nominal = _mean_by_axis(flown), _mean_by_axis(nominal)
+    return MeanSpectra(frequencies(), of_flown, of_nominal) if of_flown else None
+
+
+def _mean_by_axis(powers: Sequence[CommandPower]) -> dict[str, np.ndarray]:
+    """Mean power (bins,) over all blocks, by axis; empty without a block."""
+    blocks = sum(p.blocks for p in powers)
+    return dict(zip(AXES, (np.sum([p.total for p in powers], axis=0) / blocks).T, strict=True)) if blocks else {}

@@ -21,7 +21,7 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.where.band_sums import Sums, join, sums
+from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
@@ -40,6 +40,19 @@ class Part:
     after: Sums | None
     has_gyro: bool
     alone: tuple[Sums, ...] = ()  #: sums with one of the effects in the model each, where there are several
+
+
+@dataclass(frozen=True)
+class MapSums:
+    """The block sums of all flights: without effects, with those named in the model, with each of these by itself.
+
+    effects: their names; alone: in the order of these.
+    """
+
+    before: Sums
+    after: Sums | None
+    alone: Sequence[Sums]
+    effects: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -73,7 +86,7 @@ def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     gap = study.residual(flight)
     after = _sums_with(study, flight, terms) if terms else None
-    return Part(flight.name, sums(flight, gap, study.vehicle), after, flight.rates is not None,
+    return Part(flight.name, block_sums(flight, gap, study.vehicle), after, flight.rates is not None,
                 tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
@@ -87,9 +100,9 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
              else [after] if after is not None else [])
     no_gyro = not any(p.has_gyro for p in parts)
-    cells: list[Cell] = []
+    map_sums, cells = MapSums(joined, after, alone, effects), []
     for phase in range(len(KINDS)):
-        tables = _phase_tables(phase, joined, after, alone, phase_floor(floors, phase), effects)
+        tables = _phase_tables(phase, map_sums, phase_floor(floors, phase))
         if tables is not None:
             cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
@@ -101,7 +114,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
     as gap.
     """
-    gap = sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
+    gap = block_sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
     random = random_of(terms)
     if not random or not len(gap.phase):
         return gap
@@ -131,7 +144,7 @@ def _rms(of_sums: Sums, phase: int) -> np.ndarray:
     return np.sqrt(of_sums.power[rows].sum(axis=0) / samples[:, None, None])
 
 
-def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
+def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
           floor: np.ndarray) -> np.ndarray:
     """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
     with np.errstate(invalid="ignore"):
@@ -140,14 +153,14 @@ def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
     return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _phase_tables(phase: int, before: Sums, after: Sums | None, alone: Sequence[Sums],
-                  floor: tuple[np.ndarray, np.ndarray], effects: Sequence[str]) -> PhaseTables | None:
-    """The tables of a phase, None where no flight has it. alone: with each of the effects by itself in the model."""
-    table = table_of(before, phase, seed=phase)
+def _phase_tables(phase: int, of_map: MapSums, floor: tuple[np.ndarray, np.ndarray]) -> PhaseTables | None:
+    """The tables of a phase, None where no flight has it. floor: and its upper end, (regimes, bands, COUNT) each."""
+    table = table_of(of_map.before, phase, seed=phase)
     if table is None:
         return None
-    table_after = table_of(after, phase, seed=phase) if after is not None else None
-    best = _best([_rms(a, phase) for a in alone], effects, table.rms, floor[0]) if table_after else None
+    table_after = table_of(of_map.after, phase, seed=phase) if of_map.after is not None else None
+    best = _best_effect([_rms(a, phase) for a in of_map.alone], of_map.effects, table.rms, floor[0]) \
+        if table_after else None
     return PhaseTables(KINDS[phase], table, table_after, *floor, best)
 
 

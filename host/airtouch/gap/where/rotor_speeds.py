@@ -1,6 +1,7 @@
 """Speeds of the rotors in the air, as logged and as modelled."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,21 @@ from airtouch.simulation import replay
 LEAST_RPM = 500.0  #: 1/min from which a rotor is logged to turn; chosen, far below any hover
 MOST_TURNING = 0.5  #: share of the samples in the air above which it must be; chosen
 LEAST_MODELLED_RPM = 1.0  #: 1/min by which a logged speed is divided at least; chosen
+
+
+class RotorSpeed(NamedTuple):
+    """Speed of a rotor, 1 to 4, in the air: mean over flights as logged and as modelled, 1/min.
+
+    ratio: of the two, mean over flights, with its least and largest (low, high); flights: how many log it.
+    """
+
+    rotor: int
+    logged: float
+    modelled: float
+    ratio: float
+    low: float
+    high: float
+    flights: int
 
 
 def rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
@@ -28,8 +44,8 @@ def rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
                      np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
 
 
-def speeds_over_flights(speeds: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
-    """Mean logged and modelled speed of each rotor, 1/min, and their ratio with its range over the flights.
+def speeds_over_flights(speeds: Sequence[np.ndarray | None]) -> tuple[RotorSpeed, ...]:
+    """Speed of each rotor over the flights.
 
     speeds: (2, 4) of each flight, see `rotor_speeds`. A rotor that no flight logs is left out.
     """
@@ -39,7 +55,6 @@ def speeds_over_flights(speeds: Sequence[np.ndarray | None]) -> tuple[dict[str, 
         if len(pairs):
             ratio = pairs[:, 0] / np.maximum(pairs[:, 1], LEAST_MODELLED_RPM)
             logged, modelled = pairs.mean(axis=0)
-            out.append({"rotor": rotor + 1, "logged": float(logged), "modelled": float(modelled),
-                        "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
-                        "flights": len(pairs)})
+            out.append(RotorSpeed(rotor + 1, float(logged), float(modelled), float(ratio.mean()), float(ratio.min()),
+                                  float(ratio.max()), len(pairs)))
     return tuple(out)

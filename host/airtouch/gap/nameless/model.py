@@ -13,16 +13,16 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
+from airtouch.gap.nameless.basis import BASIS
+from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
+from airtouch.gap.nameless.powers import power_floor, power_gain
+from airtouch.gap.nameless.regression import HalfResiduals, coefficients, column_floor, linear_gain
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.basis import BASIS
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
-from airtouch.gap.unnamed.powers import power_floor, power_gain
-from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, column_floor, linear_gain
 
 LIFT, OF_HEIGHT = 2, ("near", "low", "height")  #: channel of the force along the thrust; columns of the height
 
 
-def nameless_gain(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
+def held_out_gains(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
     """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
 
     terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated

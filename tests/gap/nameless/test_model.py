@@ -7,12 +7,12 @@ import pytest
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless import model
+from airtouch.gap.nameless.basis import BASIS
+from airtouch.gap.nameless.columns import WIDEST
+from airtouch.gap.nameless.regression import HalfResiduals, coefficients
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signatures import candidates
-from airtouch.gap.unnamed import nameless
-from airtouch.gap.unnamed.basis import BASIS
-from airtouch.gap.unnamed.columns import WIDEST
-from airtouch.gap.unnamed.regression import HalfResiduals, coefficients
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench
@@ -38,7 +38,7 @@ def sideways():
 
 def gain_of(study, flights):
     data = Data(study, flights)
-    return sum(nameless.nameless_gain(data, halves(data), [(), ()]))
+    return sum(model.held_out_gains(data, halves(data), [(), ()]))
 
 
 def test_nominal_flights_of_other_seeds_have_nothing_left(study):
@@ -66,8 +66,8 @@ def test_an_effect_with_its_name_beats_the_model_without(study):
     fits = [fit.fit(data, p, (term,)) for p in parts]
     effect_gain = sum(fit.judge(data, parts[1 - k], f.terms) - fit.judge(data, parts[1 - k], ())
                       for k, f in enumerate(fits))
-    before = sum(nameless.nameless_gain(data, parts, [(), ()]))
-    after = sum(nameless.nameless_gain(data, parts, [f.terms for f in fits]))
+    before = sum(model.held_out_gains(data, parts, [(), ()]))
+    after = sum(model.held_out_gains(data, parts, [f.terms for f in fits]))
     assert 30.0 < before < effect_gain and after < 0.15 * effect_gain
 
 
@@ -76,10 +76,10 @@ def beside(study, term, values, seed):
     data = Data(study, fly(1, seed, {term.name: values}))
     parts = halves(data)
     fits = [fit.fit(data, p, [term]).terms for p in parts]
-    gain = nameless.nameless_gain(data, parts, fits)[0]
+    gain = model.held_out_gains(data, parts, fits)[0]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nameless, "allowed_columns", lambda *_: np.ones(WIDEST, bool))
-        return gain, nameless.nameless_gain(data, parts, fits)[0]
+        patch.setattr(model, "allowed_columns", lambda *_: np.ones(WIDEST, bool))
+        return gain, model.held_out_gains(data, parts, fits)[0]
 
 
 def test_what_answers_a_random_torque_is_not_new_beside_it(study):

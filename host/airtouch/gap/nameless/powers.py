@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, above_means, band_cells, channel_cells, sensor_cells
+from airtouch.gap.nameless.columns import NOTHING, NamelessFloor
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
-from airtouch.gap.unnamed.columns import NOTHING, NamelessFloor
 
 BELIEF = 2.0  #: nominal flights that the scatter of all channels together counts as in the band of one; chosen
 #: Least standard deviation of the logarithm of power between flights, simulated and recorded: no effect's spectrum, and

@@ -14,12 +14,12 @@ from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data, command_torque
 from airtouch.gap.evidence.problem import BlockSet, Problem
 from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.nameless.basis import BASIS, basis
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.basis import BASIS, basis
 
 CHANNELS = 9  #: that are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
@@ -64,7 +64,7 @@ class Regressors:
         return self.columns.shape[1] - len(self.offsets)
 
     def precision(self, floor: NamelessFloor) -> np.ndarray:
-        """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
+        """Inverse variances (free + offsets,) of the priors of coefficients in a nominal flight, and of the offsets."""
         nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
@@ -93,6 +93,7 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
 def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
     """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
     def make() -> list[list[dict[str, np.ndarray]]]:
+        """The spectra, by flight and axis."""
         out = []
         for flight, first in zip(data.flights, data.first, strict=True):
             signals = basis(flight, data.study.vehicle)
@@ -108,6 +109,7 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
     Each band's alone, weighted as what is left of the torque is; made once.
     """
     def make() -> list[np.ndarray]:
+        """The spectra, by flight."""
         f, response = frequencies(AIR), data.study.response
         bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
         bands[:FIRST_BIN] = False

@@ -10,7 +10,7 @@ finds where they do; so the means alone must be as far apart as such normal vari
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -44,20 +44,28 @@ FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most th
 FIRST = 900_000  #: number of the first flight, beyond those of any set
 
 
-def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], seed: int,
-            part_seen: Callable[[FlightLog], FlightLog]) -> float | None:
-    """Strength that is just detected on such flights; None where the highest plausible one is not.
+@dataclass(frozen=True)
+class Conditions:
+    """What the test is made on.
 
-    without: flights free of effects, other than those that the study was calibrated on.
-    part_seen: what the diagnosis gets to see of a log.
+    study: of the vehicle; scenario: in which it flies; without: flights free of effects, other than those that the
+    study was calibrated on; part_seen: what the diagnosis gets to see of a log.
     """
+
+    study: Study
+    scenario: str
+    without: Sequence[Data]
+    part_seen: Callable[[FlightLog], FlightLog]
+
+
+def weakest(kind: Kind, conditions: Conditions, seed: int) -> float | None:
+    """Strength that is just detected under the conditions; None where the highest plausible one is not."""
     seeds = [seed, sum(map(ord, kind.effect)), int(1e6 * kind.highest)]
 
     def detected(strength: float) -> bool:
         """Whether the test tells flights with the effect at a strength from those without."""
         return detectable(*_log_ratios(
-            [kind.active(strength, np.random.default_rng([*seeds, i])) for i in range(TRIES)],
-            study, scenario, without, part_seen))
+            [kind.active(strength, np.random.default_rng([*seeds, i])) for i in range(TRIES)], conditions))
 
     if not detected(kind.highest):
         return None
@@ -68,16 +76,16 @@ def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], se
     return float(np.exp(high))
 
 
-def _log_ratios(actives: Sequence[Active], study: Study, scenario: str, without: Sequence[Data],
-                part_seen: Callable[[FlightLog], FlightLog]) -> tuple[np.ndarray, np.ndarray]:
+def _log_ratios(actives: Sequence[Active], conditions: Conditions) -> tuple[np.ndarray, np.ndarray]:
     """Log ratios, nats, of a flight with each of these effects and of one without, for those that fly to the end."""
+    study, without = conditions.study, conditions.without
     yes, no = [], []
     for i, active in enumerate(actives):
         # flown with the default seed, not the set's: the same manoeuvres for every set, of numbers that no set has
-        log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
+        log = next(iter(flown(conditions.scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
         if not isinstance(log, FlightLog):
             continue
-        flights = list(ready_flights([part_seen(log)], study.vehicle, []))
+        flights = list(ready_flights([conditions.part_seen(log)], study.vehicle, []))
         if flights:
             yes.append(log_ratio(Data(study, flights), active))
             no.append(log_ratio(without[i % len(without)], active))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless.basis import BASIS
+from airtouch.gap.nameless.columns import WIDEST, allowed_columns
+from airtouch.gap.nameless.regression import HalfResiduals, coefficients
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signatures import candidates
-from airtouch.gap.unnamed.basis import BASIS
-from airtouch.gap.unnamed.columns import WIDEST, allowed_columns
-from airtouch.gap.unnamed.regression import HalfResiduals, coefficients
 from gap_flights import fly
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.unnamed.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
+from airtouch.gap.nameless.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
 from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, fly
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
-from airtouch.gap.sealed.blind_key import answers_sha256, open_key
-from airtouch.gap.sealed.blind_severity import SEEN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
+from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
+from airtouch.gap.sealed.severity import SEEN
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import terms
 
-Case = Mapping[str, Any]  #: a diagnosis as JSON
+Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
@@ -26,16 +26,15 @@ LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it tha
 class Sheet:
     """The answer sheet: what each flight's key says, beside its diagnosis.
 
-    cases: all diagnoses; plain: by flight, those with no effect left out; truth: by flight, its effects as the key
-    has them; single: the one effect of flights that have one; none: flights free of effects; pairs: names of the two
-    effects of the others. first, three: whether a single effect is first, or among the first three, of the ranking.
+    cases: all diagnoses; plain: by flight, those with no effect left out; single: the one effect of flights that have
+    one; none: flights free of effects; pairs: names of the two effects of the others. first, three: whether a single
+    effect is first, or among the first three, of the ranking.
     """
 
-    key: Mapping[str, Any]
-    cases: Sequence[Case]
-    plain: Mapping[str, Case]
-    truth: Mapping[str, Sequence[Any]]
-    single: Mapping[str, Any]
+    key: Key
+    cases: Sequence[Answer]
+    plain: Mapping[str, Answer]
+    single: Mapping[str, DrawnEffect]
     none: Sequence[str]
     pairs: Mapping[str, Sequence[str]]
     first: Mapping[str, bool]
@@ -48,14 +47,14 @@ def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any
     return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
 
 
-def read_answers(path: Path) -> list[Case]:
+def read_answers(path: Path) -> list[Answer]:
     """Diagnoses from a folder of JSON files, one each, or a file of many (`diagnose --each --json`).
 
     Raises AirTouchError for what is none.
     """
     path = Path(path)
     files = sorted(path.glob("*.json")) if path.is_dir() else [path]
-    out: list[Case] = []
+    out: list[Answer] = []
     for file in files:
         try:
             table = json.loads(file.read_text(encoding="utf-8"))
@@ -70,7 +69,7 @@ def read_answers(path: Path) -> list[Case]:
     return out
 
 
-def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
+def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     """All figures of a set, JSON-ready. A flight without a diagnosis counts as wrong.
 
     flights, diagnosed, effects: numbers of flights, of diagnoses, of effects drawn alone. Of single effects: top_1,
@@ -82,9 +81,9 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
     sheet = sheet_of(key, cases)
     plain, single = sheet.plain, sheet.single
     return {
-        "flights": len(sheet.truth), "diagnosed": len(plain), "effects": len({e["name"] for e in single.values()}),
+        "flights": len(key.flights), "diagnosed": len(plain), "effects": len({e.name for e in single.values()}),
         "top_1": share(sheet.first.values()), "top_3": share(sheet.three.values()),
-        "exact": share(_same(_named(plain.get(n)), [e["name"]]) for n, e in single.items()),
+        "exact": share(_same(_named(plain.get(n)), [e.name]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
         "unknown": unknown(sheet), "shrink": shrink(sheet), "parameters": parameters(sheet),
@@ -92,22 +91,21 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
     }
 
 
-def sheet_of(key: Mapping[str, Any], cases: Sequence[Case]) -> Sheet:
+def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
     """The diagnoses beside the key; raises AirTouchError for one of a flight that is not in it."""
     plain = {_name(c): c for c in cases if not c.get("without")}
-    truth = {n: a["effects"] for n, a in key["answers"].items()}
-    extra = sorted(set(plain) - set(truth))
+    extra = sorted(set(plain) - set(key.flights))
     if extra:
         raise AirTouchError(f"{extra[0]}: diagnosed, but not a flight of this set")
-    single = {n: e[0] for n, e in truth.items() if len(e) == 1}
-    first, three = ({n: top(plain.get(n), e["name"], rank) for n, e in single.items()} for rank in (1, 3))
-    return Sheet(key, cases, plain, truth, single, [n for n, e in truth.items() if not e],
-                 {n: [x["name"] for x in e] for n, e in truth.items() if len(e) == 2}, first, three)
+    single = {n: f.effects[0] for n, f in key.flights.items() if len(f.effects) == 1}
+    first, three = ({n: top(plain.get(n), e.name, rank) for n, e in single.items()} for rank in (1, 3))
+    return Sheet(key, cases, plain, single, [n for n, f in key.flights.items() if not f.effects],
+                 {n: [e.name for e in f.effects] for n, f in key.flights.items() if len(f.effects) == 2}, first, three)
 
 
 def by_severity(sheet: Sheet) -> dict[str, Any]:
     """For each severity of single effects: top_1, top_3, how often `none` is said, and `ideal`."""
-    groups = {name: [n for n, e in sheet.single.items() if e["level"] == i] for i, name in enumerate(SEVERITIES)}
+    groups = {name: [n for n, e in sheet.single.items() if e.level == i] for i, name in enumerate(SEVERITIES)}
     return {name: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
                    "none": share(_verdict(sheet.plain.get(n)) == "none" for n in group),
                    "ideal": ideal(sheet.key, group)}
@@ -118,9 +116,9 @@ def by_effect(sheet: Sheet) -> dict[str, Any]:
     """For each kind of single effect: top_1, top_3, and the three strengths that were drawn."""
     groups = defaultdict(list)
     for n, e in sheet.single.items():
-        groups[e["kind"]].append(n)
+        groups[e.kind].append(n)
     return {kind: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
-                   "strengths": sheet.key.get("severities", {}).get(kind)}
+                   "strengths": sheet.key.severities.get(kind)}
             for kind, group in sorted(groups.items())}
 
 
@@ -141,17 +139,17 @@ def of_pairs(sheet: Sheet) -> dict[str, Any]:
 
 def misses(sheet: Sheet) -> list[dict[str, Any]]:
     """Flights whose single effect is not first: flight, true kind, its level and the first three answers."""
-    return [{"flight": n, "true": e["kind"], "level": e["level"],
+    return [{"flight": n, "true": e.kind, "level": e.level,
              "answer": [r["name"] for r in sheet.plain[n]["ranking"][:3]] if n in sheet.plain else []}
             for n, e in sheet.single.items() if not sheet.first[n]]
 
 
-def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> Figure:
+def ideal(key: Key, flights: Sequence[str]) -> Figure:
     """How many flights a test could tell from nominal ones that is told effect and strength; n: of those known."""
-    return share(nats > SEEN for n in flights if (nats := key["answers"][n].get("nats")) is not None)
+    return share(nats > SEEN for n in flights if (nats := key.flights[n].nats) is not None)
 
 
-def top(case: Case | None, name: str, first: int) -> bool:
+def top(case: Answer | None, name: str, first: int) -> bool:
     """Whether an effect, or another name of it, is among the first of a ranking."""
     return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
 
@@ -165,9 +163,9 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
     single, plain = sheet.single, sheet.plain
     out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
     groups = {"all": list(out)}
-    groups |= {name: [n for n in out if single[n]["level"] == i] for i, name in enumerate(SEVERITIES)}
+    groups |= {name: [n for n in out if single[n].level == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
-    apart = {n for n, c in out.items() if separable(plain.get(n), single[n]["name"], _named(c))}
+    apart = {n for n, c in out.items() if separable(plain.get(n), single[n].name, _named(c))}
     known = {n: _chance(c, "unknown") for n, c in plain.items()}
     return {g: {"said_unknown": share(out[n]["verdict"] == "unknown" for n in names),
                 "wrong_name": share(out[n]["verdict"] == "effect" for n in names),
@@ -178,7 +176,7 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
             for g, names in groups.items() if names}
 
 
-def separable(case: Case | None, true: str, named: Iterable[str]) -> bool:
+def separable(case: Answer | None, true: str, named: Iterable[str]) -> bool:
     """Whether held-out data gain more by an effect than by others together: as much as a first effect must gain.
 
     case: the diagnosis with all effects. True where no others are named, and where the gains are not known.
@@ -201,17 +199,17 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
     """Parameters of flights rightly named: relative error of each effect's vector, in natural steps; coverage."""
     errors, held = defaultdict(list), defaultdict(list)
     for n, e in sheet.single.items():
-        found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e["name"]), None) if sheet.first[n] else None
+        found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e.name), None) if sheet.first[n] else None
         if found is None:
             continue
-        term = terms(e["name"])[0]
-        known = {k: q for k, q in found["parameters"].items() if "low" in q and k in e["values"]}
-        size = np.sqrt(sum(((e["values"][k] - term.values[k]) / term.step(k)) ** 2 for k in known))
+        term = terms(e.name)[0]
+        known = {k: q for k, q in found["parameters"].items() if "low" in q and k in e.values}
+        size = np.sqrt(sum(((e.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
         if not known or size == 0.0:
             continue
-        off = np.sqrt(sum(((q["value"] - e["values"][k]) / term.step(k)) ** 2 for k, q in known.items()))
-        errors[e["kind"]].append(float(off / size))
-        held[e["kind"]] += [q["low"] <= e["values"][k] <= q["high"] for k, q in known.items()]
+        off = np.sqrt(sum(((q["value"] - e.values[k]) / term.step(k)) ** 2 for k, q in known.items()))
+        errors[e.kind].append(float(off / size))
+        held[e.kind] += [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()]
     every = np.array([x for v in errors.values() for x in v])
     return {"error": median(every), "coverage": share(x for v in held.values() for x in v),
             "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share(held[k])}
@@ -221,36 +219,40 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
 def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
     """How often a flight of each effect (or `none`) got each answer first; pairs are not in it."""
     out: dict[str, Counter] = defaultdict(Counter)
-    for n, e in sheet.truth.items():
-        if len(e) < 2 and n in sheet.plain:
-            out[e[0]["name"] if e else "none"][sheet.plain[n]["ranking"][0]["name"]] += 1
+    for n, name in _true_names(sheet).items():
+        out[name][sheet.plain[n]["ranking"][0]["name"]] += 1
     return {k: dict(v) for k, v in sorted(out.items())}
 
 
 def reliability(sheet: Sheet, bins: int = 8) -> list[Figure]:
     """For bins of the first answer's probability: its mean, how often the answer was right, and n."""
     rows = []
-    for n, e in sheet.truth.items():
-        if n in sheet.plain and len(e) < 2:
-            best = sheet.plain[n]["ranking"][0]
-            rows.append((best["probability"], interchangeable(e[0]["name"] if e else "none", best["name"])))
+    for n, name in _true_names(sheet).items():
+        best = sheet.plain[n]["ranking"][0]
+        rows.append((best["probability"], interchangeable(name, best["name"])))
     place = [min(int(p * bins), bins - 1) for p, _ in rows]
     return [{"probability": float(np.mean([r[0] for r in group])), **share(r[1] for r in group)}
             for b in range(bins) if (group := [r for r, k in zip(rows, place, strict=True) if k == b])]
 
 
-def _name(case: Case) -> str:
+def _true_names(sheet: Sheet) -> dict[str, str]:
+    """The right first answer to each flight that was diagnosed, but for pairs: its effect, or "none"."""
+    return {n: f.effects[0].name if f.effects else "none" for n, f in sheet.key.flights.items()
+            if n in sheet.plain and len(f.effects) < 2}
+
+
+def _name(case: Answer) -> str:
     """Name of the flight of a diagnosis, without folder and endings."""
     name = Path(case["flights"][0]).name
     return name.split(".")[0]
 
 
-def _verdict(case: Case | None) -> str:
+def _verdict(case: Answer | None) -> str:
     """The verdict; empty without a diagnosis."""
     return case["verdict"] if case else ""
 
 
-def _named(case: Case | None) -> list[str]:
+def _named(case: Answer | None) -> list[str]:
     """Names of the effects that a diagnosis names; empty without one."""
     return [f["name"] for f in case["effects"]] if case else []
 
@@ -266,6 +268,6 @@ def _same(named: Sequence[str], true: Sequence[str]) -> bool:
     return not left
 
 
-def _chance(case: Case, name: str) -> float:
+def _chance(case: Answer, name: str) -> float:
     """Probability that a diagnosis gives a name; 0 where its ranking has none of that name."""
     return next((r["probability"] for r in case["ranking"] if r["name"] == name), 0.0)

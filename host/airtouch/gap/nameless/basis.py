@@ -1,4 +1,4 @@
-"""The flight's own signals, for a regression of a hypothesis's residual (gap.unnamed.nameless)."""
+"""The flight's own signals, for a regression of a hypothesis's residual (gap.nameless.model)."""
 
 import numpy as np
 

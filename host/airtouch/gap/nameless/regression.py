@@ -6,10 +6,10 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import BlockSet, problem_of
+from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
+from airtouch.gap.nameless.powers import Powers, gain_at_even_odds
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
-from airtouch.gap.unnamed.powers import Powers, gain_at_even_odds
 
 ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
 OWN_ROUNDS = 2  #: the same of one channel of a flight under fitted coefficients; chosen
@@ -34,10 +34,10 @@ class HalfResiduals:
 
     def normal_equations(self, one: Regressors, values: np.ndarray, residual: np.ndarray,
                          ) -> tuple[np.ndarray, np.ndarray]:
-        """Normal matrix (columns, columns) and right-hand side (columns,) for values (elements,) of one channel
-        of one flight.
+        """Normal matrix (columns, columns) and right-hand side (columns,) of one channel of one flight.
 
-        residual (elements,): by which each is weighted, as its tails are Student's.
+        values (elements,): to which its columns are fitted; residual (elements,): by which each is weighted, as its
+        tails are Student's.
         """
         nu, tail, power = self.problem.freedom[one.own], self.problem.tail[one.own], self.power[one.own]
         weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
@@ -121,7 +121,7 @@ def _worth_asking(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int])
     free: list[int] = []
     gain = 0.0
     while len(free) < MOST_COLUMNS:
-        gains = [(_gain(normal, right, [*free, k]), k) for k in allowed if k not in free]
+        gains = [(_gain_of_columns(normal, right, [*free, k]), k) for k in allowed if k not in free]
         if not gains or max(gains)[0] - gain < CHANCE:
             break
         gain, k = max(gains)
@@ -129,7 +129,7 @@ def _worth_asking(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int])
     return free
 
 
-def _gain(normal: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
+def _gain_of_columns(normal: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
     """Nats that the free columns gain together."""
     return 0.5 * float(right[free] @ np.linalg.solve(normal[np.ix_(free, free)], right[free]))
 

@@ -1,7 +1,7 @@
 """Sealed sets: flights whose effect is withheld, so that nobody, this package included, can look.
 
 A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose effect is drawn, and
-`sealed.json` with the SHA-256 of the key (`blind_key`). The key lies apart, in `FOLDER.key.json` beside the folder.
+`sealed.json` with the SHA-256 of the key (`key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
 import secrets
@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from itertools import combinations, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.blind_key import OPENED, SEALED, key_of, seal
-from airtouch.gap.sealed.blind_severity import log_ratio, three_severities, weakest
+from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
+from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
@@ -41,6 +41,21 @@ Say = Callable[[str], None]
 Severities = Mapping[str, Sequence[float]]  #: of each kind of effect, its three strengths in rising order
 
 
+class Draw(NamedTuple):
+    """A kind of effect and the place of its severity, 0 to 2."""
+
+    kind: str
+    level: int
+
+
+class Plan(NamedTuple):
+    """What the flights of a set are drawn for: the vehicle, the severities of each kind, the set's seed."""
+
+    vehicle: Vehicle
+    severities: Severities
+    seed: int
+
+
 def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, force: bool = False,
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
@@ -58,18 +73,17 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         write(log, out / f"cal_{i}.csv.gz", force=True)
     progress("calibration")
     study = study_of(vehicle, cal)
-    severities = severities_of(study, seed, kinds, progress)
+    plan = Plan(vehicle, severities_of(study, seed, kinds, progress), seed)
     rng = np.random.default_rng([seed, 1])
-    answers: dict[str, Any] = {}
-    for number, drawn in enumerate(draw(flights, severities, rng)):
+    flown_with: dict[str, DrawnFlight] = {}
+    for number, draws in enumerate(draw(flights, plan.severities, rng)):
         name = f"flight_{number:04d}"
         progress(f"{name}, of {flights}")
-        log, effects = _flight(vehicle, drawn, severities, seed, number, rng)
+        log, effects = _flight(plan, number, draws, rng)
         write(log, out / f"{name}.csv.gz", force=True)
-        answers[name] = {"effects": effects, **_nats_when_told(study, log, effects)}
-    table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
-             "severities": {k: list(v) for k, v in severities.items()}, "answers": answers}
-    seal(out, key, table, CAL)
+        flown_with[name] = DrawnFlight(effects, _log_ratio_of_one(study, log, effects))
+    drawn = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE}
+    seal(out, key, Key(flown_with, plan.severities, drawn), CAL)
     return key
 
 
@@ -83,12 +97,12 @@ def _clear(out: Path, key: Path, force: bool) -> None:
         old.unlink()
 
 
-def _nats_when_told(study: Study, log: FlightLog, effects: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Log ratio that a test sees which is told effect and values, as the key has it; nothing of pairs and nominal."""
+def _log_ratio_of_one(study: Study, log: FlightLog, effects: Sequence[DrawnEffect]) -> float | None:
+    """`severity.log_ratio` of a flight with one effect alone, nats; None with another number of effects."""
     if len(effects) != 1:
-        return {}
-    told = Active(get(effects[0]["name"]), effects[0]["values"])
-    return {"nats": log_ratio(Data(study, list(ready_flights([log], study.vehicle, []))), told)}
+        return None
+    active = Active(get(effects[0].name), effects[0].values)
+    return log_ratio(Data(study, list(ready_flights([log], study.vehicle, []))), active)
 
 
 def stripped(log: FlightLog) -> FlightLog:
@@ -109,11 +123,11 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
     vehicle = study.vehicle
     logs = nominal(vehicle, NONE_FIRST, NONE, seed)
     without = [Data(study, list(ready_flights([log], vehicle, []))) for log in logs]
-    found = {}
+    conditions, found = Conditions(study, SCENARIO, without, stripped), {}
     asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
     for number, (name, kind) in enumerate(asked.items(), 1):
         progress(f"severities of {name}, effect {number} of {len(asked)}")
-        low = weakest(kind, study, SCENARIO, without, seed, stripped)
+        low = weakest(kind, conditions, seed)
         if low is not None:
             found[name] = three_severities(low, kind.highest)
     return found
@@ -124,16 +138,19 @@ def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
     return calibrate.calibrated(vehicle, list(ready_flights(cal, vehicle, [])))[0]
 
 
-def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[list[tuple[str, int]]]:
-    """For each flight its kinds of effect, each with the place of its severity (0 to 2), in random order."""
+def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[list[Draw]]:
+    """What is drawn for each flight: one kind of effect, two or none, in random order.
+
+    Raises AirTouchError where the kinds give no single effect or no pair.
+    """
     singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
     names = list(severities)
-    every = [(n, place) for place in range(3) for n in names]
+    every = [Draw(n, level) for level in range(3) for n in names]
     if not names:
         raise AirTouchError("no effect is strong enough to be drawn; give other kinds")
     if count > singles + none and not any(_may_pair(a, b) for a, b in combinations(names, 2)):
         raise AirTouchError(f"{', '.join(names)}: no two of them make a pair; give more kinds")
-    cases: list[list[tuple[str, int]]] = []
+    cases: list[list[Draw]] = []
     while len(cases) < singles:  # every kind at every severity equally often
         cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
     for _ in range(count - singles - none):
@@ -141,7 +158,7 @@ def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[l
             a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))
             if _may_pair(a, b):
                 break
-        cases.append([(n, int(rng.choice(PAIR_SEVERITIES))) for n in (a, b)])
+        cases.append([Draw(n, int(rng.choice(PAIR_SEVERITIES))) for n in (a, b)])
     cases += [[] for _ in range(none)]
     return [cases[i] for i in rng.permutation(len(cases))]
 
@@ -151,14 +168,18 @@ def _may_pair(a: str, b: str) -> bool:
     return KINDS[a].effect != KINDS[b].effect and not interchangeable(KINDS[a].effect, KINDS[b].effect)
 
 
-def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], severities: Severities, seed: int,
-            number: int, rng: np.random.Generator) -> tuple[FlightLog, list[dict[str, Any]]]:
-    """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
+def _flight(plan: Plan, number: int, draws: Sequence[Draw], rng: np.random.Generator,
+            ) -> tuple[FlightLog, tuple[DrawnEffect, ...]]:
+    """The flight of a number that ends well, and what acts in it: after a crash another one, a little weaker.
+
+    Raises AirTouchError where TRIES flights crash.
+    """
     for attempt in range(TRIES):
-        active: list[Active] = [KINDS[k].active(severities[k][place] * WEAKER ** attempt, rng) for k, place in drawn]
-        log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=vehicle, effects=active, seed=seed,
-                              workers=1)))
-        if isinstance(log, FlightLog) and list(ready_flights([stripped(log)], vehicle, [])):
-            return stripped(log), [{"name": a.effect.name, "kind": k, "level": place, "values": dict(a.values)}
-                                   for a, (k, place) in zip(active, drawn, strict=True)]
-    raise AirTouchError(f"{', '.join(k for k, _ in drawn)}: {TRIES} flights crashed; lower its highest strength")
+        active: list[Active] = [KINDS[d.kind].active(plan.severities[d.kind][d.level] * WEAKER ** attempt, rng)
+                                for d in draws]
+        log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=plan.vehicle, effects=active,
+                              seed=plan.seed, workers=1)))
+        if isinstance(log, FlightLog) and list(ready_flights([stripped(log)], plan.vehicle, [])):
+            return stripped(log), tuple(DrawnEffect(a.effect.name, d.kind, d.level, dict(a.values))
+                                        for a, d in zip(active, draws, strict=True))
+    raise AirTouchError(f"{', '.join(d.kind for d in draws)}: {TRIES} flights crashed; lower its highest strength")

@@ -8,10 +8,10 @@ from scipy.stats import t as student
 
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.nameless import model, powers
+from airtouch.gap.nameless.powers import Powers
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.unnamed import nameless, powers
-from airtouch.gap.unnamed.powers import Powers
 from gap_flights import fly
 
 
@@ -75,4 +75,4 @@ def test_a_little_more_power_in_every_band_shows_in_the_sensors_sum():
 def test_a_little_noise_of_the_imu_is_no_chance_in_a_simulated_flight(study):
     """A tenth more power in every band of every sensor."""
     data = Data(study, fly(1, 49, {"imu_noise": {"factor": 1.06}}))
-    assert sum(nameless.nameless_gain(data, halves(data), [(), ()])) > 15.0
+    assert sum(model.held_out_gains(data, halves(data), [(), ()])) > 15.0
