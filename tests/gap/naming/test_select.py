@@ -58,11 +58,11 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert step.terms[0].values["fraction"] == pytest.approx(loss / (1.0 - loss), rel=0.03)
     bias = selection.singles["imu_bias"]
     assert bias.terms[0].values["acc_z"] == pytest.approx(-DOWN, rel=0.03)
-    assert bias.strength[2] == pytest.approx(-DOWN / 0.1, rel=0.03) and bias.variance.shape == (6,)
-    assert np.abs(bias.strength[:2]).max() < 0.1
+    assert bias.strength.mean[2] == pytest.approx(-DOWN / 0.1, rel=0.03) and bias.strength.variance.shape == (6,)
+    assert np.abs(bias.strength.mean[:2]).max() < 0.1
     # the variance of the mean of white noise of twice the declared power, in the unit of the parameter
     true = LOUDNESS * VEHICLE.acc_noise_rms_mps2 * VEHICLE.acc_noise_ratio[2] / 0.1 / np.sqrt(3000)
-    assert 0.5 * true < np.sqrt(bias.variance[2]) < 4.0 * true
+    assert 0.5 * true < np.sqrt(bias.strength.variance[2]) < 4.0 * true
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
     assert selection.nameless_alone > 0.9 * step.gain and selection.nameless_beside < 12.0 and selection.explained
@@ -102,7 +102,7 @@ def test_an_effect_at_its_bound_stands_in_for_another_and_is_not_named():
 def test_bounds_are_approached_from_within_on_both_sides():
     mass = all_candidates()["mass"][0][0]
     low, high = mass.bounds()
-    near = judging.STRETCHED
+    near = judging.NEAR_BOUND
     for x, at in ((high, True), (high * (near + 1e-6), True), (high * 0.99, False), (low, True), (0.99 * low, False),
                   (0.0 * high, False)):
         assert judging.at_bound(mass, x).tolist() == [at]
@@ -161,7 +161,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
     selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
     for step in selection.steps:
-        beyond = study.scatter.unusual({"downwash": size_of(step.gain / data.seconds, step.strength)})
+        beyond = study.scatter.unusual({"downwash": size_of(step.gain / data.seconds, step.strength.mean)})
         assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
 
 
@@ -194,7 +194,8 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     selection, data = select_from(flights, ("mass",), scattered(), ())
     wake, mass = selection.steps
     assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
-    least, share, gain = (size_of(nats / data.seconds, wake.strength) for nats in (mass.share, wake.share, wake.gain))
+    rates = (nats / data.seconds for nats in (mass.share, wake.share, wake.gain))
+    least, share, gain = (size_of(rate, wake.strength.mean) for rate in rates)
 
     def names_where_nominal_flights_have(size):
         """FALSE_SHARE of the nominal flights have a larger one."""
@@ -223,7 +224,7 @@ def test_a_look_that_is_thorough_fits_what_promises_nothing():
     for thorough in (False, True):
         best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
         assert best["imu_noise"].full == thorough
-        assert best["imu_noise"].gain < looks.HOPELESS and best["imu_noise"].strength[0] < 0.05
+        assert best["imu_noise"].gain < looks.HOPELESS and best["imu_noise"].strength.mean[0] < 0.05
 
 
 def test_halves_share_no_block_and_leave_none_out():
