@@ -39,14 +39,15 @@ class TorquePower:
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
         law = self.data.study.controller
-        loop = beside_edges(active) if law else []
-        if not len(self.base) or not loop or not law.changes_loop(loop):
+        loop = beside_edges(active) if law and len(self.base) else []
+        of_loop = law.torque_change(loop, frequencies(AIR)) if law and loop else None
+        if of_loop is None:
             return np.zeros(len(self.base))
         gather = self.layout.gather
         change = np.where(self.known, gather(spectra(self.data, loop)) - self.base, 0.0)
         steps = step_doubt(self.data, loop)
         doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
-        return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
+        return doubt + self.noise * self._noise_growth(of_loop)
 
     def _noise_growth(self, change: Change) -> np.ndarray:
         """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""

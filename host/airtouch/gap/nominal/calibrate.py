@@ -69,11 +69,11 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         alike, far = split_unlike(vehicle, alike, FAR)  # from the median of those that are left
         left_out = [*left_out, *unlike, *far]
         measured = _measured(vehicle, alike, scatter, without)
-    study, alike = measured.study, measured.flights
+    study, nominal = measured.study, measured.flights
     if study.simulated:
-        study = _as_simulated(study, alike, without)
+        study = _as_simulated(study, nominal, without)
     return study, Calibration(study.calibration, _quantities(measured.fitted),
-                              (*left_out, *odd_flights(study, alike)), None if left_out else measured.declared)
+                              (*left_out, *odd_flights(study, nominal)), None if left_out else measured.declared)
 
 
 class _Measured(NamedTuple):
