@@ -36,7 +36,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.nominal.apparent import apparent, passing_sizes
+from airtouch.gap.nominal.apparent import apparent_strengths, passing_sizes
 from airtouch.gap.sealed import make as sealed
 from airtouch.gap.signatures import scatter_estimates
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, table
@@ -112,7 +112,7 @@ def _read(path: Path) -> Log:
 
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
-             look: Callable[[Data], ApparentStrengths] = apparent) -> Iterator[tuple[str, ApparentStrengths]]:
+             look: Callable[[Data], ApparentStrengths] = apparent_strengths) -> Iterator[tuple[str, ApparentStrengths]]:
     """Each flight against others of its group, or against those given, as `look` sees it."""
     ready = _ready(logs, vehicle)
     if others is not None:

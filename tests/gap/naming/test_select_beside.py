@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
-from airtouch.gap.naming.select import nameless, select
+from airtouch.gap.naming.select import nameless_nats, select
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.scatter import Scatter
@@ -164,7 +164,7 @@ def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named(
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
     packet_loss = judging.cross_validated(on, "packet_loss", (term,), None, 0.0)
     assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
-    assert nameless(on, None) - nameless(on, packet_loss) == pytest.approx(packet_loss.gain)
+    assert nameless_nats(on, None) - nameless_nats(on, packet_loss) == pytest.approx(packet_loss.gain)
 
 
 def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():

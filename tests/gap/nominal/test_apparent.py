@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent, evenly_chosen, is_recorded
+from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent_strengths, evenly_chosen, is_recorded
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from gap_flights import fly
@@ -15,7 +15,7 @@ from gap_flights import fly
 def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
     """A strength at its bound of none has no curvature of its own: an error of next to nothing would say that nominal
     flights never differ in it."""
-    nominal = apparent(Data(study, fly(1, 47)))
+    nominal = apparent_strengths(Data(study, fly(1, 47)))
     pressed = free = 0
     for name, hypotheses in all_candidates(()).items():
         term = strength_term(hypotheses[0])

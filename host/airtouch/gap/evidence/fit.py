@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.gauss_newton import ITERATIONS, gauss_newton, start_of
+from airtouch.gap.evidence.gauss_newton import ITERATIONS, Posterior, gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
 from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
@@ -72,7 +72,8 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
     for _ in range(1 if brief else TURNS):
-        solution = gauss_newton(problem, mean, x, random_power, prior, bool(random), BRIEF if brief else ITERATIONS)
+        posterior = Posterior(problem, mean, random_power, prior, bool(random))
+        solution = gauss_newton(posterior, x, BRIEF if brief else ITERATIONS)
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             break

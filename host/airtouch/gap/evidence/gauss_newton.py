@@ -41,11 +41,11 @@ class _State(NamedTuple):
     cost: float
 
 
-class _Posterior:
+class Posterior:
     """Posterior of mean effects' parameters beside random effects that stay as they are.
 
     added (n,): power of the random effects; wide: whether the commands' floor is as uncertain as under such;
-    prior (k + m,): standard deviations of parameters and offsets.
+    spread: standard deviation of the parameters' prior; prior (k + m,): of parameters and offsets.
     """
 
     def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
@@ -67,19 +67,26 @@ class _Posterior:
         return _State(x, offsets, values, power, price + (0.5 * away - self.problem.likelihood(values, power)))
 
 
-def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
-                 spread: np.ndarray | float, wide: bool, most: int = ITERATIONS) -> MeanFit:
+class _Step(NamedTuple):
+    """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained."""
+
+    state: _State
+    covariance: np.ndarray
+    damping: float
+    gained: bool
+
+
+def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) -> MeanFit:
     """Mean effects of highest posterior, from scaled parameters x (k,) on, in so many steps at most.
 
-    added (n,): power of random effects; spread: standard deviation of the parameters' prior; wide: `_Posterior`. The
-    slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far from
-    where they were taken, takes them anew.
+    The slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far
+    from where they were taken, takes them anew.
     """
+    problem, mean = posterior.problem, posterior.mean
     low, high = limits(mean)
     x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.unit_offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.unit_offsets:
         return MeanFit(x, covariance, problem.base)
-    posterior = _Posterior(problem, mean, added, spread, wide)
     now = posterior.at(x, offsets)
     slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
     for _ in range(most):
@@ -93,12 +100,9 @@ def gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: n
     return MeanFit(now.x, covariance, now.values)
 
 
-def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],
-          damping: float) -> tuple[_State, np.ndarray, float, bool]:
-    """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained.
-
-    It is shortened until it gains, TRIES times at most.
-    """
+def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],
+          damping: float) -> _Step:
+    """A step, shortened until it gains, TRIES times at most."""
     problem, size = posterior.problem, len(now.x)
     columns = [*slopes.columns, *(-column for column, _ in problem.unit_offsets)]
     equations = normal_equations(columns, posterior.prior, now.values, weights_of(problem, now.values, now.power),
@@ -108,9 +112,9 @@ def _step(posterior: _Posterior, slopes: SpectraSlopes, now: _State, bounds: tup
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
         if new.cost < now.cost - ROUNDING:
-            return new, covariance, damping * DAMPING_FACTOR, True
+            return _Step(new, covariance, damping * DAMPING_FACTOR, True)
         damping = max(damping / DAMPING_FACTOR, FIRST_DAMPING)
-    return now, covariance, damping, False
+    return _Step(now, covariance, damping, False)
 
 
 def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:

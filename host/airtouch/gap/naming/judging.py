@@ -5,6 +5,7 @@ Two halves of the flights (of the blocks, for a few flights) take turns.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,10 +81,9 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
     """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs; brief: the
-    fits are cut short, to see whether whole ones promise anything. Its gain is
-    that of all effects over none, less what their parameters and the choice of their variants cost. Effects that are
-    seen in the commands alone gain less beside the first random one; it is not charged with that
-    (`_lost_to_uncertainty`).
+    fits are cut short, to see whether whole ones promise anything. Its gain is that of all effects over none, less what
+    their parameters and the choice of their variants cost. Effects that are seen in the commands alone gain less beside
+    the first random one; it is not charged with that (`_lost_to_uncertainty`).
     """
     before = chosen.terms if chosen else ()
     paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
@@ -93,15 +93,13 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
-        gain = clock_gains(trial.data, before)
-        for train, test in ROUND_TRIP:
-            gain += gain_of(trial, test, fits[train].terms) if spectral else 0.0
-        gain += certain - price_of(fits[-1].terms) - paid
+        held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP),
+                       clock_gains(trial.data, before))
+        gain = held_out + (certain - price_of(fits[-1].terms) - paid)
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
-    strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, strength,
-                     covariance, apart)
+    strength = strength_of(strength_term(terms), fitted, fits)
+    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, *strength)
 
 
 def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
@@ -141,13 +139,23 @@ def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
                    for train, test in ROUND_TRIP], axis=0)
 
 
-def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],
-                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Strength, covariance and difference between the halves of the scaled parameters of one term of a hypothesis.
+class Strength(NamedTuple):
+    """Scaled parameters of one term, as both halves of the flights have them.
 
-    strength (k,): the mean of both halves; covariance (k, k): 0 but for mean effects; difference (k,): half of what the
-    halves differ by. k: of all parameters that the effect may have free; those that this variant leaves alone are 0,
-    and nobody knows how far they lie from it. fitted: the hypothesis' terms; fits: those of its spectra on each half.
+    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects; apart (k,): half of what the halves
+    differ by. k: of all parameters that the effect may have free; those that its variant leaves alone are 0, and nobody
+    knows how far they lie from it.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    apart: np.ndarray
+
+
+def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms]) -> Strength:
+    """The strength of one term of a hypothesis.
+
+    fitted: the hypothesis' terms; fits: those of its spectra on each half.
     """
     hypotheses = [fitted] if term.shows_in == CLOCK or not fits else [f.terms for f in fits]
     own = term.identity, term.shows_in
@@ -156,12 +164,12 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms],
     each = np.array([t.scaled(t.values)[:k] for t in same])
     strength = term.among_all(each.mean(axis=0))
     if term.shows_in != MEAN:
-        return strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength))
+        return Strength(strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength)))
     covariance = np.zeros((k, k))
     for f, t in zip(fits, same, strict=True):
         first = f.place(t).start
         covariance += f.covariance[first:first + k, first:first + k] / len(fits) ** 2
-    return strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1]))
+    return Strength(strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1])))
 
 
 def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:

@@ -78,7 +78,12 @@ def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], pr
     for name, variants in candidates.items():
         progress(name)
         for variant in addable(name, variants, start.terms):
-            _look_at(start, variant, looks)
+            if random_of(variant.terms):
+                looks.random.append(variant)
+            elif (look := _seen(start, variant)) is None:
+                looks.unseen.append(variant)
+            else:
+                looks.means.append(look)
     return looks
 
 
@@ -96,18 +101,13 @@ def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedV
             if not any(t.identity in there for t in terms)]
 
 
-def _look_at(start: RoundStart, variant: PricedVariant, looks: Looks) -> None:
-    """Add a variant to the looks, where a look can judge it with what that says."""
-    if random_of(variant.terms):
-        looks.random.append(variant)
-    elif any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
-        looks.unseen.append(variant)
-    else:
-        look = _mean_look(start, variant)
-        if look.gain < start.gain + HOPELESS and _only_in_commands(start.trial, variant.terms):
-            looks.unseen.append(variant)
-        else:
-            looks.means.append(look)
+def _seen(start: RoundStart, variant: PricedVariant) -> Candidate | None:
+    """A first look at a variant of mean effects; None where it cannot see them, as only the commands show them."""
+    if any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
+        return None
+    look = _mean_look(start, variant)
+    hopeless = look.gain < start.gain + HOPELESS
+    return None if hopeless and _only_in_commands(start.trial, variant.terms) else look
 
 
 def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:

@@ -22,7 +22,7 @@ FULL = 5  #: variants that are fitted in full, after a first look at all; chosen
 PROMISING = 0.5  #: of FIRST_GAIN, that one of these must gain at a first look; chosen for time
 
 
-def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,
+def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,
              progress: Callable[[str], None] = lambda _: None, thorough: bool = False,
              promising: Container[str] = ()) -> dict[str, Candidate]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
@@ -32,28 +32,28 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candi
     best of several variants would be biased upwards. promising: names that are judged in full whatever the first look
     says.
     """
-    start = start_of(on, chosen)
+    start = start_of(trial, chosen)
     looks = first_looks(start, candidates, progress)
     means = _best_variants(looks.means)
     unpromising, random = random_looks(start, looks.random, means, thorough)
     to_fit, looked_at = _split(means + unpromising, start.gain, promising)
-    means_to_fit = [PricedVariant(j.name, j.terms[len(start.terms):], j.choice_cost) for j in to_fit]
+    means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.choice_cost) for c in to_fit]
     waiting = [*looks.unseen, *random, *means_to_fit]
     if thorough:
         waiting = [v for v in waiting if not _is_tried_alone(v)]
-    fitted = map_on_two_cores(lambda v: _fitted(on, v, chosen, thorough), waiting)
+    fitted = map_on_two_cores(lambda v: _fitted(trial, v, chosen, thorough), waiting)
     best = best_of_each([*fitted, *looked_at], len(start.terms))
     if thorough:
-        best = {n: _one_by_one(j, [k for k in fitted if k.name == n]) for n, j in best.items()}
-    return _with_evidence(on.data.study.scatter, best, start.gain)
+        best = {name: _one_by_one(c, [f for f in fitted if f.name == name]) for name, c in best.items()}
+    return _with_evidence(trial.data.study.scatter, best, start.gain)
 
 
-def _fitted(on: Trial, variant: PricedVariant, chosen: Candidate | None, surely: bool) -> Candidate:
+def _fitted(trial: Trial, variant: PricedVariant, chosen: Candidate | None, surely: bool) -> Candidate:
     """A variant fitted on top of what is chosen; one of the loop alone in full only where a brief fit is promising.
 
     surely: it is fitted in full whatever it promises. Each step of such a fit works out loops anew.
     """
-    fit = partial(cross_validated, on, variant.name, variant.terms, chosen, variant.choice_cost)
+    fit = partial(cross_validated, trial, variant.name, variant.terms, chosen, variant.choice_cost)
     if surely or not all(t.signature.loop_only for t in variant.terms):
         return fit()
     briefly, before = fit(brief=True), chosen.gain if chosen else 0.0
@@ -63,8 +63,8 @@ def _fitted(on: Trial, variant: PricedVariant, chosen: Candidate | None, surely:
 def _best_variants(looked: Sequence[Candidate]) -> list[Candidate]:
     """The best of each candidate's variants of one length, best first."""
     best: dict[tuple[str, int], Candidate] = {}
-    for j in sorted(looked, key=lambda j: -j.gain):
-        best.setdefault((j.name, len(j.terms)), j)
+    for look in sorted(looked, key=lambda c: -c.gain):
+        best.setdefault((look.name, len(look.terms)), look)
     return list(best.values())
 
 
@@ -74,9 +74,10 @@ def _split(looked: Sequence[Candidate], gain: float, promising: Container[str],
 
     gain: nats of what is chosen, over which a look must gain to be among the FULL best; promising: names that need not.
     """
-    worth = [j.name in promising or i < FULL and j.gain - gain > PROMISING * FIRST_GAIN for i, j in enumerate(looked)]
+    worth = [look.name in promising or place < FULL and look.gain - gain > PROMISING * FIRST_GAIN
+             for place, look in enumerate(looked)]
     pairs = list(zip(looked, worth, strict=True))
-    return [j for j, fit in pairs if fit], [j for j, fit in pairs if not fit]
+    return [look for look, fit in pairs if fit], [look for look, fit in pairs if not fit]
 
 
 def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
@@ -86,11 +87,11 @@ def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidat
     which gains.
     """
     best: dict[str, Candidate] = {}
-    for j in sorted(judged, key=lambda j: len(j.terms)):
-        old = best.get(j.name)
-        need = LEAST_GAIN if old is not None and len(j.terms) > len(old.terms) else 0.0
-        if old is None or (j.full, j.gain) > (old.full, old.gain + need):
-            best[j.name] = j
+    for new in sorted(judged, key=lambda c: len(c.terms)):
+        old = best.get(new.name)
+        need = LEAST_GAIN if old is not None and len(new.terms) > len(old.terms) else 0.0
+        if old is None or (new.full, new.gain) > (old.full, old.gain + need):
+            best[new.name] = new
     for name, other in COMPANIONS.items():
         both, alone = best.get(name), best.get(other)
         if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + LEAST_GAIN:
@@ -106,7 +107,7 @@ def _is_tried_alone(variant: PricedVariant) -> bool:
 
 def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
     """A candidate whose parameters (k,) were all tried alone, with the strength that each has there."""
-    alone = {int(np.argmin(j.variance)): j for j in variants if np.isfinite(j.variance).sum() == 1}
+    alone = {int(np.argmin(v.variance)): v for v in variants if np.isfinite(v.variance).sum() == 1}
     if len(alone) < max(len(best.strength), 2):
         return best
     *others, own = best.terms
@@ -122,10 +123,11 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], befor
     strengths in nominal flights; without one a strength says nothing.
     """
     out = {}
-    for n, j in best.items():
-        mine = [t for t in j.terms if t.name == n]
+    for name, candidate in best.items():
+        mine = [t for t in candidate.terms if t.name == name]
         own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
-        stretched = own.shows_in == MEAN and at_bound(own, j.strength).any()
-        rarity = scatter.evidence(n, j.strength, j.covariance, j.apart) if scatter else np.inf
-        out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else rarity))
+        stretched = own.shows_in == MEAN and at_bound(own, candidate.strength).any()
+        measured = candidate.strength, candidate.covariance, candidate.apart
+        rarity = scatter.evidence(name, *measured) if scatter else np.inf
+        out[name] = replace(candidate, evidence=min(candidate.gain - before, 0.0 if stretched else rarity))
     return out

@@ -98,8 +98,8 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     trial, study = search.trial, search.trial.data.study
     if passing is not None and as_in_nominal_flights(trial.data, passing, state.steps):
         state = forward(search, None)
-    before = nameless(trial, None)
-    after = nameless(trial, state.steps[-1]) if state.steps else before
+    before = nameless_nats(trial, None)
+    after = nameless_nats(trial, state.steps[-1]) if state.steps else before
     last = state.steps[-1].terms if state.steps else ()
     selection = Selection(
         singles=state.singles, steps=state.steps, nameless_alone=before, nameless_beside=after, parts=trial.parts,
@@ -110,7 +110,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     return replace(selection, contradicted=contradicted(trial, selection.chosen)) if study.simulated else selection
 
 
-def nameless(trial: Trial, chosen: Candidate | None) -> float:
+def nameless_nats(trial: Trial, chosen: Candidate | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.parts, fits)), 0.0)

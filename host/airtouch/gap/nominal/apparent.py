@@ -11,7 +11,7 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.select import nameless
+from airtouch.gap.naming.select import nameless_nats
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
@@ -41,13 +41,15 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
                       any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
 
 
-def apparent(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
+def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
-    on = trial_of(data)
-    singles = round_of(on, all_candidates(without), None, thorough=True)
-    known = {n: j for n, j in singles.items() if len(j.strength)}
-    return ApparentStrengths({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                             nameless(on, None) / data.seconds, passing_sizes(data, without))
+    trial = trial_of(data)
+    singles = round_of(trial, all_candidates(without), None, thorough=True)
+    known = {name: candidate for name, candidate in singles.items() if len(candidate.strength)}
+    return ApparentStrengths(
+        {name: candidate.strength for name, candidate in known.items()},
+        {name: _strength_error(data, candidate) for name, candidate in known.items()},
+        nameless_nats(trial, None) / data.seconds, passing_sizes(data, without))
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
@@ -71,23 +73,23 @@ def is_recorded(flight: Flight) -> bool:
 
 def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:
     """The apparent strengths of one nominal flight."""
-    return apparent(Data(study, [flight]), without)
+    return apparent_strengths(Data(study, [flight]), without)
 
 
-def _error(data: Data, judged: Candidate) -> np.ndarray:
+def _strength_error(data: Data, judged: Candidate) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
     term = strength_term(judged.terms)
     if term.shows_in == CLOCK:
         return np.zeros(len(judged.strength))
     if term.shows_in == SPECTRUM:
-        return _error_of_random(data, judged, term)
+        return _random_error(data, judged, term)
     low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
     pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
     return np.where(at_bound(term, judged.strength) | pressed, NOBODY_KNOWS,
                     np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
 
 
-def _error_of_random(data: Data, judged: Candidate, term: Term) -> np.ndarray:
+def _random_error(data: Data, judged: Candidate, term: Term) -> np.ndarray:
     """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
