@@ -17,7 +17,7 @@ PACKAGE = ROOT / "host" / "airtouch"
 DATA = ("py.typed", "vehicles/*.toml", "models/*", "report/*.html", "kernels/batch/*.h", "logs/*.csv",
         "simulation/scenarios/*.toml",
         "simulation/firmwares/*.toml", "crazyflie/missions/*.toml", "gap/signatures/*.toml", "simulation/effects/*.txt",
-        "gap/example/*")
+        "gap/edges/*.toml", "gap/example/*")
 
 pytestmark = pytest.mark.slow
 

@@ -66,8 +66,7 @@ def steps_before_exits(passes: Passes) -> np.ndarray:
     for course, x in passes:
         edges = near_range.around(course, x)
         if len(edges) == 2:
-            height, _, down, _ = edges[1]
-            height, down = height[-LAST:], down[-LAST:]
+            height, down = edges[1].height[-LAST:], edges[1].reading[-LAST:]
             out.append((100.0 * np.median(down), 100.0 * np.median(height - down)))
     return np.array(out)
 

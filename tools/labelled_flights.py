@@ -65,10 +65,11 @@ def merge(scores: Iterable[FlightScore]) -> list[FlightScore]:
 
 def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
     """The scores of several draws of one flight as one."""
-    a, b, c, d = (sum(s.windows[i] for s in scores) for i in range(4))
+    true_positives, positives, true_negatives, negatives = (sum(s.windows[i] for s in scores) for i in range(4))
     return FlightScore(name, scores[0].condition, tuple(e for s in scores for e in s.edges),
                        tuple(e for s in scores for e in s.false or ()), sum(s.detections for s in scores),
-                       sum(s.airborne_s for s in scores), (a, b, c, d), np.sum([s.bins for s in scores], axis=0))
+                       sum(s.airborne_s for s in scores), (true_positives, positives, true_negatives, negatives),
+                       np.sum([s.bins for s in scores], axis=0))
 
 
 def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
@@ -117,44 +118,73 @@ class Group:
     beside: adapt.SimulatedFlights | None
 
 
-def cell(row: str, count: int, draw: int, seed: int, group: Group, readable: dict[Path, FlightLog],
-         options: argparse.Namespace) -> list[FlightScore]:
-    """Scores of one training on the group's held-out flights, from the file of an earlier run if there is one.
+@dataclass(frozen=True)
+class Training:
+    """One training: its row ("start", "labelled", "unlabelled" or "alone"), number of flights, draw and seed."""
 
-    row: "start", "labelled", "unlabelled" or "alone".
-    """
-    steps = {"start": 0, "labelled": options.steps, "unlabelled": options.steps, "alone": options.alone_steps}[row]
-    settings = [row, count, draw, seed, group.name, steps, group.start.digest if group.start and row != "alone" else "",
-                [f.path.name for f in group.held], [f.log.source for f in group.pool]]
-    if group.beside and row in ("labelled", "unlabelled"):
-        settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
-                     [training_set.flight_hash(log) for log in group.beside.logs]]
-    rounds = [adapt.ROUNDS] if row == "unlabelled" else []
-    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{digest([*settings, *rounds])}.json"
+    row: str
+    count: int
+    draw: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Its number of flights, draw and seed, for a file's name."""
+        return f"{self.count}_draw{self.draw}_seed{self.seed}"
+
+    def steps(self, options: argparse.Namespace) -> int:
+        """Steps of the optimiser."""
+        return {"start": 0, "alone": options.alone_steps}.get(self.row, options.steps)
+
+
+def scores_of(training: Training, group: Group, readable: dict[Path, FlightLog],
+              options: argparse.Namespace) -> list[FlightScore]:
+    """Scores of one training on the group's held-out flights, from the file of an earlier run if there is one."""
+    settings = settings_of(training, group, options)
+    rounds = [adapt.ROUNDS] if training.row == "unlabelled" else []
+    path = options.out / f"{training.row}_{training.name}_{digest([*settings, *rounds])}.json"
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
-    if row == "start":
-        if group.start is None:
-            raise AirTouchError("no model to start from: give --start")
-        model = group.start
-    elif row == "alone":
-        sample = draw_flights(group.pool, count, draw)
-        model = best.fit([f.log for f in sample], seed=seed, steps=steps, command=COMMAND)
-    else:
-        file = options.out / f"labelled_{count}_draw{draw}_seed{seed}_{digest(settings[1:])}.npz"
-        model = learn(group, count, draw, seed, file, row == "unlabelled", options)
-    scores = held_out_scores(model, group.held, readable)
+    file = options.out / f"labelled_{training.name}_{digest(settings[1:])}.npz"
+    scores = held_out_scores(model_of(training, group, file, options), group.held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
 
 
-def learn(group: Group, count: int, draw: int, seed: int, file: Path, unlabelled: bool,
+def settings_of(training: Training, group: Group, options: argparse.Namespace) -> list[Any]:
+    """All that a training depends on, for the names of its files."""
+    row = training.row
+    settings = [row, training.count, training.draw, training.seed, group.name, training.steps(options),
+                group.start.digest if group.start and row != "alone" else "",
+                [f.path.name for f in group.held], [f.log.source for f in group.pool]]
+    if group.beside and row in ("labelled", "unlabelled"):
+        settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
+                     [training_set.flight_hash(log) for log in group.beside.logs]]
+    return settings
+
+
+def model_of(training: Training, group: Group, file: Path, options: argparse.Namespace) -> BestModel:
+    """The model that is scored. file: where one that learns labelled flights beside others is stored.
+
+    Raises AirTouchError for the row "start" of a group without a model to start from.
+    """
+    if training.row == "start":
+        if group.start is None:
+            raise AirTouchError("no model to start from: give --start")
+        return group.start
+    sample = draw_flights(group.pool, training.count, training.draw)
+    if training.row == "alone":
+        return best.fit([f.log for f in sample], seed=training.seed, steps=training.steps(options), command=COMMAND)
+    return learn(group, sample, training.seed, file, training.row == "unlabelled", options)
+
+
+def learn(group: Group, sample: Sequence[adapt.LoadedFlight], seed: int, file: Path, unlabelled: bool,
           options: argparse.Namespace) -> BestModel:
-    """A detector of `count` labelled flights, of the flights beside them, and of the model to start from.
+    """A detector of a sample of labelled flights, of the flights beside them, and of the model to start from.
 
     file: where that detector is stored. unlabelled: the pool's other flights are learnt after it, without their labels.
     """
-    start, sample = group.start, draw_flights(group.pool, count, draw)
+    start = group.start
     if group.beside is None or start is None:
         return cache.model(file, lambda: best.fit([f.log for f in sample], seed=seed, start=start, steps=options.steps,
                                                   command=COMMAND))
@@ -276,7 +306,7 @@ def main() -> None:
         scores: list[FlightScore] = []
         for draw, seed in draws:
             for group in groups:
-                scores += cell(kind, count, draw, seed, group, readable, options)
+                scores += scores_of(Training(kind, count, draw, seed), group, readable, options)
         print(line(title, scores, len(draws)), flush=True)
 
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "

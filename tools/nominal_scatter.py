@@ -67,7 +67,13 @@ class Group(NamedTuple):
     logs: list[Log]
 
 
-_GROUPS: list[Group] = []  #: all groups of this run, for its processes
+_GROUPS: list[Group] = []  #: all groups of this run, in its worker processes; `pool_of` fills it
+
+
+def pool_of(jobs: int, groups: list[Group]) -> ProcessPoolExecutor:
+    """Worker processes that hold the groups; they are forked, so that no log is sent to them."""
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("fork"), initializer=_GROUPS.extend,
+                               initargs=(groups,))
 
 
 def groups(folder: Path) -> Iterator[Group]:
@@ -195,29 +201,29 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     return "\n".join(lines)
 
 
-def compare_all(keep: Path | None, jobs: int) -> dict[str, dict]:
+def compare_all(groups: list[Group], keep: Path | None, jobs: int) -> dict[str, dict]:
     """Name of a comparison -> its row, of all groups; rows in the file `keep` are taken from there, new ones added."""
     row_of = {}
     if keep and keep.exists():
         row_of = {r["file"]: r for r in map(json.loads, keep.read_text().splitlines())}
-    todo = [(i, others) for i, group in enumerate(_GROUPS) for others in (False, True)
+    todo = [(i, others) for i, group in enumerate(groups) for others in (False, True)
             if any(_name(name, others) not in row_of for name, _ in group.logs)
-            and (not others or len(_rest(_GROUPS, i)) > 1)]
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
+            and (not others or len(_rest(groups, i)) > 1)]
+    with pool_of(jobs, groups) as pool:
         for i, others, rows in pool.map(_compare, todo):
             row_of |= {row["file"]: row for row in rows}
             if keep:
                 with keep.open("a") as out:
                     out.writelines(json.dumps(row) + "\n" for row in rows)
-            print(f"{_GROUPS[i].of}, {_GROUPS[i].name}{', other groups' if others else ''}: {len(rows)} flights",
+            print(f"{groups[i].of}, {groups[i].name}{', other groups' if others else ''}: {len(rows)} flights",
                   file=sys.stderr, flush=True)
     return row_of
 
 
-def scatter_of_classes(row_of: dict[str, dict]) -> tuple[dict[str, Scatter], dict[str, str]]:
+def scatter_of_classes(groups: list[Group], row_of: dict[str, dict]) -> tuple[dict[str, Scatter], dict[str, str]]:
     """Class -> its scatter, and class -> on how many flights it was measured, from the rows of `compare_all`."""
     cases, alike, names, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
-    for group in _GROUPS:
+    for group in groups:
         names[group.of].add(group.name)
         flown_by[group.of] = group.vehicle.name
         for others in (False, True):
@@ -242,13 +248,13 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--passing", action="store_true")
     args = parser.parse_args()
-    _GROUPS[:] = [g for g in groups(args.flights) if len(g.logs) >= LEAST]  # the processes inherit it: no log travels
+    large_enough = [g for g in groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
-        with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
+        with pool_of(args.jobs, large_enough) as pool:
             shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
-            write(args.out, text_of(with_passing(pool, _GROUPS), counts_of(shipped.read_text(encoding="utf-8"))))
+            write(args.out, text_of(with_passing(pool, large_enough), counts_of(shipped.read_text(encoding="utf-8"))))
     else:
-        write(args.out, text_of(*scatter_of_classes(compare_all(args.keep, args.jobs))))
+        write(args.out, text_of(*scatter_of_classes(large_enough, compare_all(large_enough, args.keep, args.jobs))))
 
 
 def write(path: Path, text: str) -> None:

@@ -80,8 +80,7 @@ def main() -> int:
     options = [*quiet, *(["-k", args.k] if args.k else [])]
     code = pytest.main([*options, *(args.tests or concurrent_tests())], plugins=[plugin])
     print(f"{len(plugin.passed | plugin.failed)} tests: {plugin.passed.total()} passed, {plugin.failed.total()} "
-          "failed, "
-          f"{plugin.skipped.total()} skipped")
+          f"failed, {plugin.skipped.total()} skipped")
     return int(code != pytest.ExitCode.OK)
 
 

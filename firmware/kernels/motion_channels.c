@@ -5,6 +5,9 @@
 #include "disturbance_force.h"
 #include "sample_guard.h"
 
+/** Where each group of channels begins; level acceleration and rates stand as in HELD_ACC and HELD_GYRO. */
+enum { CHANNEL_UP = HELD_ACC + 2, CHANNEL_MOTORS = 6, CHANNEL_UNEXPLAINED = 10, CHANNEL_FILL = MOTION_CHANNELS - 1 };
+
 void motionChannelsInit(motionChannels_t *motion, const motionConfig_t *config) {
   memset(motion, 0, sizeof *motion);
   motion->config = *config;
@@ -59,7 +62,7 @@ void motionChannelsStep(motionChannels_t *motion, const float acc[3], const floa
   const float gain = motion->airborneSteps > config->settleSamples ? config->slowGain : 1.0f;
   for (int i = 0; i < 4; i++) {
     motion->slow[i] += gain * (motors[i] - motion->slow[i]);
-    channels[6 + i] = motors[i] - motion->slow[i];
+    channels[CHANNEL_MOTORS + i] = motors[i] - motion->slow[i];
   }
   motion->slowThrust += gain * (motion->lagged - motion->slowThrust);
   const float meanThrust = motion->slowThrust > config->leastThrust ? motion->slowThrust : config->leastThrust;
@@ -67,10 +70,10 @@ void motionChannelsStep(motionChannels_t *motion, const float acc[3], const floa
   for (int i = 0; i < HELD_PWM; i++) {
     channels[i] = motion->held[i];
   }
-  channels[2] -= gravity;
-  channels[10] = a[2] - gravity * motion->lagged / meanThrust;
-  channels[MOTION_CHANNELS - 1] = 0.0f;
-  for (int i = 0; i < MOTION_CHANNELS - 1; i++) {
+  channels[CHANNEL_UP] -= gravity;
+  channels[CHANNEL_UNEXPLAINED] = a[2] - gravity * motion->lagged / meanThrust;
+  channels[CHANNEL_FILL] = 0.0f;
+  for (int i = 0; i < CHANNEL_FILL; i++) {
     channels[i] = clampFloat(channels[i] * config->inverseScale[i], -config->limit, config->limit);
   }
 }

@@ -50,7 +50,7 @@ void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t diges
   restart(sender, session == 0 ? 1 : session);
 }
 
-static void count(uint16_t *steps) { *steps = (uint16_t)(*steps + (*steps < UINT16_MAX ? 1 : 0)); }
+static void countUp(uint16_t *steps) { *steps = (uint16_t)(*steps + (*steps < UINT16_MAX ? 1 : 0)); }
 
 /** Moves the base past what the history no longer holds. */
 static void forget(linkSender_t *sender) {
@@ -70,8 +70,8 @@ void linkSenderPush(linkSender_t *sender, const uint8_t sample[EDGE_LINK_SAMPLE_
     rebase(sender);
   }
   forget(sender);
-  count(&sender->silent);
-  count(&sender->sinceRetry);
+  countUp(&sender->silent);
+  countUp(&sender->sinceRetry);
   sender->holdOff = (uint8_t)(sender->holdOff - (sender->holdOff > 0 ? 1 : 0));
   if (sender->silent >= LINK_DOWN_STEPS && (sender->state == LINK_UP || sender->state == LINK_FILLING)) {
     sender->state = LINK_DOWN;

@@ -113,8 +113,8 @@ static void gather(const convPlan_t *p, convPlace_t *at, int32_t count, int8_t *
 }
 
 /** The outputs of one channel from the sums of its lanes: one each, or one for two. */
-ALWAYS_INLINE void write(int8_t *to, int32_t channels, requantiser_t r, int32_t lanes, int32_t area, int32_t s0,
-                         int32_t s1, int32_t s2, int32_t s3) {
+ALWAYS_INLINE void writeLanes(int8_t *to, int32_t channels, requantiser_t r, int32_t lanes, int32_t area, int32_t s0,
+                              int32_t s1, int32_t s2, int32_t s3) {
   if (area == 2) {
     to[0] = requantise(r, s0 > s1 ? s0 : s1);
     if (lanes > 2) {
@@ -176,8 +176,8 @@ ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t
       a += UNIT;
       b += UNIT;
     } while (--units > 0);
-    write(to + one, channels, requantiser(&layer, one, range), lanes, area, a0, a1, a2, a3);
-    write(to + two, channels, requantiser(&layer, two, range), lanes, area, b0, b1, b2, b3);
+    writeLanes(to + one, channels, requantiser(&layer, one, range), lanes, area, a0, a1, a2, a3);
+    writeLanes(to + two, channels, requantiser(&layer, two, range), lanes, area, b0, b1, b2, b3);
   }
 }
 
@@ -211,7 +211,7 @@ ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, in
         }
       }
     }
-    write(to + channel, channels, requantiser(layer, channel, range), lanes, area, s0, s1, s2, s3);
+    writeLanes(to + channel, channels, requantiser(layer, channel, range), lanes, area, s0, s1, s2, s3);
   }
 }
 

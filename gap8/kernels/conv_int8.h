@@ -5,7 +5,7 @@
  * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
  *   (extensions.h), same bits.
  * Threads: each core of a team writes its own outputs and nothing else.
- * Memory: 256 bytes of stack.
+ * Memory: a stack of 4 * CONV_MAX_FILTER bytes.
  * Cost: kernelRows * kernelColumns * inChannels multiplications an output, or those of the kept blocks.
  */
 #pragma once
@@ -31,7 +31,7 @@ enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at mo
  * A pool must be one that convCanPool accepts; the convolution's own output is then
  * never written. Input and output must not overlap.
  *
- * Four neighbouring positions are copied to 256 bytes of stack, then multiplied with two
+ * Four neighbouring positions are copied to a stack of 4 * CONV_MAX_FILTER bytes, then multiplied with two
  * channels at a time, so that six loads serve eight products. Costs kernelRows *
  * kernelColumns * inChannels multiplications for each output, or those of the blocks that
  * are kept. Shared among cores by position and channel. Never fails.

@@ -2,27 +2,31 @@
 // Model SHA-256: 5b426e797e6f40167bfdcccc51e7560e1e0bb65e9b6e9e01482f1047e892ee4b
 #include "airtouch_model.h"
 
-_Alignas(4) static const int8_t conv1Weights[64] = {
+#ifndef AIRTOUCH_MODEL_CONST
+#define AIRTOUCH_MODEL_CONST const
+#endif
+
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Weights[64] = {
     24, -11, -127, 0, -67, 127, 11, 0, 39, -86, -127, 0, -127, -110, 55, 0, -45, 60, 127, 0, -90, 47, 127,
     0, 20, 108, 127, 0, 127, 104, 100, 0, 8, 30, 127, 0, 22, 118, -127, 0, 77, -127, 50, 0, -3, -42, 127, 0,
     -22, -3, 127, 0, -24, 34, -127, 0, -127, 93, 117, 0, 29, 13, 127, 0,
 };
 
-_Alignas(4) static const int32_t conv1Bias[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Bias[16] = {
     -7909, 5053, -11991, -11962, 7279, 5273, 14708, 20152, 8172, 1409, -217, 3882, 4789, -8151, 5212, 10476,
 };
 
-_Alignas(4) static const int32_t conv1Multiplier[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Multiplier[16] = {
     1567348280, 1718413303, 1274122649, 2007497123, 1811444756, 1121265544, 2125179744, 1116818585,
     1796717728, 1940851764, 1266981697, 1483899272, 1226538362, 1635452500, 1803206237, 1284796283,
 };
 
-_Alignas(4) static const int8_t conv1Shift[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Shift[16] = {
     -7, -7, -6, -7, -7, -6, -8, -6, -8, -7, -7, -7, -7, -7, -7, -6,
 };
 
 
-_Alignas(4) static const int8_t conv2Weights[1536] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Weights[1536] = {
     -35, 4, -107, -21, -50, -70, 33, -67, 62, -23, -44, 61, -3, -41, 63, 17, -89, 63, 17, 13, 35, 92, 29,
     37, -75, -24, 18, 97, -41, -37, 100, 89, 8, 69, -1, -23, 6, 23, 114, 53, 98, -22, 22, -14, 127, 20, 87,
     77, -44, -88, 2, 51, 5, -37, -89, 32, -17, -18, -49, 11, -17, -7, -31, -59, -26, -32, -11, 42, 70, 28,
@@ -92,26 +96,26 @@ _Alignas(4) static const int8_t conv2Weights[1536] = {
     36, 50, 44, -47, 89, 34, -41, 59, 39, 14, -17, 53, -5, 67, -12, 59, -78, -22, -21, -60, 78, -3, 24,
 };
 
-_Alignas(4) static const int32_t conv2Bias[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Bias[32] = {
     93471, 26483, -19304, 16636, -31941, -4419, 82804, -125515, 17948, 5948, 48273, -8298, 64843, 23575,
     -137883, 10847, -84197, 33633, 28997, -31109, -89328, -4279, -8994, -55405, -152597, -100500, -115203,
     14283, 86362, 1879, 69813, 23641,
 };
 
-_Alignas(4) static const int32_t conv2Multiplier[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Multiplier[32] = {
     1737479418, 1091407832, 1501966766, 1807306877, 1168945734, 1485862396, 1680227328, 1626565101,
     1929221646, 1295031976, 1149461897, 1294882004, 1201859731, 1194547608, 1297758740, 1095037397,
     1585284985, 1417886885, 1096653326, 2104290052, 1551964448, 1258582419, 1769295171, 1087287691,
     1549750122, 1854743244, 1799010803, 1392033339, 2039041655, 1476469391, 2027246486, 1676867973,
 };
 
-_Alignas(4) static const int8_t conv2Shift[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Shift[32] = {
     -9, -8, -9, -9, -8, -9, -9, -9, -9, -8, -9, -8, -8, -8, -9, -8, -9, -9, -8, -8, -8, -9, -9, -8, -8, -8,
     -9, -8, -9, -9, -9, -9,
 };
 
 
-_Alignas(4) static const int8_t dense1Weights[7064] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense1Weights[7064] = {
     -102, -75, 35, 38, -102, -60, -53, -59, 34, -57, -119, -110, -62, -25, -127, -39, -16, -93, -69, -96,
     48, -123, -97, -20, -8, 5, 2, -79, 17, 5, 65, 0, -5, -41, 6, -4, 11, 6, 7, -65, -18, -22, -17, -55, -41,
     -36, 0, -11, -46, -23, -1, -15, -23, -19, -3, -43, -25, -4, 12, -54, -31, -39, -4, -13, 9, -16, -13, 80,
@@ -403,25 +407,25 @@ _Alignas(4) static const int8_t dense1Weights[7064] = {
     -12, 13, 47, 26, 46, 16,
 };
 
-_Alignas(4) static const int32_t dense1Bias[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense1Bias[16] = {
     -174372, -67516, 340128, 437057, 72404, -67303, -93803, -395607, -730774, -286063, -446286, -226576,
     -599186, -287164, -118357, -103717,
 };
 
-_Alignas(4) static const int32_t dense1Multiplier[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense1Multiplier[16] = {
     1772207464, 2066085459, 1825230627, 1553724597, 1711928843, 1204946402, 2036488852, 1996319616,
     1590413793, 1270954175, 1158333653, 1206952182, 1322634902, 1758342201, 1691050770, 1465839513,
 };
 
-_Alignas(4) static const int8_t dense1Shift[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense1Shift[16] = {
     -9, -7, -7, -7, -6, -6, -8, -6, -6, -6, -6, -6, -6, -6, -6, -7,
 };
 
-_Alignas(4) static const uint16_t dense1BlockCounts[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t dense1BlockCounts[16] = {
     6, 47, 97, 101, 145, 98, 5, 149, 150, 125, 182, 131, 167, 143, 128, 92,
 };
 
-_Alignas(4) static const uint8_t dense1BlockSkips[1766] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t dense1BlockSkips[1766] = {
     28, 159, 36, 90, 43, 115, 4, 0, 12, 9, 16, 0, 23, 22, 0, 27, 1, 1, 21, 1, 15, 30, 63, 3, 10, 32, 19, 0,
     35, 10, 12, 10, 3, 0, 16, 2, 11, 2, 4, 30, 11, 5, 22, 7, 4, 0, 1, 4, 0, 0, 0, 0, 3, 2, 1, 2, 3, 1, 4,
     21, 4, 16, 6, 19, 0, 1, 1, 0, 14, 3, 18, 1, 6, 25, 13, 7, 5, 0, 1, 1, 5, 11, 11, 11, 5, 2, 8, 3, 7, 21,
@@ -478,25 +482,25 @@ _Alignas(4) static const uint8_t dense1BlockSkips[1766] = {
 };
 
 
-_Alignas(4) static const int8_t dense2Weights[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense2Weights[32] = {
     -25, 0, 25, 56, 104, -90, -61, -9, -91, -107, -98, 127, -105, -92, -11, 31, 47, -35, -105, -35, -119, 5,
     -43, 121, 18, -2, 56, -2, 76, 25, 127, -115,
 };
 
-_Alignas(4) static const int32_t dense2Bias[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense2Bias[2] = {
     -43406, 1434,
 };
 
-_Alignas(4) static const int32_t dense2Multiplier[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense2Multiplier[2] = {
     1935618094, 1710176236,
 };
 
-_Alignas(4) static const int8_t dense2Shift[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense2Shift[2] = {
     -8, -8,
 };
 
 
-static const layerInt8_t layers[] = {
+static AIRTOUCH_MODEL_CONST layerInt8_t layers[] = {
     {.kind = LAYER_CONV, LAYER_IN(100, 3, 1), LAYER_OUT(98, 3, 16), LAYER_KERNEL(3, 1), LAYER_RANGE(-128, -128, 127),
      LAYER_DENSE_ARRAYS(conv1)},
     {.kind = LAYER_MAX_POOL, LAYER_IN(98, 3, 16), LAYER_OUT(49, 3, 16), LAYER_KERNEL(2, 1), LAYER_RANGE(-128, -128, 127)},
@@ -509,7 +513,7 @@ static const layerInt8_t layers[] = {
      LAYER_DENSE_ARRAYS(dense2)},
 };
 
-const networkInt8_t airtouchNetwork = {
+AIRTOUCH_MODEL_CONST networkInt8_t airtouchNetwork = {
     .layers = layers,
     .layerCount = 6,
     .inputScale = 5.258001760e-02f,

@@ -2,27 +2,31 @@
 // Model SHA-256: 573510c0fc512aa15c789545a3f3f6a0454e5e364e4a411437a393e9a210efc0
 #include "airtouch_rolling.h"
 
-_Alignas(4) static const int8_t conv1Weights[64] = {
+#ifndef AIRTOUCH_MODEL_CONST
+#define AIRTOUCH_MODEL_CONST const
+#endif
+
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Weights[64] = {
     13, -12, -127, 0, -19, 127, 16, 0, 23, -97, -127, 0, -127, -118, -7, 0, -26, 71, 127, 0, -120, 49, 127,
     0, 20, 96, 127, 0, 127, 107, 111, 0, -40, 13, 127, 0, -7, 83, -127, 0, 93, -127, 86, 0, 47, 7, 127, 0,
     50, 41, 127, 0, 9, 122, -127, 0, -93, 127, 121, 0, 52, 14, 127, 0,
 };
 
-_Alignas(4) static const int32_t conv1Bias[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Bias[16] = {
     2353, -3475, -175, 1599, -1609, 2128, -440, -2779, 2267, 2602, 1391, -351, -6526, 4195, -3434, -1964,
 };
 
-_Alignas(4) static const int32_t conv1Multiplier[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Multiplier[16] = {
     2030078092, 1513971333, 1747597737, 2073608451, 1249068486, 1129519399, 2020752107, 1405973949,
     1812528468, 1593755414, 1616060531, 1346656063, 1886311441, 1420867671, 1173474332, 1581618440,
 };
 
-_Alignas(4) static const int8_t conv1Shift[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Shift[16] = {
     -8, -7, -7, -7, -7, -7, -8, -7, -8, -7, -8, -7, -8, -8, -7, -7,
 };
 
 
-_Alignas(4) static const int8_t conv2Weights[308] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Weights[308] = {
     -43, -51, 116, 127, 125, 20, 98, 111, 2, -49, 64, 127, 72, -112, 59, 13, 69, 26, 77, 0, -84, 75, -34, 3,
     90, 109, 100, 32, 6, -121, 39, 118, 48, 30, 75, 63, 23, 98, 70, 48, 55, -101, 85, 127, 69, 13, 105, 127,
     -92, 39, -55, 64, -31, -25, -7, -127, -45, -86, -109, 4, -62, 91, -61, -27, 78, -60, -30, 32, 29, 86, 9,
@@ -39,35 +43,35 @@ _Alignas(4) static const int8_t conv2Weights[308] = {
     -51, 19, 47, -127, 17, 41, 72, -103, 45, -28,
 };
 
-_Alignas(4) static const int32_t conv2Bias[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Bias[32] = {
     64249, 87884, 121148, 0, -65680, -9631, -1602, -33913, 2095, 17687, 43481, -18591, 345, -9994, 0, 45729,
     81487, 74263, 12449, 2, 43090, 1640, 2, -1356, 1, 0, 1, 5834, -9176, 25139, -8207, 2,
 };
 
-_Alignas(4) static const int32_t conv2Multiplier[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Multiplier[32] = {
     1372236340, 1198378803, 1399092291, 1073741824, 1974605046, 1229888609, 1148265118, 1193190375,
     1177699399, 1457578535, 1841158920, 1203497540, 1837317837, 1173632523, 1073741824, 1796416495,
     1616790197, 1178497759, 1787352000, 1073741824, 1859313240, 2136113409, 1073741824, 1080012717,
     1073741824, 1073741824, 1073741824, 1750042366, 1410111613, 1165249257, 1853770763, 1073741824,
 };
 
-_Alignas(4) static const int8_t conv2Shift[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Shift[32] = {
     -9, -8, -8, 1, -9, -8, -8, -8, -8, -9, -9, -8, -9, -7, 1, -9, -9, -8, -9, 1, -9, -9, 1, -8, 1, 1, 1, -9,
     -8, -8, -9, 1,
 };
 
-_Alignas(4) static const uint16_t conv2BlockCounts[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv2BlockCounts[32] = {
     2, 6, 4, 0, 4, 5, 3, 4, 3, 1, 1, 4, 5, 4, 0, 1, 5, 4, 2, 0, 3, 2, 0, 2, 0, 0, 0, 2, 4, 4, 2, 0,
 };
 
-_Alignas(4) static const uint8_t conv2BlockSkips[77] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv2BlockSkips[77] = {
     7, 3, 0, 5, 0, 0, 0, 0, 1, 3, 4, 0, 3, 0, 3, 2, 1, 5, 1, 0, 0, 3, 5, 0, 4, 2, 1, 1, 7, 1, 1, 10, 0, 0,
     2, 2, 2, 1, 1, 2, 1, 0, 4, 3, 0, 0, 4, 3, 0, 1, 0, 2, 3, 1, 0, 1, 5, 4, 3, 3, 3, 4, 5, 0, 0, 6, 3, 0, 1,
     2, 4, 0, 7, 0, 0, 3, 3,
 };
 
 
-_Alignas(4) static const int8_t dense1Weights[1428] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense1Weights[1428] = {
     15, 69, 109, -35, -4, 50, -48, 113, 37, 81, 124, -32, -31, 1, -13, 104, 35, 41, 102, -6, 0, 0, 0, 0,
     -78, -72, 0, 83, 66, -34, -79, -25, 98, -88, 31, -32, -111, -29, -33, 94, 54, -36, -94, -22, -34, 73,
     -103, 36, -63, 51, -12, 64, 127, -2, -58, 99, -31, 47, -15, 58, -21, 14, 7, -105, 39, -78, -7, -73, 50,
@@ -130,25 +134,25 @@ _Alignas(4) static const int8_t dense1Weights[1428] = {
     17, 2, 64, 0, 0, 0, 0, 85, 12, -15, -30, 2, 72, -46, 25, 48, 37, -32, 52,
 };
 
-_Alignas(4) static const int32_t dense1Bias[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense1Bias[16] = {
     0, 81380, -53366, 143682, 97467, -137631, 0, -292135, -246893, 127135, 0, 206072, -150058, -164787,
     -123856, 82377,
 };
 
-_Alignas(4) static const int32_t dense1Multiplier[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense1Multiplier[16] = {
     1073741824, 1180828201, 1297960349, 1279753420, 1549163803, 1540226380, 1073741824, 1449997915,
     1417543702, 2052874521, 1073741824, 1379221770, 1200665509, 1193668907, 1169595493, 1473661163,
 };
 
-_Alignas(4) static const int8_t dense1Shift[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense1Shift[16] = {
     1, -8, -8, -8, -8, -8, 1, -7, -8, -9, 1, -8, -8, -8, -7, -8,
 };
 
-_Alignas(4) static const uint16_t dense1BlockCounts[16] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t dense1BlockCounts[16] = {
     0, 15, 47, 25, 15, 36, 0, 51, 39, 10, 0, 23, 18, 26, 44, 8,
 };
 
-_Alignas(4) static const uint8_t dense1BlockSkips[357] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t dense1BlockSkips[357] = {
     7, 5, 1, 17, 5, 255, 10, 106, 11, 0, 10, 99, 1, 5, 1, 1, 1, 3, 19, 49, 39, 21, 17, 47, 7, 0, 106, 23, 3,
     23, 19, 3, 2, 23, 0, 4, 0, 9, 3, 3, 0, 4, 9, 9, 3, 9, 3, 15, 3, 0, 2, 3, 3, 7, 2, 1, 1, 0, 0, 0, 1, 0,
     1, 3, 1, 0, 1, 1, 2, 1, 7, 199, 23, 23, 23, 71, 8, 38, 8, 58, 18, 3, 0, 22, 0, 4, 2, 1, 17, 13, 5, 194,
@@ -164,25 +168,25 @@ _Alignas(4) static const uint8_t dense1BlockSkips[357] = {
 };
 
 
-_Alignas(4) static const int8_t dense2Weights[32] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense2Weights[32] = {
     -27, 5, 73, 87, 93, -110, -57, -17, -96, -92, -77, 127, -106, -101, -26, 32, 39, -31, -127, -59, -88,
     30, -32, 101, 25, -6, 31, -11, 67, 35, 112, -91,
 };
 
-_Alignas(4) static const int32_t dense2Bias[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense2Bias[2] = {
     -37607, -423,
 };
 
-_Alignas(4) static const int32_t dense2Multiplier[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t dense2Multiplier[2] = {
     1640865483, 1742894183,
 };
 
-_Alignas(4) static const int8_t dense2Shift[2] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t dense2Shift[2] = {
     -7, -7,
 };
 
 
-static const layerInt8_t layers[] = {
+static AIRTOUCH_MODEL_CONST layerInt8_t layers[] = {
     {.kind = LAYER_CONV, LAYER_IN(100, 3, 1), LAYER_OUT(98, 3, 16), LAYER_KERNEL(3, 1), LAYER_RANGE(-128, -128, 127),
      LAYER_DENSE_ARRAYS(conv1)},
     {.kind = LAYER_MAX_POOL, LAYER_IN(98, 3, 16), LAYER_OUT(49, 3, 16), LAYER_KERNEL(2, 1), LAYER_RANGE(-128, -128, 127)},
@@ -195,7 +199,7 @@ static const layerInt8_t layers[] = {
      LAYER_DENSE_ARRAYS(dense2)},
 };
 
-const networkInt8_t airtouchRolling = {
+AIRTOUCH_MODEL_CONST networkInt8_t airtouchRolling = {
     .layers = layers,
     .layerCount = 6,
     .inputScale = 2.968683839e-02f,
@@ -204,7 +208,7 @@ const networkInt8_t airtouchRolling = {
     .outputZeroPoint = 37,
 };
 
-const fixedScale_t airtouchRollingScale = {
+AIRTOUCH_MODEL_CONST fixedScale_t airtouchRollingScale = {
     .columns = 3,
     .mean = {-1.482390308e+01f, -1.692740250e+01f, 2.719960976e+01f},
     .inverseDeviation = {4.702513516e-01f, 3.267442286e-01f, 2.425670475e-01f},

@@ -2,7 +2,11 @@
 // Model SHA-256: f7657a4eb8eb06959b699c5d7935de820b003181cb6aa2317534997f19199421
 #include "airtouch_stream.h"
 
-_Alignas(4) static const int8_t conv0Weights[1152] = {
+#ifndef AIRTOUCH_MODEL_CONST
+#define AIRTOUCH_MODEL_CONST const
+#endif
+
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv0Weights[1152] = {
     20, 11, -70, 39, 11, -4, -78, -34, 18, -63, 9, -41, 11, 5, -25, 95, 27, 71, -40, 13, 8, -36, 1, -9, 34,
     -6, -26, 35, 38, -10, -92, -29, 59, 21, -77, -11, 10, -48, -72, 127, -1, 37, -16, -32, -17, -50, -44,
     -55, -42, 5, 12, 16, 9, 2, -2, 6, 31, 36, -12, 12, -19, -4, -6, -16, -16, 3, 23, -1, -4, 101, -17, 22,
@@ -55,23 +59,23 @@ _Alignas(4) static const int8_t conv0Weights[1152] = {
     19,
 };
 
-_Alignas(4) static const int32_t conv0Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv0Bias[24] = {
     -2106, -198, -3599, 1, -1481, -5107, -1885, -1874, 204, 1753, 21, -727, 1972, -355, -794, -250, -4368,
     -568, -993, -1064, -243, -522, -196, -85,
 };
 
-_Alignas(4) static const int32_t conv0Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv0Multiplier[24] = {
     1200837717, 1721885101, 1270562696, 1997287146, 1096598645, 1559939900, 1231293168, 1928089618,
     1260637971, 1300288523, 2076202594, 1098169300, 1717510769, 1933614415, 1111730607, 1294900566,
     2000450882, 1138998025, 1808498861, 1091701656, 1092179783, 1246597073, 1133095293, 1125008239,
 };
 
-_Alignas(4) static const int8_t conv0Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv0Shift[24] = {
     -8, -8, -8, -9, -8, -9, -8, -9, -8, -8, -9, -8, -9, -9, -8, -8, -9, -8, -8, -8, -8, -8, -8, -8,
 };
 
 
-_Alignas(4) static const int8_t conv1Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Weights[864] = {
     16, -22, -127, -65, 35, -38, 99, 4, -31, -32, -117, 47, -100, 35, -3, -15, 95, 38, -34, 44, 15, -51,
     -118, -4, 10, -7, -80, -60, -77, -37, 78, 53, 5, 11, 29, -84, -65, 54, -121, 59, 47, -105, 71, 84, 9,
     -39, -117, 20, -55, -97, 61, 46, 26, 24, 127, -58, -108, -121, -47, 22, -71, 0, 30, 49, -33, -61, 61, 5,
@@ -112,27 +116,27 @@ _Alignas(4) static const int8_t conv1Weights[864] = {
     104, 26, 49, -13, -67, 67, 67, 36, -30, 83, 44, -73, 43, -80, -75, -37, -15, -64, -52, 95, -32, -47,
 };
 
-_Alignas(4) static const int32_t conv1Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Bias[24] = {
     -61566, -34379, -17601, 16543, 55602, -114450, 43723, -56089, 22774, -47136, -27339, -7284, 84809,
     -58175, -21164, -17461, 140240, 41328, -2381, 66011, -49138, 3933, 33998, -20356,
 };
 
-_Alignas(4) static const int32_t conv1Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv1Multiplier[24] = {
     1080986422, 1503124722, 1435471200, 1880255815, 1462157460, 1213626130, 1622647740, 1434047731,
     1726602926, 1900985092, 1587444195, 1374461802, 1785027883, 1142664590, 1108648964, 1685617598,
     1866475062, 1895023554, 1432790960, 1145389086, 2117298883, 1945643415, 1952340068, 1101940013,
 };
 
-_Alignas(4) static const int8_t conv1Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv1Shift[24] = {
     -9, -10, -9, -10, -10, -9, -10, -10, -10, -10, -10, -9, -10, -9, -9, -10, -10, -10, -10, -9, -10, -10,
     -10, -9,
 };
 
-_Alignas(4) static const uint16_t conv1BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv1BlockCounts[24] = {
     9, 6, 9, 8, 4, 15, 10, 6, 10, 9, 7, 14, 10, 10, 10, 7, 8, 7, 8, 6, 13, 9, 11, 10,
 };
 
-_Alignas(4) static const uint8_t conv1BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv1BlockSkips[216] = {
     0, 0, 2, 3, 0, 0, 1, 1, 2, 0, 2, 0, 4, 1, 2, 0, 0, 2, 0, 1, 3, 1, 0, 1, 2, 2, 0, 1, 0, 2, 1, 2, 1, 4, 4,
     4, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 3, 1, 0, 0, 0, 1, 1, 1, 0, 1, 1, 1, 7, 0, 2, 0, 1, 2, 2,
     1, 0, 0, 0, 0, 0, 1, 1, 0, 3, 2, 0, 0, 1, 0, 2, 1, 1, 1, 2, 5, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 0,
@@ -143,7 +147,7 @@ _Alignas(4) static const uint8_t conv1BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t conv2Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Weights[864] = {
     54, -23, -95, 17, 34, 40, -105, -29, -42, -108, 30, -31, -10, 41, -82, -77, 100, -68, 86, 35, 0, 58, -7,
     -102, 36, -49, -94, -43, 73, -48, -127, 31, 87, -85, -83, 61, 21, 22, 102, -50, -90, 1, -12, -21, 41,
     16, -88, -38, -39, -96, 62, -51, -56, -29, 52, -4, 93, -41, -55, -28, -46, 42, -64, -68, -81, 112, 16,
@@ -184,26 +188,26 @@ _Alignas(4) static const int8_t conv2Weights[864] = {
     -28, 85, 31, -17, 61, 56, 71, 90, -34, 75, 19,
 };
 
-_Alignas(4) static const int32_t conv2Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Bias[24] = {
     -103818, -14153, 143577, -89045, 74950, -160726, 64592, -26700, 40902, -69120, 3748, -54390, 3014,
     63492, 187611, -77973, 71586, -69784, -17443, 19285, 49974, 80225, 36650, 106872,
 };
 
-_Alignas(4) static const int32_t conv2Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv2Multiplier[24] = {
     1871281664, 1594716544, 1337115904, 1567110144, 1568554880, 1190896640, 1489201024, 2041940352,
     1824494336, 1166265728, 1135464576, 1809518720, 1290003712, 1390066432, 1829220736, 2130030208,
     1112424704, 1925624576, 1890813696, 1246186752, 1886543744, 1639342720, 1588253568, 1570041088,
 };
 
-_Alignas(4) static const int8_t conv2Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv2Shift[24] = {
     -8, -8, -8, -7, -8, -8, -8, -8, -8, -7, -8, -8, -8, -8, -8, -8, -7, -8, -8, -7, -8, -8, -8, -8,
 };
 
-_Alignas(4) static const uint16_t conv2BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv2BlockCounts[24] = {
     15, 5, 7, 13, 4, 6, 3, 15, 8, 10, 6, 9, 6, 4, 9, 14, 7, 13, 13, 11, 9, 10, 10, 9,
 };
 
-_Alignas(4) static const uint8_t conv2BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv2BlockSkips[216] = {
     0, 0, 1, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 2, 0, 5, 0, 2, 7, 1, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0,
     1, 0, 0, 2, 1, 8, 3, 0, 0, 4, 1, 3, 0, 2, 1, 0, 0, 5, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0,
     3, 0, 0, 2, 4, 0, 1, 1, 1, 1, 0, 0, 0, 1, 0, 1, 1, 1, 0, 1, 3, 1, 2, 0, 1, 3, 2, 0, 0, 1, 0, 1, 1, 3, 5,
@@ -214,7 +218,7 @@ _Alignas(4) static const uint8_t conv2BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t conv3Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv3Weights[864] = {
     -31, -115, -68, -77, 59, -92, -85, 77, -76, 81, -125, -5, -127, -88, 31, 63, 51, -103, -109, -126, 95,
     35, -9, -127, -9, 15, 73, -47, 5, 7, 57, 105, 75, 46, 33, -33, -23, -2, 70, -36, 22, 24, -39, -83, -52,
     -58, -23, 19, 20, 12, -45, -118, 22, 32, -79, -44, 22, 25, 26, -99, -95, -12, -22, 1, -37, -67, -57,
@@ -255,26 +259,26 @@ _Alignas(4) static const int8_t conv3Weights[864] = {
     1, -27, 16, 66, 84, -69, -61, 59, 16,
 };
 
-_Alignas(4) static const int32_t conv3Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv3Bias[24] = {
     -110779, -53567, 101845, 90139, -36087, 116895, 71610, 81308, 60123, 27909, 36232, 118478, -78956,
     -26964, 67322, 6580, 40017, 10954, 137241, 13206, -34284, -142531, 33208, 75850,
 };
 
-_Alignas(4) static const int32_t conv3Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv3Multiplier[24] = {
     1084814592, 2095583488, 1100440576, 1611559808, 1141943296, 1743468800, 1824827776, 1274055296,
     2047902720, 1879227264, 1107381760, 2051257728, 1090489728, 2138635136, 1095534848, 1880103424,
     1821116800, 1151915904, 1878785792, 1794166784, 1387237632, 1290850816, 1407407744, 1767516672,
 };
 
-_Alignas(4) static const int8_t conv3Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv3Shift[24] = {
     -8, -8, -7, -8, -7, -8, -8, -7, -8, -8, -7, -8, -7, -8, -7, -8, -8, -7, -8, -8, -8, -8, -8, -8,
 };
 
-_Alignas(4) static const uint16_t conv3BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv3BlockCounts[24] = {
     5, 14, 8, 6, 13, 7, 9, 12, 8, 10, 12, 9, 14, 11, 7, 5, 5, 11, 11, 9, 7, 6, 5, 12,
 };
 
-_Alignas(4) static const uint8_t conv3BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv3BlockSkips[216] = {
     0, 2, 8, 3, 0, 0, 0, 1, 0, 0, 0, 2, 0, 1, 0, 0, 0, 0, 0, 4, 0, 0, 3, 0, 0, 0, 2, 2, 5, 2, 2, 0, 0, 0, 0,
     0, 3, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 5, 2, 3, 0, 3, 0, 0, 4, 0, 1, 0, 0, 0, 0, 0, 0, 1, 1, 0, 2, 0,
     0, 2, 0, 0, 0, 1, 1, 0, 0, 1, 5, 0, 1, 0, 1, 0, 4, 1, 0, 0, 0, 0, 0, 0, 0, 3, 0, 1, 0, 1, 1, 0, 0, 0, 2,
@@ -285,7 +289,7 @@ _Alignas(4) static const uint8_t conv3BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t conv4Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv4Weights[864] = {
     -28, 72, 69, 73, 4, 91, -12, 78, 122, 48, -19, 113, 40, -30, 98, 52, -76, -48, -62, 88, 75, -21, -42,
     88, -127, 65, -20, -118, 62, 89, 27, -43, 63, -80, 27, 87, -58, 72, 6, 81, 95, 94, -25, -58, 23, 38, 63,
     61, 56, 64, 127, -3, -3, -115, 30, -26, 45, -57, -96, -22, 21, 75, -6, -19, 43, -97, 42, 14, -12, -76,
@@ -326,26 +330,26 @@ _Alignas(4) static const int8_t conv4Weights[864] = {
     37, 21, -17,
 };
 
-_Alignas(4) static const int32_t conv4Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv4Bias[24] = {
     102997, 50205, -25861, 110957, 118143, 49026, 33465, -50593, -41583, -85793, -64433, 95274, -23003,
     -54737, -16525, 10135, -64553, 16367, -61229, 59885, 9719, -22500, 79044, 8502,
 };
 
-_Alignas(4) static const int32_t conv4Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv4Multiplier[24] = {
     1518009984, 2046282752, 1117938816, 1835829376, 1748621568, 1782799232, 2021306496, 1425691008,
     1281428992, 1215135488, 1670247424, 1434665984, 1075074944, 1342282112, 1767817088, 1755002368,
     1165443968, 1636104192, 1321301120, 2000960000, 1198683008, 1822849024, 1171266304, 1601191296,
 };
 
-_Alignas(4) static const int8_t conv4Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv4Shift[24] = {
     -8, -8, -7, -8, -8, -8, -8, -8, -7, -7, -8, -8, -7, -7, -7, -8, -8, -8, -7, -8, -7, -8, -7, -7,
 };
 
-_Alignas(4) static const uint16_t conv4BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv4BlockCounts[24] = {
     9, 6, 13, 7, 13, 4, 6, 8, 14, 15, 4, 8, 9, 11, 13, 8, 2, 7, 6, 16, 10, 5, 10, 12,
 };
 
-_Alignas(4) static const uint8_t conv4BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv4BlockSkips[216] = {
     2, 3, 0, 0, 2, 1, 1, 0, 0, 1, 2, 1, 3, 3, 1, 0, 1, 0, 0, 2, 1, 0, 0, 0, 0, 1, 0, 0, 1, 2, 0, 1, 0, 1, 1,
     0, 1, 1, 0, 1, 0, 1, 1, 0, 0, 0, 0, 0, 2, 1, 2, 3, 2, 6, 3, 0, 1, 0, 1, 0, 1, 0, 1, 1, 3, 3, 0, 0, 0, 0,
     1, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 5, 5, 2, 2, 0, 0, 3, 0,
@@ -356,7 +360,7 @@ _Alignas(4) static const uint8_t conv4BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t conv5Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv5Weights[864] = {
     -3, 95, -53, 66, 63, -4, 89, -39, -34, -79, -20, 37, 71, 104, 83, -43, 65, 45, -2, -44, 59, -101, 9, 12,
     -77, -17, -43, 35, 89, 25, -28, 24, 7, -68, 42, 57, -115, 127, 5, -11, 29, 92, 67, 42, 8, -37, -85, 34,
     -52, 127, 32, -1, 19, 37, -52, 75, 32, 42, 47, 53, 83, 23, 38, 36, -55, 24, 45, 85, 49, -55, 8, 59, 83,
@@ -396,26 +400,26 @@ _Alignas(4) static const int8_t conv5Weights[864] = {
     15, -52, -37, -69, -45, -1, 64, 43, 93, -7, 26, 77, 62, 97, 78, 4, 2, 44, 79, -30, 64, -5, 17, -89,
 };
 
-_Alignas(4) static const int32_t conv5Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv5Bias[24] = {
     54982, 83452, -156, 5576, -60182, -88706, -1627, -21365, 92882, -30923, 59992, -24707, 7387, -71349,
     -59746, 1287, 46898, 20212, 22915, 40532, 31588, 13107, 11716, -302,
 };
 
-_Alignas(4) static const int32_t conv5Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv5Multiplier[24] = {
     1834781696, 2103792768, 1796046848, 1748470912, 1437932672, 1248538240, 2105057536, 1273400320,
     1709890048, 1892150144, 1566619904, 1213708160, 2040275200, 1228004224, 1418806400, 1446388992,
     1962449280, 1223058560, 1673530752, 1659733120, 1351746816, 1294843520, 1412039424, 1214100992,
 };
 
-_Alignas(4) static const int8_t conv5Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv5Shift[24] = {
     -8, -8, -8, -7, -7, -7, -8, -7, -8, -8, -7, -7, -8, -7, -7, -8, -8, -7, -8, -7, -7, -7, -8, -7,
 };
 
-_Alignas(4) static const uint16_t conv5BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv5BlockCounts[24] = {
     10, 11, 7, 9, 15, 12, 7, 11, 8, 8, 11, 13, 2, 11, 15, 3, 5, 4, 7, 9, 9, 10, 5, 14,
 };
 
-_Alignas(4) static const uint8_t conv5BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv5BlockSkips[216] = {
     0, 0, 1, 2, 0, 0, 0, 3, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1, 0, 0, 0, 1, 0, 5, 0, 1, 4, 0, 0, 1, 2, 0, 4, 0,
     1, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 1, 0, 0, 1, 0, 2, 0, 1, 0, 7, 1,
     0, 2, 0, 3, 2, 0, 0, 0, 0, 0, 0, 0, 0, 1, 4, 1, 1, 0, 0, 2, 1, 1, 3, 1, 3, 0, 0, 0, 0, 0, 1, 0, 0, 2, 1,
@@ -426,7 +430,7 @@ _Alignas(4) static const uint8_t conv5BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t conv6Weights[864] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv6Weights[864] = {
     -35, -80, 11, -79, -19, 25, 1, 102, 45, 45, 89, -16, -88, 10, 29, 4, -58, 15, -85, -122, 43, 14, -65,
     -16, -81, 35, 23, -30, -42, -45, 20, -57, -8, 10, -127, 25, 36, 40, -93, -6, 53, -54, 69, -78, 58, 68,
     -100, 74, 12, 0, 24, 117, 61, 70, -67, -7, 41, -119, -85, -11, 75, -3, -7, 7, -1, -45, 51, -55, 23, 35,
@@ -466,26 +470,26 @@ _Alignas(4) static const int8_t conv6Weights[864] = {
     4, -60, -41, -38, -85, 15, 17, 79, -43, -57, -42, 54, 32, -41, 76, -52, -127,
 };
 
-_Alignas(4) static const int32_t conv6Bias[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv6Bias[24] = {
     -36826, 24719, -22654, 18291, 19841, -26952, -112792, 30077, -43843, 98473, 94402, 38647, 40903, 18808,
     -18198, -27145, -39890, 66718, 9956, 109959, 54270, 22090, -74221, -25540,
 };
 
-_Alignas(4) static const int32_t conv6Multiplier[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t conv6Multiplier[24] = {
     1261672704, 1454310016, 1503102848, 1855607168, 1189480576, 1101562752, 1084909952, 1835822080,
     1446296704, 1818623744, 1488158080, 2101835520, 1254042240, 1343632128, 1451298560, 1598135808,
     1740846720, 1307863552, 1117935104, 1951520640, 2140723840, 2000631168, 1967482368, 1299526144,
 };
 
-_Alignas(4) static const int8_t conv6Shift[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t conv6Shift[24] = {
     -7, -7, -7, -7, -7, -7, -7, -7, -7, -8, -7, -8, -7, -7, -7, -7, -7, -7, -7, -8, -8, -8, -7, -7,
 };
 
-_Alignas(4) static const uint16_t conv6BlockCounts[24] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint16_t conv6BlockCounts[24] = {
     13, 10, 13, 8, 5, 7, 8, 8, 11, 7, 10, 7, 10, 7, 13, 8, 8, 12, 9, 9, 6, 8, 14, 5,
 };
 
-_Alignas(4) static const uint8_t conv6BlockSkips[216] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST uint8_t conv6BlockSkips[216] = {
     1, 0, 0, 0, 0, 0, 1, 1, 0, 1, 0, 1, 0, 2, 0, 1, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0,
     0, 1, 3, 3, 1, 1, 0, 1, 0, 0, 2, 1, 1, 5, 1, 1, 1, 3, 4, 1, 0, 3, 3, 2, 0, 0, 0, 0, 1, 1, 0, 2, 0, 2, 2,
     1, 2, 0, 0, 2, 0, 3, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 0, 0, 0, 2, 5, 0, 0, 1, 0, 0, 0, 0, 1, 1, 3,
@@ -496,7 +500,7 @@ _Alignas(4) static const uint8_t conv6BlockSkips[216] = {
 };
 
 
-_Alignas(4) static const int8_t headWeights[432] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t headWeights[432] = {
     -38, -20, 36, 31, 15, 30, 48, 5, 64, -55, 5, -53, 45, -3, -51, 12, -35, 29, -7, 8, -24, -72, 20, 20, -1,
     -32, 23, -93, 28, -23, -12, -46, 18, -50, -53, -38, -56, 41, 9, -29, 40, 8, -52, 27, -34, 4, -64, 35,
     -24, -64, 3, -46, -96, -57, -33, -8, 33, 10, -9, -31, 61, -47, -2, -5, -45, -28, -59, -22, -44, 46, 23,
@@ -518,20 +522,20 @@ _Alignas(4) static const int8_t headWeights[432] = {
     9, -27, -45, 28, -54, -11, -16,
 };
 
-_Alignas(4) static const int32_t headBias[3] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t headBias[3] = {
     -135805, -256126, -109392,
 };
 
-_Alignas(4) static const int32_t headMultiplier[3] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t headMultiplier[3] = {
     1889990318, 2107850547, 2093540591,
 };
 
-_Alignas(4) static const int8_t headShift[3] = {
+_Alignas(4) static AIRTOUCH_MODEL_CONST int8_t headShift[3] = {
     -9, -9, -9,
 };
 
 
-static const streamConv_t convs[] = {
+static AIRTOUCH_MODEL_CONST streamConv_t convs[] = {
     {.dilation = 1, .zeroPoint = -1, .layer =
      {.kind = LAYER_DENSE, LAYER_IN(4, 1, 12), LAYER_OUT(1, 1, 24), LAYER_KERNEL(1, 1), LAYER_RANGE(-128, -128, 127),
      LAYER_DENSE_ARRAYS(conv0)}},
@@ -555,11 +559,11 @@ static const streamConv_t convs[] = {
      LAYER_SPARSE_ARRAYS(conv6)}},
 };
 
-static const layerInt8_t head =
+static AIRTOUCH_MODEL_CONST layerInt8_t head =
     {.kind = LAYER_DENSE, LAYER_IN(6, 1, 24), LAYER_OUT(1, 1, 3), LAYER_KERNEL(1, 1), LAYER_RANGE(93, -128, 127),
      LAYER_DENSE_ARRAYS(head)};
 
-const streamInt8_t airtouchStream = {
+AIRTOUCH_MODEL_CONST streamInt8_t airtouchStream = {
     .convs = convs,
     .convCount = 7,
     .stride = 2,
@@ -567,14 +571,14 @@ const streamInt8_t airtouchStream = {
     .head = &head,
 };
 
-const streamQuantisation_t airtouchStreamQuantisation = {
+AIRTOUCH_MODEL_CONST streamQuantisation_t airtouchStreamQuantisation = {
     .inputScale = 3.137255087e-02f,
     .outputScale = 4.368918240e-01f,
     .inputZeroPoint = -1,
     .outputZeroPoint = 93,
 };
 
-const decoderConfig_t airtouchStreamDecoder = {
+AIRTOUCH_MODEL_CONST decoderConfig_t airtouchStreamDecoder = {
     .overShare = 3.000000119e-01f,
     .entryScore = AIRTOUCH_STREAM_ENTRY_SCORE,
     .exitScore = AIRTOUCH_STREAM_EXIT_SCORE,
@@ -587,7 +591,7 @@ const decoderConfig_t airtouchStreamDecoder = {
     .holdSteps = 20,
 };
 
-const motionConfig_t airtouchStreamMotion = {
+AIRTOUCH_MODEL_CONST motionConfig_t airtouchStreamMotion = {
     .vehicle = {.mass = 3.620000184e-02f, .gravity = 9.810000420e+00f,
                 .thrust = {5.484999856e-04f, 1.032600039e-06f, 2.130299930e-11f},
                 .nominalVoltage = 3.799999952e+00f},

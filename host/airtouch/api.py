@@ -5,6 +5,7 @@
 names. Heavy modules are imported at their first use, so `import airtouch` is fast.
 """
 
+import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -99,8 +100,7 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
 
     module, log = registry.get(detector), read(flight)
     scoring.check(log, scoring.spare_of(module))
-    trained = module.load(Path(model) if model else None)
-    return module.run(log, module.model_for(trained, log) if hasattr(module, "model_for") else trained)
+    return module.run(log, registry.model_for(module, module.load(Path(model) if model else None), log))
 
 
 @in_python
@@ -258,9 +258,17 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
     if named is None:
         craft, warning = vehicles.of_log(logs[0].meta if logs else {})
         if warning:
-            warnings.warn(python_words(warning), stacklevel=4)  # the caller of at.gap.diagnose
+            warnings.warn(python_words(warning), stacklevel=_caller_level())
         return craft
     return vehicles.load(named) if isinstance(named, (str, Path)) else named
+
+
+def _caller_level() -> int:
+    """The `stacklevel` of a warning, given in the function that calls this, for the first caller outside AirTouch."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == "airtouch":
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _pandas() -> Any:

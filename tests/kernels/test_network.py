@@ -153,3 +153,10 @@ def test_windows_of_another_shape_are_refused() -> None:
         c_network.infer_int8(model, np.zeros((4, 50, 3), np.float32))
     with pytest.raises(AirTouchError, match="needs features"):
         c_network.probability_of_flight(model, np.zeros((400, 4), np.float32))
+
+
+def test_a_network_without_weights_runs() -> None:
+    """A pool alone: the largest of each two."""
+    shape = int8_network.Int8Layer(int8_network.MAX_POOL, (4, 1, 1), (2, 1, 1), (2, 1), 1.0, 0, 1.0, 0)
+    inputs = np.array([[3, -5, -7, -2], [1, 2, 3, 4]], np.int8)
+    assert c_network.run_int8(int8_network.Int8Network((shape,)), inputs).tolist() == [[3, -2], [2, 4]]

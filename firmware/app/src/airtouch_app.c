@@ -104,9 +104,11 @@ LOG_ADD(LOG_FLOAT, fAcc, &core.log.feature[0])
 LOG_ADD(LOG_FLOAT, fGyro, &core.log.feature[1])
 /** @brief Fused feature of the motors, PWM^3 */
 LOG_ADD(LOG_FLOAT, fMotor, &core.log.feature[2])
-/** @brief Disturbance force f_w, level axes [N] */
+/** @brief Disturbance force f_w, level x axis [N] */
 LOG_ADD(LOG_FLOAT, fwx, &core.log.force[0])
+/** @brief Disturbance force f_w, level y axis [N] */
 LOG_ADD(LOG_FLOAT, fwy, &core.log.force[1])
+/** @brief Disturbance force f_w, upwards [N] */
 LOG_ADD(LOG_FLOAT, fwz, &core.log.force[2])
 /** @brief FR-CFAR: the cell under test [N^2] */
 LOG_ADD(LOG_FLOAT, cell, &core.log.cfarPower)
@@ -116,9 +118,11 @@ LOG_ADD(LOG_FLOAT, thresh, &core.log.threshold)
 LOG_ADD(LOG_UINT8, alert, &core.log.alert)
 /** @brief P(over a platform), NaN while unknown */
 LOG_ADD(LOG_FLOAT, prob, &core.log.probability)
-/** @brief `best`: logits of over, entry, exit */
+/** @brief `best`: logit of being over a platform */
 LOG_ADD(LOG_FLOAT, lOver, &core.log.logit[0])
+/** @brief `best`: logit of an entry */
 LOG_ADD(LOG_FLOAT, lEntry, &core.log.logit[1])
+/** @brief `best`: logit of an exit */
 LOG_ADD(LOG_FLOAT, lExit, &core.log.logit[2])
 /** @brief Edges reported so far */
 LOG_ADD(LOG_UINT16, edges, &core.log.edges)
@@ -132,8 +136,9 @@ LOG_ADD(LOG_UINT8, over, &core.log.over)
 LOG_ADD(LOG_UINT32, steps, &core.log.samples)
 /** @brief 0 is good; bits: app_core.h, appHealth_t */
 LOG_ADD_BY_FUNCTION(LOG_UINT16, health, &healthLogger)
-/** @brief Time of the last step, and of the longest [us] */
+/** @brief Time of the last step [us] */
 LOG_ADD(LOG_UINT16, load, &core.log.load)
+/** @brief Time of the longest step so far [us] */
 LOG_ADD(LOG_UINT16, loadMax, &core.log.loadMax)
 /** @brief Steps that began late */
 LOG_ADD(LOG_UINT16, late, &core.log.late)

@@ -38,6 +38,9 @@ static bool findVariables(void) {
   return variablesFound;
 }
 
+/** Forgets the floor; the count of its steps stays. */
+static void resetFloor(void) { state = (floorHeight_t){.steps = state.steps}; }
+
 /** Of the angle between beam and plumb, as the estimator counts it. */
 static float tiltCosine(void) {
   const float x = logGetFloat(ids[QX]), y = logGetFloat(ids[QY]);
@@ -48,7 +51,7 @@ static float tiltCosine(void) {
 
 static void correctRange(tofMeasurement_t *tof) {
   if (!supervisorIsFlying()) {
-    state = (floorHeight_t){.steps = state.steps};
+    resetFloor();
     return;
   }
   tof->distance = floorHeightRange(&state, tof->distance, xTaskGetTickCount(), tiltCosine(), logGetFloat(ids[CLIMB]),
@@ -70,7 +73,7 @@ void __wrap_estimatorEnqueue(const measurement_t *measurement) {
   const bool tof = measurement->type == MeasurementTypeTOF;
   if (!enable || !(tof || measurement->type == MeasurementTypeFlow) || !findVariables()) {
     if (!enable) {
-      state = (floorHeight_t){.steps = state.steps};
+      resetFloor();
     }
     __real_estimatorEnqueue(measurement);
     return;

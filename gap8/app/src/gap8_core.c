@@ -158,8 +158,8 @@ static bool paperFits(const networkInt8_t *network) {
          networkInt8ArenaBytes(network) <= AIRTOUCH_MODEL_ARENA_BYTES;
 }
 
-/** Plans the network where its state will be. */
-static bool paperStreamFits(const gap8Models_t *models, rollingInt8_t *plan) {
+/** Plans the network where its state will be; returns whether it fits. */
+static bool planPaperStream(const gap8Models_t *models, rollingInt8_t *plan) {
   return takesFeatures(models->paperStream, AIRTOUCH_ROLLING_COLUMNS, AIRTOUCH_ROLLING_OUTPUTS) &&
          models->paperStreamScale->columns == AIRTOUCH_ROLLING_COLUMNS &&
          rollingInt8Plan(plan, models->paperStream, AIRTOUCH_ROLLING_STRIDE) &&
@@ -193,7 +193,7 @@ int32_t gap8CoreInit(gap8Core_t *core, const gap8Models_t *models, const gap8Tea
                                .stride = 1,
                                .algorithm = EDGE_LINK_PAPER});
   }
-  if (paperStreamFits(models, &core->paperStream.state)) {
+  if (planPaperStream(models, &core->paperStream.state)) {
     addNetwork(core, &count, AIRTOUCH_ROLLING_SHA256,
                (linkNetwork_t){.reset = resetPaperStream,
                                .step = stepPaperStream,

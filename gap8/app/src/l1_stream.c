@@ -4,7 +4,7 @@
 #include "airtouch_stream.h"
 #include "l1_models.h"
 
-#define const PI_CL_L1
+#define AIRTOUCH_MODEL_CONST PI_CL_L1
 #define airtouchStream gap8L1Stream
 #define airtouchStreamQuantisation gap8L1StreamQuantisation
 #define airtouchStreamDecoder gap8L1StreamDecoder

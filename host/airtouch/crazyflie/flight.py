@@ -26,6 +26,9 @@ LINK_TIMEOUT_S = 3.0  #: s of silence, after which the drone lands as soon as th
 FORGOTTEN_S = 1.0  #: s of silence, after which the firmware has deleted the log blocks
 GIVE_UP_S = 60.0  #: s without an answer to the land command, after which the flight gives up
 DOWN_S = 3.0  #: s, duration of a landing after an error
+SILENCE_S = 0.5  #: s without a packet that the flight notes; chosen
+LAND_TRIES, LAND_WAIT_S = 50, 0.1  #: land commands after an error, and s to wait for the answer to each; chosen
+STOP_EVERY_S = 5 * TURN_S  #: s between two "stop" commands after a flight; chosen
 AFTER_S = 0.5  #: s of log after the motors have stopped
 BATTERY_SAMPLES = 100  #: samples (1 s) whose median voltage counts, so that a climb does not end the flight
 
@@ -160,12 +163,12 @@ class Flight:
         return True
 
     def _silence(self, wall: float) -> float:
-        """Seconds since the last packet, or since the flight began; notes each silence of over half a second."""
+        """Seconds since the last packet, or since the flight began; notes each silence of over SILENCE_S."""
         heard = self.intake.last_arrival_s
         silence = wall - (self._began if heard is None else max(heard, self._began))
-        if silence > 0.5 and self._silent_since is None:
+        if silence > SILENCE_S and self._silent_since is None:
             self._silent_since = wall - silence
-        elif silence < 0.5 and self._silent_since is not None:
+        elif silence < SILENCE_S and self._silent_since is not None:
             self.silences.append(round(wall - self._silent_since, 2))
             self._tell(f"the drone is heard again after {self.silences[-1]:.1f} s of silence")
             self._silent_since = None
@@ -208,7 +211,7 @@ class Flight:
         while self.clock() < until:
             self._receive()
             self.craft.send([Command("stop")])
-            self.sleep(5 * TURN_S)
+            self.sleep(STOP_EVERY_S)
         self._receive()
 
     def _bring_down(self) -> None:
@@ -218,10 +221,10 @@ class Flight:
             return
         self._tell("an error in flight: landing")
         command = Command("land", z_m=self.pilot.origin.z_m, seconds=DOWN_S)
-        for _ in range(50):
+        for _ in range(LAND_TRIES):
             try:
                 self.craft.send([command])
-                self.sleep(0.1)
+                self.sleep(LAND_WAIT_S)
                 if any(kind == "land" for kind, _ in drain(self.craft.answers)):
                     self.landed = True
                     self.sleep(command.seconds + 1.0)

@@ -19,8 +19,9 @@ from typing import Any
 
 PATIENCE_S = 60.0  #: s to wait for a drone out of reach or a radio that is still busy
 RESEND_S = 0.2  #: s between two land commands, until one is answered
-HEADER = 0x8C  #: CRTP port 8, channel 0
-LAND = 8
+PORT = 8  #: CRTP port of the high-level commander
+HEADER = PORT << 4 | 0x0C  #: of its packets on channel 0
+LAND = 8  #: COMMAND_LAND_2
 
 
 def land_packet(height_m: float, seconds: float) -> bytes:
@@ -80,7 +81,7 @@ def _answered(link: Any) -> bool:
     until = time.monotonic() + RESEND_S
     while time.monotonic() < until:
         packet = link.receive_packet(0.05)
-        if packet is not None and packet.port == 8 and packet.data[:1] == bytes([LAND]):
+        if packet is not None and packet.port == PORT and packet.data[:1] == bytes([LAND]):
             return True
     return False
 

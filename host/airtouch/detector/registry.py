@@ -21,8 +21,7 @@ DETECTORS = {
 class Detector(Protocol):
     """What a detector's module offers. `model` is whatever its `fit` and `load` return.
 
-    A module with `model_for(model, log)` has several models and picks the one for a log. One that says SPARE_SENSORS =
-    k takes logs that lack k of acceleration, rates and motors; others need all.
+    One that says SPARE_SENSORS = k takes logs that lack k of acceleration, rates and motors; others need all.
     """
 
     def run(self, log: FlightLog, model: Any = None) -> Trace:
@@ -56,6 +55,19 @@ class InFloat(Detector, Protocol):
 
     def run_float(self, log: FlightLog, model: Any = None) -> Trace:
         """As `run`."""
+
+
+@runtime_checkable
+class Choosing(Protocol):
+    """A detector with several models, which picks one by the sensors that a log holds."""
+
+    def model_for(self, model: Any, log: FlightLog) -> Any:
+        """The model that serves this log."""
+
+
+def model_for(detector: Detector, model: Any, log: FlightLog) -> Any:
+    """The model that serves this log: by the detector's own choice, or `model` where it has but one."""
+    return detector.model_for(model, log) if isinstance(detector, Choosing) else model
 
 
 def get(name: str | Detector) -> Detector:

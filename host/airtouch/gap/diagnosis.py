@@ -85,7 +85,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
     known = None if before is None else before.calibrated
-    study, calibration = calibrated = known or _calibrated(vehicle, nominal, without)
+    calibrated = known or _calibrated(vehicle, nominal, without)
+    study, calibration = calibrated
     if partner:
         study, note = _with_partner(study, usable[0], seconds)
         notes.append(note)

@@ -40,7 +40,7 @@ class FloatLayer:
 
 
 def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
-    """int8 logits (n, 2) of normalised windows (n, 100, 3), float32. Reference: `int8_network.infer_int8`.
+    """int8 outputs (n, outputs) of normalised windows (n, rows, columns). Reference: `int8_network.infer_int8`.
 
     Raises AirTouchError for windows of another shape than the model takes.
     """
@@ -81,14 +81,20 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
 
 
 def probability(model: Model, windows: np.ndarray) -> np.ndarray:
-    """P(over a platform), (n,), of normalised windows (n, 100, 3): softmax of the int8 logits."""
-    return softmax(model.int8, infer_int8(model, windows))
+    """P(over a platform), (n,), of normalised windows (n, rows, columns) of the model's input."""
+    return platform_probability(infer_int8(model, windows), model.int8.layers[-1].output_scale)
+
+
+def platform_probability(logits: np.ndarray, scale: float) -> np.ndarray:
+    """P(over a platform), (n,): softmax of the second of two int8 logits, (n, 2), which are in units of `scale`."""
+    difference = logits[:, 1].astype(np.float64) - logits[:, 0]
+    return 1.0 / (1.0 + np.exp(-scale * difference))
 
 
 def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
-    """P(over a platform) at each sample of a flight, (n,), from its fused features (n, 3).
+    """P(over a platform) at each sample of a flight, (n,), from its fused features (n, columns).
 
-    Row i: the window of features i - 99 to i, z-scored by itself, quantised, through the
+    Row i: the window that ends at i, as many rows as the network takes, z-scored by itself, quantised, through the
     network, all in C. NaN where that window is not full or holds a value that is not finite.
     """
     network = model.int8
@@ -101,7 +107,7 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
     lib.networkInt8Flight(flat, pointer(x), len(x), x.shape[1], rows, pointer(window), pointer(quantised), _arena(flat),
                           pointer(logits), pointer(valid))
-    return np.where(valid, softmax(network, logits), np.nan)
+    return np.where(valid, platform_probability(logits, network.layers[-1].output_scale), np.nan)
 
 
 def parameter_bytes(network: Int8Network | StreamNetwork) -> int:
@@ -138,25 +144,17 @@ def layer_shape(layer: Int8Layer) -> list[int]:
             layer.output_zero_point, layer.output_min, 127]
 
 
-def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
-    """The C view of a network whose layers fit each other, and the arrays that must outlive it."""
-    flat, keep = flat_layers(network.layers)
-    valid_size(lib.networkInt8BatchArena(flat))
-    return flat, keep
-
-
 def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     """The C view of layers, one after the other, and the arrays that must outlive it."""
     weighted = [layer for layer in layers if layer.weighted]
     packed = [packed_weights(layer) for layer in weighted]
-    padded = [np.pad(np.ravel(weights), (0, -weights.size % 4)) for weights, _, _ in packed]
     constants = [layer.c_constants() for layer in weighted]
-    weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
-                              zip((padded, *list(zip(*packed, strict=True))[1:]), (np.int8, np.uint16, np.uint8),
-                                  strict=True))
-    bias, multiplier, shift = (_joined(parts, dtype)
-                               for parts, dtype in zip(zip(*constants, strict=True), (np.int32, np.int32, np.int8),
-                                                       strict=True))
+    weights = _joined([np.pad(np.ravel(one), (0, -one.size % 4)) for one, _, _ in packed], np.int8)
+    counts = _joined([one for _, one, _ in packed], np.uint16)
+    skips = _joined([one for _, _, one in packed], np.uint8)
+    bias = _joined([one for one, _, _ in constants], np.int32)
+    multiplier = _joined([one for _, one, _ in constants], np.int32)
+    shift = _joined([one for _, _, one in constants], np.int8)
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
@@ -174,6 +172,13 @@ def valid_size(size: int) -> int:
     return size
 
 
+def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
+    """The C view of a network whose layers fit each other, and the arrays that must outlive it."""
+    flat, keep = flat_layers(network.layers)
+    valid_size(lib.networkInt8BatchArena(flat))
+    return flat, keep
+
+
 def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:
     """(n, inputs) from (n, rows, columns) or anything with as many values a row."""
     windows = np.asarray(windows)
@@ -182,12 +187,6 @@ def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:
         raise AirTouchError(f"network: needs windows (n, {shape[0]}, {shape[1] * shape[2]}), "
                             f"not {windows.shape}")
     return windows.reshape(len(windows), size)
-
-
-def softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
-    """P(over a platform), (n,), of int8 logits (n, 2)."""
-    difference = logits[:, 1].astype(np.float64) - logits[:, 0]
-    return 1.0 / (1.0 + np.exp(-network.layers[-1].output_scale * difference))
 
 
 def _arena(flat: Any) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
-from airtouch.kernels.network import Model, flat_layers, softmax
+from airtouch.kernels.network import Model, flat_layers, platform_probability
 from airtouch.reference.networks.int8_network import Int8Network, quantise
 
 
@@ -78,7 +78,7 @@ def probability_of_samples(model: ScaledModel, features: np.ndarray, stride: int
     inputs = fixed_scale(model.scale.mean, model.scale.deviation, features)
     first = network.layers[0]
     outputs, valid = run_rolling(network, quantise(inputs, first.input_scale, first.input_zero_point), stride, usable)
-    probability = softmax(network, outputs)
+    probability = platform_probability(outputs, network.layers[-1].output_scale)
     latest = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), -1))
     broken = np.maximum.accumulate(np.where(usable, -1, np.arange(len(valid))))
     return np.where(latest > broken, probability[latest], np.nan)

@@ -1,9 +1,10 @@
 """The result of a blind check: its figures beside the goals, and a picture."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airtouch.report.style import BLUE, GREY, png, style
@@ -28,7 +29,7 @@ def rows(score: Mapping[str, Any]) -> Rows:
     for level, goal in (("weakest", "at least 80 %"), ("2x", ""), ("4x", "")):
         of = score["by_severity"].get(level, {})
         add(f"top-1, {level} severity", of.get("top_1"), goal)
-        add(f"a test that is told the effect, {level} severity", of.get("ideal"))
+        add(f"test for the true effect at its true strength, {level} severity", of.get("ideal"))
     add("exact set, single effects", score["exact"])
     add("false alarms, no effect", score["false_alarms"], "at most 2 %")
     add("pairs: exact set", score["pairs_exact"], "at least 80 %")
@@ -64,28 +65,36 @@ def picture(score: Mapping[str, Any]) -> bytes:
     with style():
         figure = Figure(figsize=(12.0, 7.6), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.7, 1.0])
-        table = score["confusion"]
-        true = list(table)
-        answers = sorted({a for v in table.values() for a in v} | set(true))
-        counts = np.array([[table[t].get(a, 0) for a in answers] for t in true], float).reshape(len(true), len(answers))
-        shown = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-        left.imshow(shown, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        for i, j in zip(*np.nonzero(counts), strict=True):
-            left.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7,
-                      color="white" if shown[i, j] > 0.6 else "black")
-        left.set_xticks(range(len(answers)), answers, rotation=90)
-        left.set_yticks(range(len(true)), true)
-        left.set_xlabel("answered first")
-        left.set_title("flights by true effect (rows) and first answer", loc="left")
-        points = score["reliability"]
-        p, share = (np.array([b[k] for b in points], float) for k in ("probability", "value"))
-        bars = np.maximum([share - [b["low"] for b in points], [b["high"] for b in points] - share], 0.0)
-        right.plot([0, 1], [0, 1], color=GREY, lw=0.8)
-        right.errorbar(p, share, bars, fmt="o", color=BLUE, ms=4, lw=1)
-        for b in points:
-            right.annotate(f"{b['n']}", (b["probability"], b["value"]), xytext=(5, -9), textcoords="offset points",
-                           fontsize=7, color=GREY)
-        right.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="probability of the first answer",
-                  ylabel="share that was right, 95 % interval")
-        right.set_title("reliability (numbers: flights)", loc="left")
+        _draw_confusion(left, score["confusion"])
+        _draw_reliability(right, score["reliability"])
         return png(figure)
+
+
+def _draw_confusion(axes: Axes, table: Mapping[str, Mapping[str, int]]) -> None:
+    """Flights by true effect, a row each, and first answer; shaded by their share of the row."""
+    true = list(table)
+    answers = sorted({a for v in table.values() for a in v} | set(true))
+    counts = np.array([[table[t].get(a, 0) for a in answers] for t in true], float).reshape(len(true), len(answers))
+    shown = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+    axes.imshow(shown, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for i, j in zip(*np.nonzero(counts), strict=True):
+        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7,
+                  color="white" if shown[i, j] > 0.6 else "black")
+    axes.set_xticks(range(len(answers)), answers, rotation=90)
+    axes.set_yticks(range(len(true)), true)
+    axes.set_xlabel("answered first")
+    axes.set_title("flights by true effect (rows) and first answer", loc="left")
+
+
+def _draw_reliability(axes: Axes, points: Sequence[Mapping[str, float]]) -> None:
+    """How often answers of a probability were right, beside the diagonal of a calibrated answer."""
+    p, share = (np.array([b[k] for b in points], float) for k in ("probability", "value"))
+    bars = np.maximum([share - [b["low"] for b in points], [b["high"] for b in points] - share], 0.0)
+    axes.plot([0, 1], [0, 1], color=GREY, lw=0.8)
+    axes.errorbar(p, share, bars, fmt="o", color=BLUE, ms=4, lw=1)
+    for b in points:
+        axes.annotate(f"{b['n']}", (b["probability"], b["value"]), xytext=(5, -9), textcoords="offset points",
+                      fontsize=7, color=GREY)
+    axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="probability of the first answer",
+             ylabel="share that was right, 95 % interval")
+    axes.set_title("reliability (numbers: flights)", loc="left")

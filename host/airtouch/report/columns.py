@@ -18,13 +18,15 @@ COLUMNS = {
 
 def cell(table: dict[str, Any], key: str, form: str) -> str:
     """A figure of a summary with its interval on a second line; "-" for None. key: path in the summary, with "/"."""
-    def dig(source: Any) -> Any:
-        for part in key.split("/"):
-            source = source[part]
-        return source
-
-    value, interval = dig(table), dig(table["intervals"])
+    value, interval = _value_at(table, key), _value_at(table["intervals"], key)
     if value is None:
         return "-"
     return form.format(value) if interval is None else "{}\n{}".format(
         form.format(value), " - ".join(form.format(bound) for bound in interval))
+
+
+def _value_at(source: Any, path: str) -> Any:
+    """The value of nested tables at a path of keys with "/" between them."""
+    for key in path.split("/"):
+        source = source[key]
+    return source

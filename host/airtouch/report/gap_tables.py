@@ -36,14 +36,20 @@ def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, 
         for channel in CHANNELS:
             some = [place.get((phase.name, channel.name, band)) for band in bands(cells)]
             if any(some):
-                rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
-                    c and {**heat_map_cell(c), "headline": (c.phase, c.channel, c.band_hz) == marked} for c in some]})
+                rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [_map_cell(c, marked) for c in some]})
         shown = (n == 0 and phase.over > 0) or (headline is not None and phase.name == headline.phase)
         worse = f", {phase.worse} worse than before" if phase.worse else ""
         out.append({"name": capital(PHASE_WORDS[phase.name]), "rows": rows, "open": shown,
                     "text": f"{phase.over} of {phase.cells} cells over the floor"
                             + ("" if phase.after is None else f", {phase.stay} with the effects in the model{worse}")})
     return out
+
+
+def _map_cell(cell: Cell | None, marked: tuple[str, str, tuple[float, float]] | None) -> dict[str, Any] | None:
+    """A cell of the heat map with whether it is the headline's, at `marked`; None for no cell."""
+    if cell is None:
+        return None
+    return {**heat_map_cell(cell), "headline": (cell.phase, cell.channel, cell.band_hz) == marked}
 
 
 def phase_rows(phases: Sequence[summary.Phase]) -> list[dict[str, Any]]:

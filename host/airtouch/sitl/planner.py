@@ -35,8 +35,7 @@ class Goal:
     yaw_rate: float
 
 
-def polynomial(seconds: float, start: tuple[float, float, float],
-               end: tuple[float, float, float]) -> np.ndarray:
+def polynomial(seconds: float, start: tuple[float, float, float], end: tuple[float, float, float]) -> np.ndarray:
     """Coefficients (8,) of a polynomial in t / seconds, with zero jerk at both ends.
 
     start, end: value, first and second derivative there.

@@ -21,6 +21,6 @@ def test_an_array_holds_its_values_in_lines_that_fit(size):
     values = np.random.default_rng(size).integers(-2**31, 2**31, size).astype(np.int32)
     text = array("int32_t", "some", values)
     head, body = text.split("{", 1)
-    assert head == f"_Alignas(4) static const int32_t some[{max(size, 1)}] = "
+    assert head == f"_Alignas(4) static AIRTOUCH_MODEL_CONST int32_t some[{max(size, 1)}] = "
     assert [int(v) for v in re.findall(r"-?\d+", body)] == (values.tolist() or [0])
     assert max(map(len, text.splitlines())) <= 108

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.unexplained import followed_signals, over_floor, unexplained, worst_stretch
+from airtouch.gap.answer.unexplained import followed_signals, ratios_of_blocks, unexplained, worst_stretch
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, starts
@@ -28,7 +28,7 @@ def hover(strength, seed=1, **more):
 
 def ratio_of(one):
     """Rms over the floor of CELL in each block of a flight."""
-    return over_floor(STUDY, one, residual(one, VEHICLE), CELL)
+    return ratios_of_blocks(STUDY, one, residual(one, VEHICLE), CELL)
 
 
 def test_the_ratio_is_the_rms_over_the_floor_of_the_cell():

@@ -5,7 +5,7 @@ import pytest
 
 from airtouch.gap.features import feature
 from airtouch.gap.features.feature_space import SQUASHED, Standard, cholesky_factor, directions, standard_of
-from airtouch.gap.features.flight_features import table
+from airtouch.gap.features.flight_features import declared_features
 
 
 def test_features_far_out_grow_with_the_logarithm_and_missing_ones_say_nothing():
@@ -16,7 +16,7 @@ def test_features_far_out_grow_with_the_logarithm_and_missing_ones_say_nothing()
 
 def test_a_standard_is_the_median_and_the_middle_two_thirds():
     rng = np.random.default_rng(1)
-    features = 3.0 + 2.0 * rng.normal(size=(1000, len(table())))
+    features = 3.0 + 2.0 * rng.normal(size=(1000, len(declared_features())))
     features[:50] = 1e6  # flights that hit something
     standard = standard_of(features)
     assert np.median(standard.middle) == pytest.approx(3.0, abs=0.2)
@@ -25,7 +25,8 @@ def test_a_standard_is_the_median_and_the_middle_two_thirds():
 
 def test_no_feature_is_known_better_than_the_simulator_is():
     """Features that do not vary at all: coherences, logarithms and the clock have a least deviation, others none."""
-    deviation = dict(zip((f.name for f in table()), standard_of(np.ones((50, len(table())))).deviation, strict=True))
+    names = [f.name for f in declared_features()]
+    deviation = dict(zip(names, standard_of(np.ones((50, len(names)))).deviation, strict=True))
     assert deviation["roll real command:turn 0"] == feature.LEAST_COHERENCE
     assert deviation["roll power command 0"] == feature.LEAST_LOG
     assert deviation["clock rms"] == feature.LEAST_CLOCK and deviation["clock lost"] == feature.LEAST_LOST
@@ -33,8 +34,8 @@ def test_no_feature_is_known_better_than_the_simulator_is():
 
 
 def test_every_feature_has_a_name_of_its_own_and_says_no_more_than_the_simulator_is_exact():
-    least = {f.name: f.least for f in table()}
-    assert len(least) == len(table())
+    least = {f.name: f.least for f in declared_features()}
+    assert len(least) == len(declared_features())
     assert {least[n] for n in least if " variance " in n or " power " in n or " alone " in n} == {feature.LEAST_LOG}
     assert {least[n] for n in least if " real " in n or " imaginary " in n} == {feature.LEAST_COHERENCE}
 

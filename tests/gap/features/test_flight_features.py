@@ -25,7 +25,7 @@ def test_coherence_of_a_signal_and_its_noisy_copy(flight):
     table = rng.normal(size=signals.table.shape)
     table[:, LIFT.start] = 2.0 * table[:, COMMAND.start] + rng.normal(size=len(table))
     values = coherence.coherence(replace(signals, table=table))
-    coherences = dict(zip((f.name for f in coherence.table()), values, strict=True))
+    coherences = dict(zip((f.name for f in coherence.declared_features()), values, strict=True))
     wide = [k for k, (a, b) in enumerate(zip(coherence.BANDS_HZ, coherence.BANDS_HZ[1:], strict=False)) if b - a > 3.0]
     real = np.mean([coherences[f"climb real command:lift {k}"] for k in wide])
     assert real == pytest.approx(2.0 / np.sqrt(5.0), abs=0.03)
@@ -45,9 +45,9 @@ def test_a_feature_has_the_name_of_the_signal_that_moves_it(flight, column, word
     table[:, COLUMNS.index(column)] += 1.0 + np.random.default_rng(1).normal(size=len(table))
     moved = replace(signals, table=table)
     for module, values in ((moments, lambda s: moments.moments(s, VEHICLE)), (edge_steps, edge_steps.edge_steps)):
-        changed = {f.name for f, a, b in zip(module.table(), values(signals), values(moved), strict=True)
+        changed = {f.name for f, a, b in zip(module.declared_features(), values(signals), values(moved), strict=True)
                    if not (a == b or np.isnan([a, b]).all())}
-        named = {f.name for f in module.table() if any(w in f.name for w in words)}
+        named = {f.name for f in module.declared_features() if any(w in f.name for w in words)}
         assert changed <= named and len(changed) > 0.9 * len(named)
 
 
@@ -57,7 +57,7 @@ def test_a_row_lost_by_chance_hardly_moves_the_relations(flight):
     rows = np.delete(np.arange(len(log)), len(log) // 2)
     holed = ready(FlightLog({k: v[rows] for k, v in log.columns.items()}, log.meta), VEHICLE)
     before, after = (flight_features.features(f, VEHICLE) for f in (flight, holed))
-    of_one_signal = np.array([" alone " in f.name for f in flight_features.table()])
+    of_one_signal = np.array([" alone " in f.name for f in flight_features.declared_features()])
     assert np.abs(after - before)[of_one_signal].max() < 1.0
 
 

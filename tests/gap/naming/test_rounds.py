@@ -71,8 +71,8 @@ def test_a_first_look_has_the_mean_of_both_halves_and_their_spread():
     flights = [hover(7 + k, (0.0, 0.0, 0.1 if k % 2 else -0.1), length_s=10.0) for k in range(4)]
     best = round_of(trial(*flights), candidates_of(["imu_bias"]), None)["imu_bias"]
     assert best.full is False, "what one half says is wrong on the other: too little for a fit"
-    assert best.strength[2] == pytest.approx(0.0, abs=0.1)
-    assert best.variance[2] == pytest.approx(1.0, rel=0.1), "half the difference, squared"
+    assert best.strength.mean[2] == pytest.approx(0.0, abs=0.1)
+    assert best.strength.variance[2] == pytest.approx(1.0, rel=0.1), "half the difference, squared"
 
 
 def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are():

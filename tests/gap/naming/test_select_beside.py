@@ -113,14 +113,15 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
 def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     data = Data(flying, fly(1, 62))
     on = judging.trial_of(data)
-    together = rounds.round_of(on, candidates_of(["controller_gain"]), None, thorough=True)["controller_gain"]
+    looked = rounds.round_of(on, candidates_of(["controller_gain"]), None, thorough=True)["controller_gain"]
+    together = looked.strength
     _, *variants = all_candidates()["controller_gain"]
-    assert together.strength.shape == together.variance.shape == (len(variants),) == (4,)
+    assert together.mean.shape == together.variance.shape == (len(variants),) == (4,)
     for i, terms in enumerate(variants):
-        single = judging.cross_validated(on, "controller_gain", terms, None, np.log(len(variants)))
-        assert together.strength[i] == single.strength[i] and together.variance[i] == single.variance[i]
-        assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.strength, i).any()
-    assert together.gain < judging.FIRST_GAIN, "a nominal flight"
+        single = judging.cross_validated(on, "controller_gain", terms, None, np.log(len(variants))).strength
+        assert together.mean[i] == single.mean[i] and together.variance[i] == single.variance[i]
+        assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.mean, i).any()
+    assert looked.gain < judging.FIRST_GAIN, "a nominal flight"
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
@@ -138,7 +139,7 @@ def test_two_weak_rotors_have_a_strength_each():
     assert losses == {2.0: pytest.approx(0.005, rel=0.1), 1.0: pytest.approx(0.002, rel=0.1)}
     assert first.terms[0].values["rotor"] == 2.0
     unit = losses[1.0] / second.terms[1].scaled(second.terms[1].values)[0]
-    assert second.strength[0] * unit == pytest.approx(0.002, rel=0.1), "its own, not the first one's"
+    assert second.strength.mean[0] * unit == pytest.approx(0.002, rel=0.1), "its own, not the first one's"
 
 
 def test_a_few_lost_rows_beside_a_large_effect_are_not_named():
@@ -290,13 +291,14 @@ def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
     alike, apart = pushed(0.7, 0.7, 0.7, 0.7), pushed(1.0, 0.4, 1.0, 0.4)
     (sure,), (doubted,) = (select_from(f, ("imu_bias",))[0].steps for f in (alike, apart))
     unit = 0.1  # m/s^2, the parameter's step
-    assert doubted.strength[2] == pytest.approx(sure.strength[2], rel=0.02) == pytest.approx(-0.7 / unit, rel=0.02)
+    assert doubted.strength.mean[2] == pytest.approx(sure.strength.mean[2], rel=0.02)
+    assert sure.strength.mean[2] == pytest.approx(-0.7 / unit, rel=0.02)
     # the mean of two values that lie 0.6 apart
-    assert doubted.variance[2] == pytest.approx((0.6 / unit) ** 2 / 4.0, rel=0.05)
-    assert sure.variance[2] < 0.01 * doubted.variance[2]
+    assert doubted.strength.variance[2] == pytest.approx((0.6 / unit) ** 2 / 4.0, rel=0.05)
+    assert sure.strength.variance[2] < 0.01 * doubted.strength.variance[2]
 
     (mass,) = select_from(alike, ("mass",))[0].steps
-    nominal = scattered(mass=[abs(mass.strength[0]) / 8.0])
+    nominal = scattered(mass=[abs(mass.strength.mean[0]) / 8.0])
     (evident,), (deviation,) = (select_from(f, ("mass",), nominal)[0].steps for f in (alike, apart))
     # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
     assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.named

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.features.flight_features import features, table
+from airtouch.gap.features.flight_features import declared_features, features
 from airtouch.gap.naming.related import inference_of
 from airtouch.gap.naming.select import select
 from airtouch.gap.relations import library
@@ -46,7 +46,7 @@ def test_a_file_holds_what_was_saved(tmp_path):
 def test_the_file_is_of_todays_features_and_effects():
     """Else `python -m airtouch.gap.relations.build` makes a new one."""
     shipped = library.shipped()
-    assert len(shipped.standard.middle) == len(table())
+    assert len(shipped.standard.middle) == len(declared_features())
     assert {(c.name, c.shape) for c in shipped.model.classes} \
         == {(d.name, d.shape) for e in NAMES for d in drawings(e)}
 

@@ -18,7 +18,7 @@ def test_a_record_names_parameters_of_its_effect_with_values_in_their_bounds(nam
               *(signature.without_random or {}).items()]
     values += [(signature.shape.parameter, v) for v in signature.shape.values] if signature.shape else []
     assert all(parameters[p].low <= value <= parameters[p].high for p, value in values)
-    named = (*(signature.bursts or ()), signature.several_by, signature.class_by)
+    named = (*(signature.loss_runs or ()), signature.several_by, signature.class_by)
     assert all(p in parameters for p in named if p)
     assert bool(signature.spectrum) <= (signature.shows_in == SPECTRUM)
     assert not signature.factors or all(parameters[p].neutral == 1.0 for p in signature.free)

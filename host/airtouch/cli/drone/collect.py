@@ -3,7 +3,7 @@
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
     from airtouch.crazyflie import collect
+    from airtouch.crazyflie.flight import Flight
     from airtouch.crazyflie.mission import Mission
 
 
@@ -165,7 +166,7 @@ def waiting(uri: str, stop: threading.Event) -> Callable[[str], None]:
 
 
 @contextmanager
-def _display(seconds: float):
+def _display(seconds: float) -> Iterator[Callable[["Flight"], None]]:
     """A status line with leg, time, battery and losses; without a terminal one line for each leg."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -174,7 +175,7 @@ def _display(seconds: float):
     if not console.is_terminal:
         seen = []
 
-        def plain(flight) -> None:
+        def plain(flight: "Flight") -> None:
             label = _label(flight)
             if seen[-1:] != [label]:
                 seen.append(label)
@@ -186,7 +187,7 @@ def _display(seconds: float):
                   console=console, transient=True) as bar:
         task = bar.add_task("flight", total=seconds, leg="", text="")
 
-        def live(flight) -> None:
+        def live(flight: "Flight") -> None:
             i = flight.intake
             bar.update(task, completed=_time_s(flight), leg=_label(flight),
                        text=f"{_time_s(flight):5.1f} s  {i.latest.get('vbat_V', float('nan')):.2f} V  "
@@ -195,17 +196,17 @@ def _display(seconds: float):
         yield live
 
 
-def _label(flight) -> str:
+def _label(flight: "Flight") -> str:
     pilot = flight.pilot
     return pilot.leg.kind if pilot.phase == "mission" and pilot.leg else pilot.phase
 
 
-def _time_s(flight) -> float:
+def _time_s(flight: "Flight") -> float:
     i = flight.intake
-    return 0.0 if i.first_ms is None else (i.newest_ms - i.first_ms) / 1000.0
+    return 0.0 if i.first_ms is None or i.newest_ms is None else (i.newest_ms - i.first_ms) / 1000.0
 
 
-def _report(outcome) -> None:
+def _report(outcome: "collect.Outcome") -> None:
     from airtouch import logs
 
     log = outcome.log

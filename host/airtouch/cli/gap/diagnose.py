@@ -99,8 +99,8 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
     rows = []
     with Bar(len(flights), "diagnosing") as bar:
         for diagnosis in run(partial(_alone, case), flights):
-            if isinstance(diagnosis, str):
-                show.left_out([diagnosis])
+            if isinstance(diagnosis, AirTouchError):
+                show.left_out([str(diagnosis)])
                 continue
             bar(diagnosis.flights[0])
             first = diagnosis.ranking[0]
@@ -114,7 +114,8 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
 
 
 def _alone(case: Callable, log: Any) -> Any:
+    """The diagnosis of one flight, or the AirTouchError that says why it has none."""
     try:
         return replace(case([log]), calibrated=None, map=None)  # which need not travel
     except AirTouchError as error:
-        return str(error)
+        return error

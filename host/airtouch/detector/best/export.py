@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.outputs import OUTPUTS
-from airtouch.detector.shared.c_source import float_literal, golden_header, golden_source, layer
+from airtouch.detector.shared.c_source import CONST, CONST_DEFAULT, float_literal, golden_header, golden_source, layer
 from airtouch.detector.shared.vehicle_header import thrust_text
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
@@ -81,17 +81,19 @@ def _source(model: BestModel) -> str:
     counts = {"dwellSteps": decoder.dwell_steps, "armSteps": decoder.arm_steps, "lookBack": decoder.look_back,
               "holdSteps": decoder.hold_steps}
     return "\n".join([
-        '#include "airtouch_stream.h"', "", *arrays, text, "static const streamConv_t convs[] = {", *convs, "};", "",
-        f"static const layerInt8_t head =\n    {head};", "",
-        "const streamInt8_t airtouchStream = {", "    .convs = convs,", f"    .convCount = {len(network.layers) - 1},",
+        '#include "airtouch_stream.h"', "", CONST_DEFAULT, *arrays, text,
+        f"static {CONST} streamConv_t convs[] = {{", *convs, "};", "",
+        f"static {CONST} layerInt8_t head =\n    {head};", "",
+        f"{CONST} streamInt8_t airtouchStream = {{", "    .convs = convs,",
+        f"    .convCount = {len(network.layers) - 1},",
         f"    .stride = {network.stride},", f"    .firstSkip = {network.graph[-1].reads[0]},",
         "    .head = &head,", "};", "",
-        "const streamQuantisation_t airtouchStreamQuantisation = {",
+        f"{CONST} streamQuantisation_t airtouchStreamQuantisation = {{",
         f"    .inputScale = {float_literal(first.input_scale)},",
         f"    .outputScale = {float_literal(network.head.output_scale)},",
         f"    .inputZeroPoint = {first.input_zero_point},",
         f"    .outputZeroPoint = {network.head.output_zero_point},", "};", "",
-        "const decoderConfig_t airtouchStreamDecoder = {",
+        f"{CONST} decoderConfig_t airtouchStreamDecoder = {{",
         *(f"    .{name} = {value}," for name, value in settings.items()),
         *(f"    .{name} = {value}," for name, value in counts.items()), "};", "", _motion(model.recipe.motion)])
 
@@ -105,7 +107,7 @@ def _motion(motion: MotionConfig) -> str:
     plain = {"limit": motion.limit, "armPwm": motion.arm_pwm, "slowGain": 1.0 / motion.slow_samples,
              "lagGain": 1.0 / motion.lag_samples, "leastThrust": motion.least_thrust_n}
     return "\n".join([
-        "const motionConfig_t airtouchStreamMotion = {",
+        f"{CONST} motionConfig_t airtouchStreamMotion = {{",
         f"    .vehicle = {{.mass = {float_literal(vehicle.mass_kg)}, .gravity = {float_literal(vehicle.gravity_mps2)},",
         f"                .thrust = {{{thrust}}},",
         f"                .nominalVoltage = {float_literal(vehicle.nominal_voltage_v or 0.0)}}},",

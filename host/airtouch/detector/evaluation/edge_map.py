@@ -26,6 +26,10 @@ from airtouch.parameters import SAMPLE_PERIOD_S
 ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
 TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
 MIN_SPEED_MPS = 0.05  #: m/s, least speed by which a timing error is multiplied
+SPEED_S = 0.1  #: s before and after a detection over which the speed is taken; chosen
+#: distances between successive passes below this fraction of ROW_QUANTILE of all are not from row to row; chosen
+ROW_FRACTION, ROW_QUANTILE = 0.3, 0.9
+ROWS_APART = 4.0  #: most distance between passes over one platform, in median distances of rows; chosen
 
 
 @dataclass(frozen=True)
@@ -93,8 +97,7 @@ def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = 
     """
     module = registry.get(detector)
     evaluate.check(log, evaluate.spare_of(module))
-    trained = module.load(model)
-    trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
+    trained = registry.model_for(module, module.load(model), log)
     return TimedEdges(module.run(log, trained).edges, module.lag_s(trained),
                       getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
 
@@ -142,7 +145,7 @@ def edge_points(
     detector, is subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
     """
     points = []
-    half = max(1, round(0.1 / period_s))
+    half = max(1, round(SPEED_S / period_s))
     for sample, kind in zip(samples, kinds, strict=True):
         at = int(np.clip(round(sample - lag_s / period_s), 0, len(xy) - 1))
         low, high = max(0, at - half), min(len(xy) - 1, at + half)
@@ -164,13 +167,13 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     """Group the passes into platforms and fit each one's outline.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
-    no further apart than four times the median distance between successive rows.
+    no further apart than ROWS_APART times the median distance between successive rows.
     """
     crossed = passes(points)
     groups: list[list[tuple[EdgePoint, EdgePoint]]] = []
     gaps = np.array([_distance(a, b) for a, b in pairwise(crossed)])
-    rows = gaps[gaps > 0.3 * np.quantile(gaps, 0.9)] if len(gaps) else gaps
-    reach = 4.0 * float(np.median(rows)) if len(rows) else 0.0
+    rows = gaps[gaps > ROW_FRACTION * np.quantile(gaps, ROW_QUANTILE)] if len(gaps) else gaps
+    reach = ROWS_APART * float(np.median(rows)) if len(rows) else 0.0
     for crossing in crossed:
         for group in groups:
             if any(_adjacent(other, crossing, reach) for other in group[-2:]):

@@ -10,7 +10,7 @@ from airtouch import logs
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.data.dataset import FlightFile, with_flown_speed
 from airtouch.detector.evaluation.score import FlightScore, score_flight
-from airtouch.detector.registry import Detector
+from airtouch.detector.registry import Detector, model_for
 from airtouch.detector.shared import sensors, training_set
 from airtouch.detector.shared.channels import ACCELERATIONS, RATES, logged_channels
 from airtouch.detector.trace import Trace
@@ -104,8 +104,7 @@ def truth(log: FlightLog) -> list[logs.Edge] | None:
 
 def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
     """Run the detector on one flight and score it."""
-    if hasattr(detector, "model_for"):
-        model = detector.model_for(model, log)
+    model = model_for(detector, model, log)
     return result_of(file, log, detector.run(log, model), detector, model)
 
 

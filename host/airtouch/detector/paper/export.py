@@ -5,7 +5,7 @@ import numpy as np
 from airtouch.detector.paper import decoding, stride
 from airtouch.detector.paper.model import Model
 from airtouch.detector.paper.network import WEIGHTED
-from airtouch.detector.shared.c_source import float_literal, golden_header, golden_source, layer
+from airtouch.detector.shared.c_source import CONST, CONST_DEFAULT, float_literal, golden_header, golden_source, layer
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
@@ -42,7 +42,7 @@ def _render_rolling(model: Model) -> dict[str, str]:
         raise AirTouchError("this model is one of windows: it has no fixed scale to roll on")
     what = "Made-up quantised samples and the outputs that every build must give, to the last bit."
     scale = "\n".join([
-        "const fixedScale_t airtouchRollingScale = {", f"    .columns = {len(model.scale.mean)},",
+        f"{CONST} fixedScale_t airtouchRollingScale = {{", f"    .columns = {len(model.scale.mean)},",
         f"    .mean = {{{', '.join(map(float_literal, model.scale.mean))}}},",
         f"    .inverseDeviation = {{{', '.join(map(float_literal, 1.0 / model.scale.deviation.astype(float)))}}},",
         "};", ""])
@@ -143,8 +143,9 @@ def _model_source(network: Int8Network, header: str, variable: str) -> str:
     rows = [f"    {initialiser}," for _, initialiser in parts]
     first, last = network.layers[0], network.layers[-1]
     return "\n".join([
-        f'#include "{header}"', "", *arrays, "static const layerInt8_t layers[] = {", *rows, "};", "",
-        f"const networkInt8_t {variable} = {{", "    .layers = layers,",
+        f'#include "{header}"', "", CONST_DEFAULT, *arrays,
+        f"static {CONST} layerInt8_t layers[] = {{", *rows, "};", "",
+        f"{CONST} networkInt8_t {variable} = {{", "    .layers = layers,",
         f"    .layerCount = {len(network.layers)},",
         f"    .inputScale = {float_literal(first.input_scale)},", f"    .inputZeroPoint = {first.input_zero_point},",
         f"    .outputScale = {float_literal(last.output_scale)},",

@@ -7,6 +7,12 @@ import numpy as np
 from airtouch.kernels.network import layer_shape, packed_weights
 from airtouch.reference.networks.int8_network import Int8Layer, runs_sparse
 
+#: qualifier of a network's data in C: `const`, unless the file that includes the source defines it otherwise, as
+#: gap8/app/src/l1_*.c do
+CONST = "AIRTOUCH_MODEL_CONST"
+#: what stands below the includes of a network's source
+CONST_DEFAULT = f"#ifndef {CONST}\n#define {CONST} const\n#endif\n"
+
 
 def layer(name: str, of: Int8Layer) -> tuple[str, str]:
     """The C arrays of one layer, whose names begin with `name`, and the initialiser of its layerInt8_t."""
@@ -27,9 +33,9 @@ def layer(name: str, of: Int8Layer) -> tuple[str, str]:
     return text, f"{head},\n     LAYER_{'SPARSE' if counts.size else 'DENSE'}_ARRAYS({name})}}"
 
 
-def array(kind: str, name: str, values: np.ndarray, static: bool = True) -> str:
-    """A constant array, aligned to four bytes."""
-    head = f"{'static ' if static else ''}const {kind} {name}[{max(values.size, 1)}]"
+def array(kind: str, name: str, values: np.ndarray, qualifiers: str = f"static {CONST}") -> str:
+    """An array with its values, aligned to four bytes."""
+    head = f"{qualifiers} {kind} {name}[{max(values.size, 1)}]"
     lines, line = [], "   "
     for value in values.tolist() or [0]:  # C has no empty array
         if len(line) + len(f" {value},") > 108:
@@ -59,7 +65,7 @@ extern const int8_t {names[1]}[{outputs.size}];
 
 def golden_source(header: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
     """Their definitions."""
-    arrays = (array("int8_t", name, values.ravel(), False)
+    arrays = (array("int8_t", name, values.ravel(), "const")
               for name, values in zip(names, (inputs, outputs), strict=True))
     return (f'#include "{header}"\n\n' + "".join(arrays)).rstrip("\n") + "\n"
 

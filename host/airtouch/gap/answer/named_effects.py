@@ -93,8 +93,8 @@ def _in_times(data: Data, term: Term) -> tuple[np.ndarray, np.ndarray]:
     samples = sum(len(f) for f in data.flights)
     independent = samples / (CORRELATION_S / PERIOD_S)
     count = 2.0 * independent  # a standard deviation from n values has the relative variance 1 / (2 n)
-    if term.signature.bursts is not None:
-        share, burst = (term.values[p] for p in term.signature.bursts)
+    if term.signature.loss_runs is not None:
+        share, burst = (term.values[p] for p in term.signature.loss_runs)
         count = share * samples / (2.0 * burst - 1.0)
     x = term.scaled(term.values)
     return x, np.diag(x ** 2 / max(count, 1.0))

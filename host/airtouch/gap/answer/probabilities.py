@@ -12,7 +12,7 @@ MOST_UNKNOWN = 0.9
 
 
 def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
-    """Of every single candidate, `none` and `unknown`; they sum to 1.
+    """The probability of every single candidate, of `none` and of `unknown`; they sum to 1.
 
     at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
 
@@ -21,14 +21,14 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     """
     names = list(selection.singles)
     weight = _weights(selection, names)
-    share = weight / weight.sum()
+    total = weight.sum()
     odds = selection.unlike ** 2
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:
-        unknown = _limited(unknown, share[names.index(selection.named[0].name)])
+        unknown = _limited(unknown, weight[names.index(selection.named[0].name)] / total)
     if at_floor:
-        unknown = _limited(unknown, share[-1])
-    known = (1.0 - unknown) * weight / weight.sum()
+        unknown = _limited(unknown, weight[-1] / total)
+    known = (1.0 - unknown) * weight / total
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
 
 

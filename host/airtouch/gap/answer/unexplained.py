@@ -10,7 +10,7 @@ from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH, blocks, frequencies, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.where import summary
@@ -36,7 +36,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     near = tuple(nearest(selection))
     out = []
     for cell in chosen:
-        ratios = _in_phase([(f, over_floor(study, f, gap, cell)) for f, gap in gaps], cell.phase)
+        ratios = _in_phase([(f, ratios_of_blocks(study, f, gap, cell)) for f, gap in gaps], cell.phase)
         if not ratios:
             continue
         flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
@@ -49,7 +49,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     return out
 
 
-def over_floor(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
+def ratios_of_blocks(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
     """Rms of a cell's channel and band over its floor, in each block (blocks,) in the air.
 
     gap (n, COUNT): the flight, measured minus modelled.
@@ -60,7 +60,7 @@ def over_floor(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.
     f = frequencies(AIR)
     band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
     power = (np.abs(blocks(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
-    return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
+    return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), LEAST_POWER))
 
 
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:

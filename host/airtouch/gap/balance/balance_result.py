@@ -36,6 +36,8 @@ from airtouch.vehicle import Vehicle
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
 #: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen
 WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
+LEAST_GAP = 1e-9  #: over the floor, that a share of the gap is taken of at least
+LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
            "leave both as they are were not tried")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
@@ -109,7 +111,7 @@ def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
 
     def share(rest: float) -> float:
         """Share of the gap over the floor that goes when this rms is left."""
-        return float(np.clip((before - rest) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
+        return float(np.clip((before - rest) / max(before - 1.0, LEAST_GAP), 0.0, 1.0)) if before > 1.0 else 0.0
 
     low, high = share(quantile(after_each, fit.weight, HIGH)), share(quantile(after_each, fit.weight, LOW))
     return Shrink(before, after, Quantity(share(after), min(low, share(after)), max(high, share(after))))
@@ -128,18 +130,30 @@ def _control(probability_of: Mapping[str, float], first: str, shrink: Mapping[st
 
 def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
-    chance = dict(probability_of)
-    weight = OFF_CENTRE if first == WEIGHT else WEIGHT
-    if first in (WEIGHT, OFF_CENTRE) and weight in chance:
-        chance[first], chance[weight] = chance[first] + chance[weight], 0.0
-    why = {}
-    if chance.get(weight) == 0.0:
-        why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
-    best = max(chance.values())
-    return sorted((RankedCandidate(n, p, shrink[n].share,
-                                   "" if n == first
-                                   else why.get(n, f"{best / max(p, 1e-12):.3g} times less probable than {first}"))
-                   for n, p in chance.items()), key=lambda r: (r.name != first, -r.probability))
+    together = _weights_together(first, probability_of)
+    best = max(together.values())
+    other_weight = OFF_CENTRE if first == WEIGHT else WEIGHT
+
+    def reason(name: str, probability: float) -> str:
+        """Why a candidate is not the answer; empty for the answer."""
+        if name == first:
+            return ""
+        if name == other_weight and probability == 0.0:
+            return f"counted with {first}: a weight, whether its own mass shows or not"
+        return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
+
+    return sorted((RankedCandidate(n, p, shrink[n].share, reason(n, p)) for n, p in together.items()),
+                  key=lambda r: (r.name != first, -r.probability))
+
+
+def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
+    """The probabilities, those of a weight's two forms summed in the one that is the answer, if it is."""
+    if first not in (WEIGHT, OFF_CENTRE):
+        return dict(probability_of)
+    other = OFF_CENTRE if first == WEIGHT else WEIGHT
+    if other not in probability_of:
+        return dict(probability_of)
+    return {**probability_of, first: probability_of[first] + probability_of[other], other: 0.0}
 
 
 def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, flights: int) -> tuple[Cell, ...]:

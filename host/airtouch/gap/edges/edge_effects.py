@@ -5,6 +5,7 @@ The response to a parameter is that to one natural step of it, scaled: linear, a
 
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
@@ -31,17 +32,6 @@ AHEAD_M, BEYOND_M, STOPPING_S = 1.5, 0.3, 1.5
 #: m/s and s, rms and correlation time of the flow sensor's noise that stays; chosen
 FLOW_NOISE_MPS, FLOW_NOISE_S = 0.02, 0.02
 LEAST_TOP_M = 0.02  #: height of a simulated platform at least; chosen
-_MISSION = """
-name = "edge-response"
-[[platform]]
-size_m = [{length}, 4.0]
-centre_m = [{centre}, 0.0]
-top_m = {top}
-[mission]
-control = "velocity"
-step = [{{ do = "wait", time_s = 0.5 }}, {{ do = "take-off", height_m = {height} }}, {{ do = "hover", time_s = 3.0 }},
-        {{ do = "go", distance_m = {way}, speed_mps = {speed} }}, {{ do = "hover", time_s = 1.0 }}, {{ do = "land" }}]
-"""
 
 
 class Crossing(NamedTuple):
@@ -126,8 +116,10 @@ def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[
 def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active]) -> dict[str, np.ndarray]:
     """Mean response (COUNT,) by kind of two flights over a platform; 0 for a kind that neither crosses."""
     height, clearance, speed, length = crossing
-    text = _MISSION.format(length=length, centre=AHEAD_M + 0.5 * length, top=max(height - clearance, LEAST_TOP_M),
-                           height=height, way=AHEAD_M + length + STOPPING_S * speed + BEYOND_M, speed=speed)
+    values = {"length": length, "centre": AHEAD_M + 0.5 * length, "top": max(height - clearance, LEAST_TOP_M),
+              "height": height, "way": AHEAD_M + length + STOPPING_S * speed + BEYOND_M, "speed": speed}
+    text = (resources.files("airtouch") / "gap/edges/edge-response.toml").read_text("utf-8")
+    text += "[values]\n" + "".join(f"{name} = {value}\n" for name, value in values.items())
     logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=exact_sensors(floor.vehicle),
                                  effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}

@@ -29,6 +29,9 @@ LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
 WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
 #: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
 SHRINKAGE = 0.3
+#: share of the scatter's summed variance that is added to each variance, and that sum at least, so that the covariance
+#: can be inverted; chosen
+RIDGE, LEAST_VARIANCE = 1e-12, 1e-9
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]])
     """
     spread = np.cov((without_edge - np.mean(without_edge, axis=0)).T)
     out = ((1.0 - SHRINKAGE) * spread + SHRINKAGE * np.diag(np.diag(spread))
-           + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9))
+           + RIDGE * np.eye(COUNT) * max(np.trace(spread), LEAST_VARIANCE))
     of_kinds = [np.array(v) - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1]
     if of_kinds:
         deviations = np.concatenate(of_kinds)

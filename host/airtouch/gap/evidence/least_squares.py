@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
+from airtouch.gap.signals.spectra import LEAST_POWER, OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
 
@@ -48,7 +48,7 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
     matrix, right = equations
     n, (low, high) = len(x), bounds
     free = np.ones(len(right), bool)
-    covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], 1e-300))  # of those at a bound: all else known
+    covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], LEAST_POWER))  # of those at a bound: all else known
     for _ in range(n + 1):
         change = np.zeros(len(right))
         where = np.flatnonzero(free)

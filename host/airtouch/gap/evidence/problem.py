@@ -9,25 +9,22 @@ import numpy as np
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
-from airtouch.gap.evidence.data import Data, spectra, step_doubt
+from airtouch.gap.evidence.data import Data, spectra
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
+from airtouch.gap.evidence.torque_power import TorquePower, beside_edges
 from airtouch.gap.flights.blocks import BANDS_HZ
-from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
-from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged_bins, squared
+from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged_bins
 from airtouch.gap.signatures.candidates import mean_of, random_of
-from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-#: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
-TORQUE_DOUBT = 0.25
 #: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
 FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
 
@@ -69,8 +66,7 @@ class Elements:
 class Problem:
     """A part of flights as flattened values (n,): `replay_count` of the replay view, then those of the commands.
 
-    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view; torque (replay,):
-    whether a value is one of the torque.
+    Arrays over all values are those of `Elements`. air: the blocks in the air of the replay view.
     """
 
     def __init__(self, data: Data, part: BlockSet) -> None:
@@ -78,12 +74,12 @@ class Problem:
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.means_only))
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
-        #: power (replay,) of the floor, without what lost rows add
-        self.noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
-                                         for f, b in zip(data.flights, data.first, strict=True)]).real
-        replay = _of_replay(data, self.layout, self.noise)
+        noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
+                                    for f, b in zip(data.flights, data.first, strict=True)]).real
+        replay = _of_replay(data, self.layout, noise)
         self.replay_count = len(replay.base)
-        self.torque = (replay.channel >= TORQUE.start) & (replay.channel < TORQUE.stop)
+        torque = (replay.channel >= TORQUE.start) & (replay.channel < TORQUE.stop)
+        self.torque_power = TorquePower(self.data, self.layout, replay.base, replay.known, torque, noise)
         self.air = self.layout.air_blocks(data.first)
         values = replay.followed_by(_of_commands(self.commands))
         self.base, self.power, self.known = values.base, values.power, values.known
@@ -103,14 +99,14 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """The gap (n,) with effects in the model."""
-        replayed = _beside_edges(active)
+        replayed = beside_edges(active)
         replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.replay_count]
         command_values = self.commands.moved([a for a in active if not a.gate])
-        return np.where(self.known, self.with_commands(replay_values, command_values), 0.0)
+        return np.where(self.known, self.joined(replay_values, command_values), 0.0)
 
-    def with_commands(self, own: np.ndarray, of_commands: np.ndarray | float = 0.0) -> np.ndarray:
+    def joined(self, replay: np.ndarray, commands: np.ndarray | float = 0.0) -> np.ndarray:
         """Values (replay,) of the replay view, followed by one value, or one each, for those of the commands."""
-        return np.concatenate([own, np.broadcast_to(of_commands, len(self.commands))])
+        return np.concatenate([replay, np.broadcast_to(commands, len(self.commands))])
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: the gap (n,) with its mean effects, the power (n,) that it adds, and nats that its floor costs.
@@ -128,41 +124,13 @@ class Problem:
         wide: as in `modelled`.
         """
         power, cost = self.commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.torque_power(active), power - self.commands.floor]), cost
-
-    def torque_power(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (replay,) that effects of the loop add to the floor of the torque.
-
-        It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
-        """
-        law = self.data.study.controller
-        loop = _beside_edges(active) if law else []
-        if not self.replay_count or not loop or not law.changes_loop(loop):
-            return np.zeros(self.replay_count)
-        gather, own = self.layout.gather, slice(self.replay_count)
-        change = np.where(self.known[own], gather(spectra(self.data, loop)) - self.base[own], 0.0)
-        steps = step_doubt(self.data, loop)
-        doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
-        return doubt + self.noise * self._noise_growth(law.torque_change(loop, frequencies(AIR)))
-
-    def _noise_growth(self, change: Change) -> np.ndarray:
-        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
-        before, after = change.incoherent
-        table = np.zeros((len(before), COUNT))
-        nominal = self.data.study.floor.power[AIR][:, TORQUE]
-        table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
-        return self.layout.per_bin({AIR: table, REST: np.zeros(self.layout.keep[REST].shape)})
-
-    def loops_differ(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
-        """Whether the loops of roll and pitch differ between two hypotheses."""
-        law = self.data.study.controller
-        return law is not None and not law.same_loop(before, after)
+        return np.concatenate([self.torque_power.added_by(active), power - self.commands.floor]), cost
 
     def random_power(self, terms: Sequence[Term]) -> np.ndarray:
         """Power (n,) that random effects add."""
         total = np.zeros(len(self.base))
         for term in terms:
-            total += self.with_commands(self.layout.gather(random_effects.power(self.data, term)).real)
+            total += self.joined(self.layout.gather(random_effects.power(self.data, term)).real)
         return total
 
     @functools.cached_property
@@ -172,7 +140,7 @@ class Problem:
         One for each of OFFSETS channels of each flight whose mean differs between nominal flights.
         """
         spread = self.data.study.floor.offset
-        return [(self.with_commands(self.layout.gather(self._offset(i, c))), float(spread[c]))
+        return [(self.joined(self.layout.gather(self._offset(i, c))), float(spread[c]))
                 for i in range(len(self.data.flights)) for c in range(OFFSETS) if spread[c] > 0.0]
 
     def _offset(self, flight: int, channel: int) -> list[dict[str, np.ndarray]]:
@@ -187,11 +155,6 @@ class Problem:
         """`unit_offsets` without zeros: indices, values there, deviation. No two have an index in common."""
         places = [np.flatnonzero(column) for column, _ in self.unit_offsets]
         return [(here, column[here], spread) for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
-
-
-def _beside_edges(active: Sequence[Active]) -> list[Active]:
-    """The effects that show beside edges: in the replay, or in the loop that is part of it."""
-    return [a for a in active if not signature_of(a.effect).edges_only]
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:

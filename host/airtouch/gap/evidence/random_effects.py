@@ -17,7 +17,7 @@ from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
-from airtouch.gap.signals.spectra import AIR, LEAKED, LENGTH, blocks, difference_power, frequencies
+from airtouch.gap.signals.spectra import AIR, LEAKED, LEAST_POWER, LENGTH, blocks, difference_power, frequencies
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term, neutral_of, parameter_of
@@ -90,7 +90,7 @@ def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
         if r == AIR:
             total[:, :, TORQUE] *= _over_a_sample()[:, None]
         shape = total.mean(axis=0, keepdims=True)
-        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
+        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), LEAST_POWER)
         out[r] = shape * strength
     return out
 
@@ -167,7 +167,7 @@ def _gyro_share(study: Study) -> np.ndarray:
     row = prepare(study.vehicle, study.calibration)[0][0]
     for i, axis in enumerate(AXES[1:]):
         strength, powers = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], axis_plant(row, axis), f)
-        share[:, i] = strength[0] * powers[0] / np.maximum(strength @ powers, 1e-300)
+        share[:, i] = strength[0] * powers[0] / np.maximum(strength @ powers, LEAST_POWER)
     return share
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.evidence.torque_power import loops_differ
 from airtouch.gap.signatures.term import Term, mean_places
 from airtouch.simulation.effects import Active
 
@@ -40,7 +41,7 @@ class SpectraSlopes:
         if not len(stale):
             return
         before = active_at(self.mean, x)
-        values, power = self.problem.values(before), self.problem.torque_power(before)
+        values, power = self.problem.values(before), self.problem.torque_power.added_by(before)
         for i in stale:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             shifted = x.copy()
@@ -48,8 +49,8 @@ class SpectraSlopes:
             after = active_at(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.torque_power(after) - power) / step
-            self.bent[i] = self.problem.loops_differ(before, after)
+            self.powers[i] = (self.problem.torque_power.added_by(after) - power) / step
+            self.bent[i] = loops_differ(self.problem.data, before, after)
         self.at = x.copy() if anew else self.at
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,

@@ -18,7 +18,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.signals.spectra import AIR, LENGTH
+from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH
 from airtouch.gap.signals.study import Study
 from airtouch.simulation import replay
 from airtouch.simulation.flight import prepare
@@ -146,7 +146,7 @@ def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1.
     """
-    strengths = STRENGTHS / max(float(shape.mean()), 1e-300)
+    strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
     tail, falls, known = (np.full(len(size), x) for x in (FREEDOM, FREEDOM + 1.0, True))
 

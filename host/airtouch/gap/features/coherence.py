@@ -39,7 +39,7 @@ GROUPS: dict[str, dict[str, int]] = {
 
 
 @cache
-def table() -> tuple[Feature, ...]:
+def declared_features() -> tuple[Feature, ...]:
     """What `coherence` gives: group, what of it (power, real, imaginary, alone), signals, number of the band."""
     out: list[Feature] = []
     for group, signals in GROUPS.items():
@@ -52,7 +52,7 @@ def table() -> tuple[Feature, ...]:
 
 
 def coherence(signals: FlightSignals) -> np.ndarray:
-    """Powers and coherences (len(table()),) of a flight in the air.
+    """Powers and coherences (len(declared_features()),) of a flight in the air.
 
     Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the
     logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple

@@ -35,7 +35,7 @@ def standard_of(nominal: np.ndarray) -> Standard:
     """The standard of nominal flights' features (n, features): the middle two thirds of them give the deviation."""
     middle = np.nanmedian(nominal, axis=0)
     low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), MIDDLE_TWO_THIRDS, axis=0)
-    deviation = np.hypot(0.5 * (high - low), [f.least for f in flight_features.table()])
+    deviation = np.hypot(0.5 * (high - low), [f.least for f in flight_features.declared_features()])
     return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
 
 

@@ -18,13 +18,13 @@ UNSEEN = ("vbat_V", *RPM)  #: columns that are left out: few small vehicles log 
 
 
 @cache
-def table() -> tuple[Feature, ...]:
+def declared_features() -> tuple[Feature, ...]:
     """All features, in their order."""
-    return (*coherence.table(), *moments.table(), *edge_steps.table())
+    return (*coherence.declared_features(), *moments.declared_features(), *edge_steps.declared_features())
 
 
 def features(flight: Flight, vehicle: Vehicle) -> np.ndarray | None:
-    """Features (len(table()),) of a flight of a vehicle as declared, NaN where there is nothing to tell by.
+    """Features (len(declared_features()),) of a flight of a vehicle as declared, NaN where there is nothing to tell by.
 
     None for a log that lacks a column. Takes about 20 ms.
     """

@@ -24,13 +24,13 @@ REGRESSED = {"force": FORCE_RESIDUAL, "torque": TORQUE_RESIDUAL, "speed": SPEED_
 OF_MEANS = slice(FORCE_RESIDUAL.start, SPEED_RESIDUAL.stop)  #: columns of the table whose means are looked at
 FEWEST = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
 FEWEST_AT_REST = 4  #: samples at rest of which a variance is taken; chosen
-FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow and what deviates from it fast; chosen
+FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow; chosen
 LEAST_VARIANCE = 1e-14  #: variance that is added, in squared units of a signal, so that none is 0
 LEAST_SCORE = 1e-9  #: sum of squares of a column that is added to it, so that none is 0
 
 
 @cache
-def table() -> tuple[Feature, ...]:
+def declared_features() -> tuple[Feature, ...]:
     """What `moments` gives, in its order: scores, each phase, the second half, at rest, the clock."""
     means = [*COLUMNS[OF_MEANS], *COLUMNS[COMMAND]]
     slow = [*(f"{what} {axis}" for what in ("angle", "velocity", "rate") for axis in AXES), *COLUMNS[RANGE_RESIDUAL]]
@@ -48,7 +48,7 @@ def table() -> tuple[Feature, ...]:
 
 
 def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
-    """Scores, means and variances (len(table()),) of a flight; NaN where there is nothing to tell by.
+    """Scores, means and variances (len(declared_features()),) of a flight; NaN where there is nothing to tell by.
 
     What force, torque and estimated speed have of the flight's own signals (`nameless.basis`); means and logarithms of
     variances in each phase; what the second half has over the first; means and noise at rest; and what the log did to
@@ -64,25 +64,28 @@ def _scores(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
     root = np.sqrt(signals.air.sum() + 1.0)
     for place in REGRESSED.values():
         residual = signals.table[signals.air, place]
-        out += [columns[:, :, axis].T @ residual[:, axis]
-                / np.sqrt((columns[:, :, axis] ** 2).sum(axis=0) + LEAST_SCORE) / root for axis in range(len(AXES))]
+        for axis in range(len(AXES)):
+            of_axis = columns[:, :, axis]
+            length = np.sqrt((of_axis ** 2).sum(axis=0) + LEAST_SCORE)
+            out.append(of_axis.T @ residual[:, axis] / length / root)
     return np.concatenate(out)
 
 
-def _means(signals: FlightSignals, some: np.ndarray) -> np.ndarray:
-    """Means of what model and estimator leave open, and of the commands, over some samples, bool (n,) or places."""
-    return np.concatenate([signals.table[some, OF_MEANS].mean(axis=0), signals.table[some, COMMAND].mean(axis=0)])
+def _means(signals: FlightSignals, samples: np.ndarray) -> np.ndarray:
+    """Means of what model and estimator leave open, and of the commands, over samples, bool (n,) or places."""
+    table = signals.table
+    return np.concatenate([table[samples, OF_MEANS].mean(axis=0), table[samples, COMMAND].mean(axis=0)])
 
 
 def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
-    """`_means`, those of angles, velocity, rates and range, and logarithms of the variance of what is fast."""
+    """`_means`, those of angles, velocity, rates and range, and log variances of the part faster than 0.5 s."""
     in_phase = signals.air & (signals.flight.phase == phase)
-    some = in_phase if in_phase.sum() > FEWEST else signals.air
+    samples = in_phase if in_phase.sum() > FEWEST else signals.air
     assert signals.flight.rates is not None
-    slow = [x[some].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
+    slow = [x[samples].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
                                            signals.table[:, RANGE_RESIDUAL])]
-    fast = (signals.table - _smoothed(signals.table))[some].var(axis=0)
-    return np.concatenate([_means(signals, some), *slow, np.log(fast + LEAST_VARIANCE)])
+    fast = (signals.table - _smoothed(signals.table))[samples].var(axis=0)
+    return np.concatenate([_means(signals, samples), *slow, np.log(fast + LEAST_VARIANCE)])
 
 
 def _smoothed(table: np.ndarray) -> np.ndarray:

@@ -87,12 +87,12 @@ def _slope(y: np.ndarray, x: np.ndarray) -> float:
     table = np.stack([np.ones(len(x)), x - x.mean()], axis=1)
     middle, spread = PRIOR
     start = np.array([np.log(y.mean()), 0.0])
-    at = start.copy()
+    line = start.copy()  # level and slope
     for _ in range(ROUNDS):
-        ratio = y / np.exp(table @ at)
+        ratio = y / np.exp(table @ line)
         dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), LEAST_DISPERSION)
         information = table.T @ table / dispersion + np.diag([0.0, 1.0 / spread ** 2])
-        push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (at[1] - middle) / spread ** 2])
+        push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (line[1] - middle) / spread ** 2])
         step = np.linalg.solve(information, push)
-        at = at + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-    return float(np.clip(at[1], 0.0, STEEPEST))
+        line = line + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+    return float(np.clip(line[1], 0.0, STEEPEST))

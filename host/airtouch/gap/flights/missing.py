@@ -9,8 +9,7 @@ def interpolate_missing(values: np.ndarray) -> np.ndarray:
     table = out[:, None] if out.ndim == 1 else out
     finite = np.isfinite(table)
     for j in np.flatnonzero(~finite.all(axis=0)):
-        good = np.flatnonzero(finite[:, j])
-        table[:, j] = np.interp(np.arange(len(table)), good, table[good, j]) if len(good) else 0.0
+        table[:, j] = _bridged(table[:, j], finite[:, j]) if finite[:, j].any() else 0.0
     return out
 
 
@@ -18,7 +17,11 @@ def interpolate_over(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """The values (n, c) with straight lines over the samples that are not valid; absent channels stay NaN."""
     out = np.array(values)
     if not valid.all() and valid.any():
-        index = np.arange(len(out))
         for c in range(out.shape[1]):
-            out[:, c] = np.interp(index, index[valid], out[valid, c])
+            out[:, c] = _bridged(out[:, c], valid)
     return out
+
+
+def _bridged(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Values (n,) with straight lines over those that are not known, bool (n,)."""
+    return np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])

@@ -25,7 +25,7 @@ from airtouch.gap.loop.command_spectra import (
     frequencies,
     through_window,
 )
-from airtouch.gap.loop.controller import AXES, Controller, firmware_of
+from airtouch.gap.loop.controller import AXES, TURNING, Controller, firmware_of
 from airtouch.gap.loop.loop_model import AxisLoop, excess_phase, torque_per_command
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.loop.set_point_steps import NO_STEP, Step
@@ -135,13 +135,14 @@ class ClosedLoop:
         if not self.by_firmware:
             return replace(self)
 
-        def of_axis(i: int) -> Step:
-            """The steps of the set-point of an axis, a place in AXES."""
+        def of_axis(axis: str) -> Step:
+            """The steps of the set-point of an axis, one of TURNING."""
+            i, turn = AXES.index(axis), TURNING.index(axis)
             loop = self._loops(self._nominal_row)[i]
-            measured = share[:, i - 1] * torque_per_command(loop.firmware, loop.plant, f)
-            return fitted_step(loop.firmware, loop.plant, self.strengths[i], f, excess[:, i - 1], measured)
+            measured = share[:, turn] * torque_per_command(loop.firmware, loop.plant, f)
+            return fitted_step(loop.firmware, loop.plant, self.strengths[i], f, excess[:, turn], measured)
 
-        return replace(self, steps=(of_axis(AXES.index("roll")), of_axis(AXES.index("pitch"))))
+        return replace(self, steps=(of_axis("roll"), of_axis("pitch")))
 
     @cached_property
     def _nominal_row(self) -> PlantRow:
@@ -171,9 +172,12 @@ class ClosedLoop:
     def _torques(self, row: PlantRow, f: np.ndarray) -> list[AxisTorque]:
         """Torques of commands about roll and pitch at frequencies f, cached for all plant rows with the same loop."""
         nominal, loops = self._loops(self._nominal_row), self._loops(row)
-        return [self._once_a_loop("torque", loops[i], f, partial(
-            axis_torque, loops[i], nominal[i].plant, self.strengths[i], self.steps[i - 1], f))
-            for i, axis in enumerate(AXES) if axis != "thrust"]
+        torques = []
+        for axis, step in zip(TURNING, self.steps, strict=True):
+            i = AXES.index(axis)
+            make = partial(axis_torque, loops[i], nominal[i].plant, self.strengths[i], step, f)
+            torques.append(self._once_a_loop("torque", loops[i], f, make))
+        return torques
 
     def _once_a_loop(self, what: str, loop: AxisLoop, f: np.ndarray, make: Callable[[], Made]) -> Made:
         """A value of a loop at frequencies f, the same for all plant rows with that loop; cached."""
@@ -186,8 +190,9 @@ class ClosedLoop:
         for i, loop in enumerate(self._loops(row)):
             powers, excess_rad = self._once_a_loop("power", loop, f, partial(_power_and_phase, loop, f))
             strengths = self.strengths[i].copy()
-            if self.by_firmware and loop.plant.axis != "thrust":
-                strengths[0] *= (float(row["gyro_noise"][i - 1]) / self._gyro_noise()[i - 1]) ** 2
+            if self.by_firmware and loop.plant.axis in TURNING:
+                turn = TURNING.index(loop.plant.axis)
+                strengths[0] *= (float(row["gyro_noise"][turn]) / self._gyro_noise()[turn]) ** 2
             power = strengths @ powers
             by_axis.append(power * np.exp(UNSTABLE * excess_rad) if excess_rad > 0.0 else power)  # it would not fly
         return np.stack([through_window(m) for m in by_axis], axis=1)

@@ -16,6 +16,7 @@ from airtouch.simulation.firmware import battery_compensation, settings
 DEGREES = 180.0 / np.pi
 RICCATI_STEPS = 400  #: readings after which the Kalman filter's gains stand still; chosen
 AXES = ("thrust", "roll", "pitch")
+TURNING = AXES[1:]  #: axes that turn the vehicle, in the order of torques and rates
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     above = flight.signals[:, at.HEIGHT]
     low = 1.0 / (1.0 + (above / LOW_M) ** 2)
     columns = np.column_stack([np.ones(len(flight)), air, thrust, changing, speed, np.hypot(*speed[:, :2].T),
-                            np.zeros((len(flight), 3)), time, time * thrust[:, 0], height, low, above])
+                               np.zeros((len(flight), 3)), time, time * thrust[:, 0], height, low, above])
     columns[:, 1:] *= air[:, None]
     out = np.repeat(columns[:, :, None], 3, axis=2)
     place = BASIS.index("world_x")

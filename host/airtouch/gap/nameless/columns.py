@@ -49,12 +49,12 @@ def no_floor() -> NamelessFloor:
 class Regressors:
     """What the values of one channel of one flight are regressed on.
 
-    own (elements,): places of the values among the problem's; columns (elements, free + offsets): of the regression;
+    places (elements,): of the values among the problem's; columns (elements, free + offsets): of the regression;
     offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
     """
 
     channel: int
-    own: np.ndarray
+    places: np.ndarray
     columns: np.ndarray
     offsets: np.ndarray
 
@@ -82,10 +82,10 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
         table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
             here = known[elements] & (flight[elements] == f)
-            own = elements[here]
-            offsets = [(x[own], p) for x, p in problem.unit_offsets if np.any(x[own])]
-            if len(own):
-                out.append(Regressors(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
+            places = elements[here]
+            offsets = [(x[places], p) for x, p in problem.unit_offsets if np.any(x[places])]
+            if len(places):
+                out.append(Regressors(c, places, np.column_stack([table[here], *(x for x, _ in offsets)]),
                                       np.array([p for _, p in offsets])))
     return out
 

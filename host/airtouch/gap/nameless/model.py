@@ -16,7 +16,7 @@ from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
 from airtouch.gap.nameless.powers import power_floor, power_gain
-from airtouch.gap.nameless.regression import HalfResiduals, coefficients, column_floor, linear_gain
+from airtouch.gap.nameless.regression import PartResiduals, coefficients, column_floor, linear_gain
 from airtouch.gap.signatures.term import Term
 
 LIFT, OF_HEIGHT = 2, ("near", "low", "height")  #: channel of the force along the thrust; columns of the height
@@ -31,7 +31,7 @@ def held_out_gains(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequen
     floor = data.study.nameless_floor or no_floor()
     linear = power = 0.0
     for train, test in ROUND_TRIP:
-        trained, held_out = (HalfResiduals(data, parts[half], terms[train]) for half in (train, test))
+        trained, held_out = (PartResiduals(data, parts[half], terms[train]) for half in (train, test))
         fitted = np.array([coefficients(trained, channel, floor, allowed_columns(data, terms[train], channel))
                            for channel in range(CHANNELS)])
         for channel in range(CHANNELS):
@@ -44,7 +44,7 @@ def held_out_gains(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequen
 def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
     """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
     floor = data.study.nameless_floor or no_floor()
-    halves = [HalfResiduals(data, part, ()) for part in parts]
+    halves = [PartResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
     return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
                for train, test in ROUND_TRIP)
@@ -52,7 +52,7 @@ def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
 
 def nameless_floor(data: Data) -> NamelessFloor:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
-    halves = [HalfResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
+    halves = [PartResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     if len(halves) < 2:
         return no_floor()
     floor = NamelessFloor(column_floor(halves), no_floor().power)

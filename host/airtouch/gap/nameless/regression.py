@@ -19,8 +19,8 @@ SURE = 3.0  #: standard deviations by which coefficients must scatter more than 
 CHANCE = 4.0  #: nats that a column must gain on the half that it is fitted to; chosen, chance gives about one
 
 
-class HalfResiduals:
-    """Residual of a half under a hypothesis: values, their expected power, and the basis there.
+class PartResiduals:
+    """Residual of a part of the flights under a hypothesis: values, their expected power, and the basis there.
 
     regressors: of every channel of every flight; what nominal flights may have of a column, each flight has for itself.
     """
@@ -32,32 +32,34 @@ class HalfResiduals:
         self.cells = problem.cells
         self.regressors = regressors_of(data, part, problem)
 
-    def normal_equations(self, one: Regressors, values: np.ndarray, residual: np.ndarray,
+    def normal_equations(self, regressors: Regressors, values: np.ndarray, residual: np.ndarray,
                          ) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (columns, columns) and right-hand side (columns,) of one channel of one flight.
 
         values (elements,): to which its columns are fitted; residual (elements,): by which each is weighted, as its
         tails are Student's.
         """
-        nu, tail, power = self.problem.freedom[one.own], self.problem.tail[one.own], self.power[one.own]
+        places = regressors.places
+        nu, tail, power = self.problem.freedom[places], self.problem.tail[places], self.power[places]
         weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
-        weighted = one.columns.conj().T * weights
-        return 2.0 * (weighted @ one.columns).real, 2.0 * (weighted @ values).real
+        weighted = regressors.columns.conj().T * weights
+        return 2.0 * (weighted @ regressors.columns).real, 2.0 * (weighted @ values).real
 
-    def residual_under(self, one: Regressors, fitted: np.ndarray, floor: NamelessFloor) -> tuple[np.ndarray, float]:
+    def residual_under(self, regressors: Regressors, fitted: np.ndarray, floor: NamelessFloor,
+                       ) -> tuple[np.ndarray, float]:
         """Residual (elements,) of one channel of one flight under fitted coefficients, and its log likelihood.
 
         What nominal flights may have of the columns is taken off as well. fitted (columns,): the coefficients that all
         flights share.
         """
-        values = self.values[one.own] - one.columns[:, :one.free] @ fitted[:one.free]
-        residual, precision = values, one.precision(floor)
+        values = self.values[regressors.places] - regressors.columns[:, :regressors.free] @ fitted[:regressors.free]
+        residual, precision = values, regressors.precision(floor)
         for _ in range(OWN_ROUNDS):
-            normal, right = self.normal_equations(one, values, residual)
+            normal, right = self.normal_equations(regressors, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
-            residual = values - one.columns @ x
-        nu, tail = self.problem.freedom[one.own], self.problem.tail[one.own]
-        tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[one.own] / tail)
+            residual = values - regressors.columns @ x
+        nu, tail = self.problem.freedom[regressors.places], self.problem.tail[regressors.places]
+        tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[regressors.places] / tail)
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:
@@ -69,8 +71,8 @@ class HalfResiduals:
     def residuals_under(self, fitted: np.ndarray, floor: NamelessFloor) -> np.ndarray:
         """`residual_under` of every channel of every flight, (elements,). fitted (CHANNELS, WIDEST): coefficients."""
         residuals = self.values.copy()
-        for one in self.regressors:
-            residuals[one.own], _ = self.residual_under(one, fitted[one.channel], floor)
+        for regressors in self.regressors:
+            residuals[regressors.places], _ = self.residual_under(regressors, fitted[regressors.channel], floor)
         return residuals
 
     def floor_powers(self, floor: NamelessFloor) -> Powers:
@@ -78,28 +80,28 @@ class HalfResiduals:
         return self.powers(self.residuals_under(np.zeros((CHANNELS, WIDEST)), floor))
 
 
-def coefficients(half: HalfResiduals, channel: int, floor: NamelessFloor, among: np.ndarray | None = None,
+def coefficients(part: PartResiduals, channel: int, floor: NamelessFloor, among: np.ndarray | None = None,
                  ) -> np.ndarray:
     """Coefficients (WIDEST,) that a channel asks for, one column after another; zero for the others.
 
     among (WIDEST,): the columns that may be asked for; all by default.
     """
-    sets = [c for c in half.regressors if c.channel == channel]
+    sets = [c for c in part.regressors if c.channel == channel]
     fitted = np.zeros(WIDEST)
     if not sets:
         return fitted
     allowed = [k for k in range(sets[0].free) if among is None or among[k]]
-    residuals = [half.values[c.own] for c in sets]
+    residuals = [part.values[c.places] for c in sets]
     for _ in range(ROUNDS):  # of weights
-        normal, right = _shared_system(half, sets, residuals, floor)
-        free = _worth_asking(normal, right, allowed)
+        normal, right = _shared_system(part, sets, residuals, floor)
+        free = _selected_columns(normal, right, allowed)
         fitted = np.zeros(WIDEST)
         fitted[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
-        residuals = [half.residual_under(c, fitted, floor)[0] for c in sets]
+        residuals = [part.residual_under(c, fitted, floor)[0] for c in sets]
     return fitted
 
 
-def _shared_system(half: HalfResiduals, sets: Sequence[Regressors], residuals: Sequence[np.ndarray],
+def _shared_system(part: PartResiduals, sets: Sequence[Regressors], residuals: Sequence[np.ndarray],
                    floor: NamelessFloor) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and right-hand side of the coefficients that all flights share, each flight's own solved for.
 
@@ -107,16 +109,16 @@ def _shared_system(half: HalfResiduals, sets: Sequence[Regressors], residuals: S
     """
     n = sets[0].free
     total, right = np.zeros((n, n)), np.zeros(n)
-    for one, residual in zip(sets, residuals, strict=True):
-        normal, slope = half.normal_equations(one, half.values[one.own], residual)
-        ridge = normal + np.diag(one.precision(floor))
+    for regressors, residual in zip(sets, residuals, strict=True):
+        normal, slope = part.normal_equations(regressors, part.values[regressors.places], residual)
+        ridge = normal + np.diag(regressors.precision(floor))
         own = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
         total += normal[:n, :n] - normal[:n] @ own[:, :n]
         right += slope[:n] - normal[:n] @ own[:, n]
     return total + np.diag(RIDGE * np.diag(total) + LEAST_RIDGE), right
 
 
-def _worth_asking(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int]) -> list[int]:
+def _selected_columns(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int]) -> list[int]:
     """Columns that gain more than CHANCE one after another, the best first; at most MOST_COLUMNS."""
     free: list[int] = []
     gain = 0.0
@@ -134,39 +136,39 @@ def _gain_of_columns(normal: np.ndarray, right: np.ndarray, free: Sequence[int])
     return 0.5 * float(right[free] @ np.linalg.solve(normal[np.ix_(free, free)], right[free]))
 
 
-def linear_gain(half: HalfResiduals, channel: int, fitted: np.ndarray, floor: NamelessFloor) -> float:
-    """Log likelihood that the coefficients (WIDEST,) of a channel, fitted elsewhere, gain on a half."""
+def linear_gain(part: PartResiduals, channel: int, fitted: np.ndarray, floor: NamelessFloor) -> float:
+    """Log likelihood that the coefficients (WIDEST,) of a channel, fitted elsewhere, gain on a part."""
     if not fitted.any():
         return 0.0
     nothing = np.zeros(WIDEST)
-    own = [c for c in half.regressors if c.channel == channel]
-    return float(gain_at_even_odds(sum(half.residual_under(c, fitted, floor)[1]
-                                       - half.residual_under(c, nothing, floor)[1] for c in own)))
+    own = [c for c in part.regressors if c.channel == channel]
+    return float(gain_at_even_odds(sum(part.residual_under(c, fitted, floor)[1]
+                                       - part.residual_under(c, nothing, floor)[1] for c in own)))
 
 
-def column_floor(halves: Sequence[HalfResiduals]) -> np.ndarray:
+def column_floor(parts: Sequence[PartResiduals]) -> np.ndarray:
     """rms (CHANNELS, WIDEST) of the coefficients of nominal flights, two or more, beyond what chance alone gives."""
-    n = len(halves)
+    n = len(parts)
     beyond_chance, over_chance = np.zeros((2, CHANNELS, WIDEST))
-    for half in halves:
-        for one in half.regressors:
-            estimate, variance = _one_by_one(half, one)
-            beyond_chance[one.channel, :one.free] += (estimate ** 2 - variance) / (n - 1)
-            over_chance[one.channel, :one.free] += estimate ** 2 / variance / n
+    for part in parts:
+        for regressors in part.regressors:
+            estimate, variance = _one_by_one(part, regressors)
+            beyond_chance[regressors.channel, :regressors.free] += (estimate ** 2 - variance) / (n - 1)
+            over_chance[regressors.channel, :regressors.free] += estimate ** 2 / variance / n
     beyond_chance[over_chance < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
     of_another = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
     return np.sqrt(np.maximum(of_another * beyond_chance, 0.0))
 
 
-def _one_by_one(half: HalfResiduals, one: Regressors) -> tuple[np.ndarray, np.ndarray]:
+def _one_by_one(part: PartResiduals, regressors: Regressors) -> tuple[np.ndarray, np.ndarray]:
     """Coefficient and variance (columns,) of every column of one channel of a flight, each beside the offsets."""
-    n = one.free
-    residual = half.residual_under(one, np.zeros(n), no_floor())[0]
-    normal, right = half.normal_equations(one, half.values[one.own], residual)
+    n = regressors.free
+    residual = part.residual_under(regressors, np.zeros(n), no_floor())[0]
+    normal, right = part.normal_equations(regressors, part.values[regressors.places], residual)
     estimate, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         index = [k, *range(n, len(right))]
-        precision = np.concatenate([[LEAST_RIDGE], 1.0 / one.offsets ** 2])
+        precision = np.concatenate([[LEAST_RIDGE], 1.0 / regressors.offsets ** 2])
         inverse = np.linalg.inv(normal[np.ix_(index, index)] + np.diag(precision + RIDGE * np.diag(normal)[index]))
         estimate[k], variance[k] = (inverse @ right[index])[0], inverse[0, 0]
     return estimate, variance

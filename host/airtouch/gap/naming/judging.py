@@ -5,7 +5,6 @@ Two halves of the flights (of the blocks, for a few flights) take turns.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
@@ -27,7 +26,7 @@ LEAST_GAIN = 12.0
 #: 46 flights of a fresh set (2026-11-21)
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
-STRETCHED = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
+NEAR_BOUND = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def halves(data: Data) -> tuple[BlockSet, BlockSet]:
 def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
     """Which scaled parameters (k,) lie as far from neutral as they may: the model stretches to fit something else."""
     low, high = (term.among_all(b) for b in term.bounds())
-    return (strength != 0.0) & ((strength <= STRETCHED * low) | (strength >= STRETCHED * high))
+    return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
 
 def price_of(terms: Sequence[Term]) -> float:
@@ -99,7 +98,7 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, *strength)
+    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, strength)
 
 
 def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
@@ -137,19 +136,6 @@ def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(trial.data, trial.parts[test], hypothesis.fits[train].terms)
                    for train, test in ROUND_TRIP], axis=0)
-
-
-class Strength(NamedTuple):
-    """Scaled parameters of one term, as both halves of the flights have them.
-
-    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects; apart (k,): half of what the halves
-    differ by. k: of all parameters that the effect may have free; those that its variant leaves alone are 0, and nobody
-    knows how far they lie from it.
-    """
-
-    mean: np.ndarray
-    covariance: np.ndarray
-    apart: np.ndarray
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms]) -> Strength:

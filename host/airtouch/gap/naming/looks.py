@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
 from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
@@ -116,9 +116,10 @@ def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
     look = first_order(start.trial.data, start.halves, terms, start.terms)
     gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
     halves = np.array(look.fitted)[:, :k]
+    strength = Strength(own.among_all(halves.mean(axis=0)),
+                        covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
-                     strength=own.among_all(halves.mean(axis=0)),
-                     covariance=covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
+                     strength=strength)
 
 
 def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
@@ -180,7 +181,7 @@ def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
     """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
     name, terms, cost = look.variant
     return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice_cost=cost,
-                     strength=strength_term(terms).among_all(look.strength))
+                     strength=Strength(strength_term(terms).among_all(look.strength)))
 
 
 def _same(one: Term, other: Term) -> bool:

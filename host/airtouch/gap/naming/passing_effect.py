@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
@@ -42,13 +42,13 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
-                     strength=effect.strength, evidence=evidence, key=effect.key)
+                     strength=Strength(effect.strength), evidence=evidence, key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:
     """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
-               and passing_evidence(data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps)
+               and passing_evidence(data, passing.key, s.share, passing.strength.mean) < LEAST_GAIN for s in steps)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
 #: share of the gap that the effect named must close: as much as the loop model may be wrong by,
-#: `problem.TORQUE_DOUBT`; chosen
+#: `torque_power.TORQUE_DOUBT`; chosen
 LEAST_CLOSED = 0.25
 #: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
 #: seconds; chosen

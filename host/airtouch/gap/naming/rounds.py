@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, cross_validated
 from airtouch.gap.naming.looks import PricedVariant, first_looks, random_looks, start_of
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.scatter import Scatter
@@ -107,13 +107,14 @@ def _is_tried_alone(variant: PricedVariant) -> bool:
 
 def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
     """A candidate whose parameters (k,) were all tried alone, with the strength that each has there."""
-    alone = {int(np.argmin(v.variance)): v for v in variants if np.isfinite(v.variance).sum() == 1}
-    if len(alone) < max(len(best.strength), 2):
+    strengths = [v.strength for v in variants if np.isfinite(v.strength.variance).sum() == 1]
+    alone = {int(np.argmin(s.variance)): s for s in strengths}
+    if len(alone) < max(len(best.strength.mean), 2):
         return best
     *others, own = best.terms
-    return replace(best, terms=(*others, replace(own, free=own.signature.free)), apart=0.0,
-                   strength=np.array([alone[i].strength[i] for i in range(len(alone))]),
-                   covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]))
+    strength = Strength(np.array([alone[i].mean[i] for i in range(len(alone))]),
+                        np.diag([alone[i].variance[i] for i in range(len(alone))]))
+    return replace(best, terms=(*others, replace(own, free=own.signature.free)), strength=strength)
 
 
 def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], before: float) -> dict[str, Candidate]:
@@ -126,8 +127,8 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], befor
     for name, candidate in best.items():
         mine = [t for t in candidate.terms if t.name == name]
         own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
-        stretched = own.shows_in == MEAN and at_bound(own, candidate.strength).any()
-        measured = candidate.strength, candidate.covariance, candidate.apart
-        rarity = scatter.evidence(name, *measured) if scatter else np.inf
+        stretched = own.shows_in == MEAN and at_bound(own, candidate.strength.mean).any()
+        measured = candidate.strength
+        rarity = scatter.evidence(name, measured.mean, measured.covariance, measured.apart) if scatter else np.inf
         out[name] = replace(candidate, evidence=min(candidate.gain - before, 0.0 if stretched else rarity))
     return out

@@ -22,39 +22,53 @@ TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too 
 
 
 @dataclass(frozen=True)
+class Strength:
+    """Scaled parameters of one term, as both halves of the flights have them.
+
+    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects; apart (k,): half of what the halves
+    differ by. k: of all parameters that the effect may have free; those that its variant leaves alone are 0, and nobody
+    knows how far they lie from it.
+    """
+
+    mean: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    apart: np.ndarray | float = 0.0
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance (k,) of the mean, no less than what the halves differ by says.
+
+        Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
+        """
+        return np.maximum(np.diag(self.covariance), np.square(self.apart))
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A hypothesis with its gain over no effect, held-out nats, and its fits of both halves.
 
-    name: its newest effect; terms: all of them, with their values. strength: scaled parameters (k,) of the newest
-    effect, the mean of both halves; covariance (k, k): of those of a mean effect, by chance; apart (k,): half of what
-    the halves differ by. evidence: nats that that effect gains over the hypothesis before, and no more than its
-    strength says beyond the scatter of nominal flights. named: whether that is enough; if not, it is a deviation that
-    nominal flights have as well, and stands beside the effects that are named.
+    name: its newest effect; terms: all of them, with their values; full: whether it is fitted in full, not to first
+    order only. choice_cost: nats that the choice of the effects' variants has cost, which the gain is without;
+    gained_while_certain: nats of the gain that effects before the first random one gained while the commands' floor was
+    more certain. strength: of the newest effect. evidence: nats that that effect gains over the hypothesis before, and
+    no more than its strength says beyond the scatter of nominal flights. named: whether that is enough; if not, it is a
+    deviation that nominal flights have as well, and stands beside the effects that are named. key: of one that comes
+    and goes, what of `Scatter.passing` it is compared with. share: where several effects are named, nats over the
+    hypothesis of the others alone.
     """
 
     name: str
     terms: Terms
     gain: float
     fits: tuple[FittedTerms, ...] = ()
-    full: bool = True  #: fitted in full, not to first order only
-    choice_cost: float = 0.0  #: nats that the choice of the effects' variants has cost, which the gain is without
-    #: nats of the gain that effects before the first random one gained while the commands' floor was more certain
+    full: bool = True
+    choice_cost: float = 0.0
     gained_while_certain: float = 0.0
-    strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    apart: np.ndarray | float = 0.0
+    strength: Strength = field(default_factory=Strength)
     evidence: float = 0.0
     named: bool = True
-    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is compared with
-    share: float = np.inf  #: where several effects are named: nats over the hypothesis of the others alone
-
-    @property
-    def variance(self) -> np.ndarray:
-        """Variance (k,) of `strength`, no less than what the halves differ by says.
-
-        Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
-        """
-        return np.maximum(np.diag(self.covariance), np.square(self.apart))
+    key: str = ""
+    share: float = np.inf
 
     @property
     def of_the_log(self) -> bool:

@@ -18,7 +18,7 @@ from airtouch.gap.signatures.term import Term
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1
 #: the same of an effect that changes the loop, beside one that changes or shakes it: with this project's firmware twice
 #: what wrong ones gained at most beside right ones in 43 simulated flights; with others as little as the loop model is
-#: trusted (`problem.TORQUE_DOUBT`), chosen
+#: trusted (`torque_power.TORQUE_DOUBT`), chosen
 ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 #: the same of a random effect, to be named: what a model is wrong by looks random. Beside weak motors and offset masses
 #: motor noise gained 3 to 16 %: the yaw command of the logged instant is not that of the 10 ms around it

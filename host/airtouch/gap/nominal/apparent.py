@@ -45,9 +45,9 @@ def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStren
     """How strong every effect but those of `without` seems to be in flights that have none."""
     trial = trial_of(data)
     singles = round_of(trial, all_candidates(without), None, thorough=True)
-    known = {name: candidate for name, candidate in singles.items() if len(candidate.strength)}
+    known = {name: candidate for name, candidate in singles.items() if len(candidate.strength.mean)}
     return ApparentStrengths(
-        {name: candidate.strength for name, candidate in known.items()},
+        {name: candidate.strength.mean for name, candidate in known.items()},
         {name: _strength_error(data, candidate) for name, candidate in known.items()},
         nameless_nats(trial, None) / data.seconds, passing_sizes(data, without))
 
@@ -78,15 +78,15 @@ def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Appare
 
 def _strength_error(data: Data, judged: Candidate) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
-    term = strength_term(judged.terms)
+    term, strength = strength_term(judged.terms), judged.strength
     if term.shows_in == CLOCK:
-        return np.zeros(len(judged.strength))
+        return np.zeros(len(strength.mean))
     if term.shows_in == SPECTRUM:
         return _random_error(data, judged, term)
     low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
-    pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
-    return np.where(at_bound(term, judged.strength) | pressed, NOBODY_KNOWS,
-                    np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
+    pressed = (low == 0.0) & (strength.mean < NEUTRAL)  # the data would have it below none: how far, nobody knows
+    return np.where(at_bound(term, strength.mean) | pressed, NOBODY_KNOWS,
+                    np.minimum(np.sqrt(strength.variance), NOBODY_KNOWS))
 
 
 def _random_error(data: Data, judged: Candidate, term: Term) -> np.ndarray:
@@ -94,4 +94,4 @@ def _random_error(data: Data, judged: Candidate, term: Term) -> np.ndarray:
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
-    return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))
+    return np.sqrt(np.where(judged.strength.mean > 0.0, variance, 0.0))

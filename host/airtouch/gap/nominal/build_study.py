@@ -13,6 +13,7 @@ from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
+from airtouch.gap.signals.quiet_blocks import TINY
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import (
     AIR,
@@ -54,7 +55,7 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
     nominal = [_under_response(n, vehicle, calibration, response) for n in replayed]
     floor = floor_of(nominal, sensor_noise(vehicle))
     if loop is not None and response is not None and response.stepped_law is not None:
-        over = response.stepped_law.power / np.maximum(response.quiet_law.power, 1e-30)
+        over = response.stepped_law.power / np.maximum(response.quiet_law.power, TINY)
         loop = loop.with_steps(response.stepped_law.coherent, over, frequencies(AIR))
     return Study(vehicle, calibration, loop, floor, response, nominal=len(flights))
 

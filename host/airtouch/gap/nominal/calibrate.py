@@ -9,6 +9,7 @@ in the torque alone: it stays as declared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,26 +56,43 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
                ) -> tuple[Study, Calibration]:
     """The study of a vehicle fitted to nominal flights, and the calibration.
 
-    scatter: measure as well how strong every effect but those of `without` seems to be in them (seconds a flight;
-    naming effects needs it, a map does not).
-
-    Flights that cannot be nominal like the others (a touch of the ground, a swapped
-    propeller) are left out and named, as long as most agree.
+    Flights that cannot be nominal like the others (a touch of the ground, a swapped propeller) are left out and named,
+    as long as most agree. scatter: measure as well how strong every effect but those of `without` seems to be in them
+    (seconds a flight; naming effects needs it, a map does not).
     """
-    flights, left_out = split_unlike(vehicle, flights, FAR)
+    alike, left_out = split_unlike(vehicle, flights, FAR)
+    measured = _measured(vehicle, alike, scatter, without)
+    while measured.study.simulated:
+        alike, unlike = split_unlike(vehicle, measured.flights, FAR_SIMULATED)
+        if not unlike:
+            break
+        alike, far = split_unlike(vehicle, alike, FAR)  # from the median of those that are left
+        left_out = [*left_out, *unlike, *far]
+        measured = _measured(vehicle, alike, scatter, without)
+    study, nominal = measured.study, measured.flights
+    if study.simulated:
+        study = _as_simulated(study, nominal, without)
+    return study, Calibration(study.calibration, _quantities(measured.fitted),
+                              (*left_out, *odd_flights(study, nominal)), None if left_out else measured.declared)
+
+
+class _Measured(NamedTuple):
+    """Nominal flights with what they say: of the vehicle as declared, as fitted to them, and the fit."""
+
+    flights: Sequence[Flight]
+    declared: Study
+    study: Study
+    fitted: FittedTerms
+
+
+def _measured(vehicle: Vehicle, flights: Sequence[Flight], scatter: bool, without: Sequence[str]) -> _Measured:
+    """A vehicle fitted to nominal flights, with how they scatter. scatter, without: see `calibrated`."""
     declared = declared_study(vehicle, flights)
     study, fitted = _fitted_vehicle(declared, flights)
     study = replace(study, nameless_floor=nameless_floor(Data(study, flights)))
     if scatter:
         study = replace(study, scatter=baseline_scatter(study, flights, without))
-    if study.simulated:
-        alike, unlike = split_unlike(vehicle, flights, FAR_SIMULATED)
-        if unlike:
-            study, again = calibrated(vehicle, alike, without=without)
-            return study, replace(again, notes=(*left_out, *unlike, *again.notes), declared=None)
-        study = _as_simulated(study, flights, without)
-    return study, Calibration(study.calibration, _quantities(fitted), (*left_out, *odd_flights(study, flights)),
-                              None if left_out else declared)
+    return _Measured(flights, declared, study, fitted)
 
 
 def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:

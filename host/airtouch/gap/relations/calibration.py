@@ -72,7 +72,8 @@ def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing
     return ClassCalibration(
         _readout(drawing, shown), share_of((f.nameless, f.evidence) for f in shown),
         share_of((f.second, f.evidence) for f in shown if f.second is not None),
-        scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]), library.nominal_scatter))
+        likeliest_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
+                          library.nominal_scatter))
 
 
 def with_calibrations(library: Library, found: Sequence[ClassCalibration]) -> Library:
@@ -179,7 +180,7 @@ def share_of(gains: Iterable[tuple[float, float]]) -> float:
     return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
 
 
-def scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
+def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
     """Likeliest scatter s of distances over the evidence: excess (n,) ~ sqrt(nominal^2 + (s evidence)^2) Student's t.
 
     nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats.
@@ -219,7 +220,7 @@ def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing])
         excess.append(library.excess(flight.squared_distance(both)))
         evidence.append(both.evidence)
         of_classes.append(library.scatter(max(library.distance_scatter[[a, b]]), both.evidence))
-    return scatter(np.array(excess), np.array(evidence), np.array(of_classes))
+    return likeliest_scatter(np.array(excess), np.array(evidence), np.array(of_classes))
 
 
 def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, int]:

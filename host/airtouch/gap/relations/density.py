@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaln
 
-from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.effect_class import SMALLEST, EffectClass
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 REFINEMENTS, TRIALS = 3, 9  #: rounds in which the best strength of a grid is refined, and strengths in each
@@ -17,7 +17,6 @@ STARTS, STEPS = 5, 10  #: sizes of the strength from which a fit of several para
 STEP_LENGTHS = (1.0, 0.5, 0.25, 0.1)  #: of a step that are tried in turn, until one gains
 LEAST_GAIN = 0.01  #: nats that a step gains; after one that gains less the fit ends
 SLOPE = 1e-3  #: share of the strength over which slopes are taken
-SMALLEST = 1e-300  #: length that a division may have at least
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from airtouch.gap.relations.readout import Readout
 
+SMALLEST = 1e-300  #: length that a division or a logarithm may have at least
 KNOT = float(np.log(3.0))  #: between two knots of a curve, in the logarithm of the strength
 LEAST_SHIFT = 0.5  #: shift along a class's own direction below which a flight says nothing of the curve
 LEAST_WEIGHED = 5.0  #: length of a shift below which errors of the curve are weighed as at that length
@@ -89,7 +90,7 @@ def _parts(strength: np.ndarray, signed: bool) -> np.ndarray:
 
 def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Weights (n, k) of the knots at strengths (n,): straight lines in the logarithm, constant outside."""
-    x = np.clip(np.log(np.maximum(size, 1e-300)), knots[0], knots[-1])
+    x = np.clip(np.log(np.maximum(size, SMALLEST)), knots[0], knots[-1])
     left = np.clip(np.searchsorted(knots, x) - 1, 0, len(knots) - 2)
     share = (x - knots[left]) / (knots[left + 1] - knots[left])
     out = np.zeros((len(x), len(knots)))

@@ -26,19 +26,19 @@ LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it tha
 class Sheet:
     """The answer sheet: what each flight's key says, beside its diagnosis.
 
-    cases: all diagnoses; plain: by flight, those with no effect left out; single: the one effect of flights that have
-    one; none: flights free of effects; pairs: names of the two effects of the others. first, three: whether a single
-    effect is first, or among the first three, of the ranking.
+    cases: all diagnoses; full_registry: by flight, those with no effect left out; single_effect: the one effect of
+    flights that have one; without_effect: flights free of effects; pairs: names of the two effects of the others.
+    is_first, in_first_three: whether a single effect is first, or among the first three, of the ranking.
     """
 
     key: Key
     cases: Sequence[Answer]
-    plain: Mapping[str, Answer]
-    single: Mapping[str, DrawnEffect]
-    none: Sequence[str]
+    full_registry: Mapping[str, Answer]
+    single_effect: Mapping[str, DrawnEffect]
+    without_effect: Sequence[str]
     pairs: Mapping[str, Sequence[str]]
-    first: Mapping[str, bool]
-    three: Mapping[str, bool]
+    is_first: Mapping[str, bool]
+    in_first_three: Mapping[str, bool]
 
 
 def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
@@ -79,11 +79,11 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     that is not in the key.
     """
     sheet = sheet_of(key, cases)
-    plain, single = sheet.plain, sheet.single
+    answers, single = sheet.full_registry, sheet.single_effect
     return {
-        "flights": len(key.flights), "diagnosed": len(plain), "effects": len({e.name for e in single.values()}),
-        "top_1": share(sheet.first.values()), "top_3": share(sheet.three.values()),
-        "exact": share(_same(_named(plain.get(n)), [e.name]) for n, e in single.items()),
+        "flights": len(key.flights), "diagnosed": len(answers), "effects": len({e.name for e in single.values()}),
+        "top_1": share(sheet.is_first.values()), "top_3": share(sheet.in_first_three.values()),
+        "exact": share(_same(_named(answers.get(n)), [e.name]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
         "unknown": unknown(sheet), "shrink": shrink(sheet), "parameters": parameters(sheet),
@@ -93,21 +93,25 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
 
 def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
     """The diagnoses beside the key; raises AirTouchError for one of a flight that is not in it."""
-    plain = {_name(c): c for c in cases if not c.get("without")}
-    extra = sorted(set(plain) - set(key.flights))
+    full_registry = {_name(c): c for c in cases if not c.get("without")}
+    extra = sorted(set(full_registry) - set(key.flights))
     if extra:
         raise AirTouchError(f"{extra[0]}: diagnosed, but not a flight of this set")
     single = {n: f.effects[0] for n, f in key.flights.items() if len(f.effects) == 1}
-    first, three = ({n: top(plain.get(n), e.name, rank) for n, e in single.items()} for rank in (1, 3))
-    return Sheet(key, cases, plain, single, [n for n, f in key.flights.items() if not f.effects],
-                 {n: [e.name for e in f.effects] for n, f in key.flights.items() if len(f.effects) == 2}, first, three)
+    first, three = ({n: top(full_registry.get(n), e.name, rank) for n, e in single.items()} for rank in (1, 3))
+    return Sheet(
+        key=key, cases=cases, full_registry=full_registry, single_effect=single,
+        without_effect=[n for n, f in key.flights.items() if not f.effects],
+        pairs={n: [e.name for e in f.effects] for n, f in key.flights.items() if len(f.effects) == 2},
+        is_first=first, in_first_three=three)
 
 
 def by_severity(sheet: Sheet) -> dict[str, Any]:
     """For each severity of single effects: top_1, top_3, how often `none` is said, and `ideal`."""
-    groups = {name: [n for n, e in sheet.single.items() if e.level == i] for i, name in enumerate(SEVERITIES)}
-    return {name: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
-                   "none": share(_verdict(sheet.plain.get(n)) == "none" for n in group),
+    groups = {name: [n for n, e in sheet.single_effect.items() if e.level == i] for i, name in enumerate(SEVERITIES)}
+    return {name: {"top_1": share(sheet.is_first[n] for n in group),
+                   "top_3": share(sheet.in_first_three[n] for n in group),
+                   "none": share(_verdict(sheet.full_registry.get(n)) == "none" for n in group),
                    "ideal": ideal(sheet.key, group)}
             for name, group in groups.items() if group}
 
@@ -115,23 +119,24 @@ def by_severity(sheet: Sheet) -> dict[str, Any]:
 def by_effect(sheet: Sheet) -> dict[str, Any]:
     """For each kind of single effect: top_1, top_3, and the three strengths that were drawn."""
     groups = defaultdict(list)
-    for n, e in sheet.single.items():
+    for n, e in sheet.single_effect.items():
         groups[e.kind].append(n)
-    return {kind: {"top_1": share(sheet.first[n] for n in group), "top_3": share(sheet.three[n] for n in group),
+    return {kind: {"top_1": share(sheet.is_first[n] for n in group),
+                   "top_3": share(sheet.in_first_three[n] for n in group),
                    "strengths": sheet.key.severities.get(kind)}
             for kind, group in sorted(groups.items())}
 
 
 def of_flights_without_effect(sheet: Sheet) -> dict[str, Any]:
     """false_alarms: flights free of effects that are not called `none`; false_unknown: those called `unknown`."""
-    said = [_verdict(sheet.plain.get(n)) for n in sheet.none]
+    said = [_verdict(sheet.full_registry.get(n)) for n in sheet.without_effect]
     return {"false_alarms": share(verdict != "none" for verdict in said),
             "false_unknown": share(verdict == "unknown" for verdict in said)}
 
 
 def of_pairs(sheet: Sheet) -> dict[str, Any]:
     """pairs_exact: flights with two effects of which both are named and nothing else; pairs_one_right: one or both."""
-    named = {n: _named(sheet.plain.get(n)) for n in sheet.pairs}
+    named = {n: _named(sheet.full_registry.get(n)) for n in sheet.pairs}
     return {"pairs_exact": share(_same(named[n], e) for n, e in sheet.pairs.items()),
             "pairs_one_right": share(any(interchangeable(a, b) for a in named[n] for b in e)
                                      for n, e in sheet.pairs.items())}
@@ -140,8 +145,8 @@ def of_pairs(sheet: Sheet) -> dict[str, Any]:
 def misses(sheet: Sheet) -> list[dict[str, Any]]:
     """Flights whose single effect is not first: flight, true kind, its level and the first three answers."""
     return [{"flight": n, "true": e.kind, "level": e.level,
-             "answer": [r["name"] for r in sheet.plain[n]["ranking"][:3]] if n in sheet.plain else []}
-            for n, e in sheet.single.items() if not sheet.first[n]]
+             "answer": [r["name"] for r in sheet.full_registry[n]["ranking"][:3]] if n in sheet.full_registry else []}
+            for n, e in sheet.single_effect.items() if not sheet.is_first[n]]
 
 
 def ideal(key: Key, flights: Sequence[str]) -> Figure:
@@ -155,18 +160,19 @@ def top(case: Answer | None, name: str, first: int) -> bool:
 
 
 def unknown(sheet: Sheet) -> dict[str, Any]:
-    """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in.
+    """How often flights whose effect was taken out of the registry are called `unknown`, and how likely that is.
 
-    wrong_name_told_apart, auroc_told_apart: among those flights whose data tell the effect from the names that it was
-    given.
+    said_unknown, wrong_name: share of them with that answer; auroc: of the probability of `unknown`, against the same
+    flights with the effect in the registry. wrong_name_told_apart, auroc_told_apart: among those flights whose data
+    tell the effect from the names that it was given.
     """
-    single, plain = sheet.single, sheet.plain
+    single, full_registry = sheet.single_effect, sheet.full_registry
     out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n].level == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
-    apart = {n for n, c in out.items() if separable(plain.get(n), single[n].name, _named(c))}
-    known = {n: _chance(c, "unknown") for n, c in plain.items()}
+    apart = {n for n, c in out.items() if separable(full_registry.get(n), single[n].name, _named(c))}
+    known = {n: _chance(c, "unknown") for n, c in full_registry.items()}
     return {g: {"said_unknown": share(out[n]["verdict"] == "unknown" for n in names),
                 "wrong_name": share(out[n]["verdict"] == "effect" for n in names),
                 "wrong_name_told_apart": share(out[n]["verdict"] == "effect" for n in names if n in apart),
@@ -188,7 +194,8 @@ def separable(case: Answer | None, true: str, named: Iterable[str]) -> bool:
 
 def shrink(sheet: Sheet) -> dict[str, Any]:
     """Share of the gap over the floor that goes, over all flights rightly named: with the effect, with a wrong one."""
-    named = [sheet.plain[n] for n in sheet.single if sheet.first[n] and sheet.plain[n]["verdict"] == "effect"]
+    answers = [sheet.full_registry[n] for n in sheet.single_effect if sheet.is_first[n]]
+    named = [c for c in answers if c["verdict"] == "effect"]
     right = [(c["gap"]["before"], c["gap"]["after"]) for c in named if c["gap"]["before"] > LEAST_GAP]
     wrong = [(c["control"]["before"], c["control"]["after"]) for c in named
              if c.get("control") and c["control"]["before"] > LEAST_GAP]
@@ -198,8 +205,9 @@ def shrink(sheet: Sheet) -> dict[str, Any]:
 def parameters(sheet: Sheet) -> dict[str, Any]:
     """Parameters of flights rightly named: relative error of each effect's vector, in natural steps; coverage."""
     errors, held = defaultdict(list), defaultdict(list)
-    for n, e in sheet.single.items():
-        found = next((f for f in sheet.plain[n]["effects"] if f["name"] == e.name), None) if sheet.first[n] else None
+    for n, e in sheet.single_effect.items():
+        effects = sheet.full_registry[n]["effects"] if sheet.is_first[n] else []
+        found = next((f for f in effects if f["name"] == e.name), None)
         if found is None:
             continue
         term = terms(e.name)[0]
@@ -220,7 +228,7 @@ def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
     """How often a flight of each effect (or `none`) got each answer first; pairs are not in it."""
     out: dict[str, Counter] = defaultdict(Counter)
     for n, name in _true_names(sheet).items():
-        out[name][sheet.plain[n]["ranking"][0]["name"]] += 1
+        out[name][sheet.full_registry[n]["ranking"][0]["name"]] += 1
     return {k: dict(v) for k, v in sorted(out.items())}
 
 
@@ -228,7 +236,7 @@ def reliability(sheet: Sheet, bins: int = 8) -> list[Figure]:
     """For bins of the first answer's probability: its mean, how often the answer was right, and n."""
     rows = []
     for n, name in _true_names(sheet).items():
-        best = sheet.plain[n]["ranking"][0]
+        best = sheet.full_registry[n]["ranking"][0]
         rows.append((best["probability"], interchangeable(name, best["name"])))
     place = [min(int(p * bins), bins - 1) for p, _ in rows]
     return [{"probability": float(np.mean([r[0] for r in group])), **share(r[1] for r in group)}
@@ -238,7 +246,7 @@ def reliability(sheet: Sheet, bins: int = 8) -> list[Figure]:
 def _true_names(sheet: Sheet) -> dict[str, str]:
     """The right first answer to each flight that was diagnosed, but for pairs: its effect, or "none"."""
     return {n: f.effects[0].name if f.effects else "none" for n, f in sheet.key.flights.items()
-            if n in sheet.plain and len(f.effects) < 2}
+            if n in sheet.full_registry and len(f.effects) < 2}
 
 
 def _name(case: Answer) -> str:

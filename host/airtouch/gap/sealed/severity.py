@@ -78,8 +78,8 @@ def weakest(kind: Kind, conditions: Conditions, seed: int) -> float | None:
 
 def _log_ratios(actives: Sequence[Active], conditions: Conditions) -> tuple[np.ndarray, np.ndarray]:
     """Log ratios, nats, of a flight with each of these effects and of one without, for those that fly to the end."""
-    study, without = conditions.study, conditions.without
-    yes, no = [], []
+    study, free = conditions.study, conditions.without
+    with_effect, without_effect = [], []
     for i, active in enumerate(actives):
         # flown with the default seed, not the set's: the same manoeuvres for every set, of numbers that no set has
         log = next(iter(flown(conditions.scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
@@ -87,21 +87,22 @@ def _log_ratios(actives: Sequence[Active], conditions: Conditions) -> tuple[np.n
             continue
         flights = list(ready_flights([conditions.part_seen(log)], study.vehicle, []))
         if flights:
-            yes.append(log_ratio(Data(study, flights), active))
-            no.append(log_ratio(without[i % len(without)], active))
-    return np.array(yes), np.array(no)
+            with_effect.append(log_ratio(Data(study, flights), active))
+            without_effect.append(log_ratio(free[i % len(free)], active))
+    return np.array(with_effect), np.array(without_effect)
 
 
-def detectable(yes: np.ndarray, no: np.ndarray) -> bool:
+def detectable(with_effect: np.ndarray, without_effect: np.ndarray) -> bool:
     """Whether log ratios (n,) of flights with an effect, nats, stand over those of as many without.
 
     True for fewer than FEWEST: an effect so strong that it cannot fly.
     """
-    if len(yes) < FEWEST:
+    if len(with_effect) < FEWEST:
         return True
-    alarm = no.mean() + FALSE_ALARM * no.std(ddof=1)
-    apart = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
-    return bool(apart and 0.5 * (yes.mean() - no.mean()) > APART)
+    alarm = without_effect.mean() + FALSE_ALARM * without_effect.std(ddof=1)
+    most_over = with_effect.mean() - POWER * with_effect.std(ddof=1) > alarm
+    apart = most_over or with_effect.min() > alarm  # strong ones scatter widely
+    return bool(apart and 0.5 * (with_effect.mean() - without_effect.mean()) > APART)
 
 
 def log_ratio(data: Data, active: Active) -> float:

@@ -27,9 +27,8 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
                    quiet: np.ndarray | None = None, response: Response | None = None) -> np.ndarray:
     """Power (blocks, bins, COUNT), unit^2/Hz, that lost rows add to the blocks in the air that begin at `first`.
 
-    quiet (blocks, 3), response: as `Response.with_residual` takes them; without, the torque is that of the logged
-    commands.
-    Zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight.
+    It is zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight. quiet
+    (blocks, 3), response: as `Response.with_residual` takes them; without, the torque is that of the logged commands.
     """
     total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))
     if not flight.lost.any() or not len(first):

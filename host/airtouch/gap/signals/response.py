@@ -26,16 +26,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
+from airtouch.gap.signals import quiet_blocks
 from airtouch.gap.signals.channels import TORQUE
+from airtouch.gap.signals.quiet_blocks import TINY
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
-QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
-#: power of the modelled torque over the nominal one, scaled to the flight (`_quiet`), from which a set-point stepped;
-#: chosen
-STEPPED_TORQUE = 2.0
-CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
-ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
 FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
 #: Relative error of the loop model in that change of the transfer function which the command's limits make. It is the
 #: error in pairs of simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each.
@@ -47,7 +43,6 @@ ANSWER_DOUBT = 0.2
 #: (looks.md, 2026-11-24).
 SHARE_DOUBT = 0.2
 NOISE = 0.2  #: coherence up to which a transfer is the gyro's noise in both, and not believed; chosen
-TINY = 1e-30  #: least power that is divided by, far below any measured
 
 
 @dataclass(frozen=True)
@@ -130,7 +125,7 @@ class Response:
 
     def quiet(self, modelled: np.ndarray) -> np.ndarray:
         """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3)."""
-        return _quiet(modelled, self.nominal, self.calm)
+        return quiet_blocks.are_quiet(modelled, self.nominal, self.calm)
 
     def with_residual(self, spectra: np.ndarray, quiet: np.ndarray, torque: TorqueSpectra,
                       change: Change | None = None) -> np.ndarray:
@@ -186,26 +181,13 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
     w = y - np.concatenate(residuals)
     if len(y) < FEWEST:
         return None
-    nominal, calm, quiet = _quiet_blocks([m - r for m, r in zip(measured, residuals, strict=True)], np.abs(w) ** 2)
+    modelled = [m - r for m, r in zip(measured, residuals, strict=True)]
+    nominal, calm, quiet = quiet_blocks.of_nominal_flights(modelled, np.abs(w) ** 2)
     steady, floor = _law(y, w, quiet, loop, None)
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
         stepped, _ = _law(y, w, ~quiet, loop, floor)
     return Response(nominal=_smooth(nominal), calm=calm, quiet_law=steady, stepped_law=stepped)
-
-
-def _quiet_blocks(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`Response.nominal` (not smoothed), `Response.calm`, and the blocks without a step, bool (blocks, 3).
-
-    modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the nominal power
-    is that of blocks without a step, and a step is what is stronger.
-    """
-    quiet = np.ones((len(power), 3), bool)
-    for _ in range(ROUNDS):
-        nominal = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0) / np.log(2.0)  # mean of an exponential
-        calm = np.median([np.quantile(_sizes(m, nominal), CALM, axis=0) for m in modelled if len(m)], axis=0)
-        quiet = np.concatenate([_quiet(m, nominal, calm) for m in modelled])
-    return nominal, calm, quiet
 
 
 def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
@@ -233,21 +215,6 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floo
     return Law(transfer=transfer, coherent=coherent, bounded=coherent / np.maximum(np.abs(coherent), 1.0),
                disturbance=disturbance, random=np.abs(disturbance) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2,
                weight=weight, power=_smooth(power)), own_floor
-
-
-def _quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.ndarray:
-    """Blocks without a step, bool (blocks, 3): their modelled torque is about as strong as in the quietest quarter.
-
-    In nominal flights that quarter of a flight's blocks has a share calm (3,) of the nominal power. A lower gain makes
-    both the noise and the steps weaker, so that a limit fixed by nominal flights would take steps for noise.
-    """
-    size = _sizes(modelled, nominal)
-    return size < STEPPED_TORQUE * np.quantile(size, CALM, axis=0) / calm if len(size) else np.zeros((0, 3), bool)
-
-
-def _sizes(modelled: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the nominal one, where a step shows."""
-    return (np.abs(modelled) ** 2 / np.maximum(nominal, TINY))[:, QUIET_BINS].mean(axis=1)
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

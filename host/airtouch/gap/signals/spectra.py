@@ -29,6 +29,7 @@ FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
 LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
 UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
 LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
+LEAST_POWER = 1e-300  #: power that is divided by, or has a logarithm, at least; below any measured
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 
 
@@ -200,5 +201,5 @@ def difference_power(f: np.ndarray) -> np.ndarray:
 def _smooth(power: np.ndarray) -> np.ndarray:
     """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged."""
     out = power.copy()
-    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), SMOOTH, axis=0, mode="nearest"))
+    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], LEAST_POWER)), SMOOTH, axis=0, mode="nearest"))
     return out

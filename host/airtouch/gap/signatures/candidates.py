@@ -11,6 +11,14 @@ from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
 
+PROBE_SAMPLES = 50  #: of PROBE; chosen
+#: signals, by their columns, of a small drone that flies level 0.1 m high at 0.5 m/s; SI units; chosen
+PROBE: tuple[tuple[int | slice, float], ...] = (
+    (at.STEP, 0.01), (at.MASS, 0.03), (at.GRAVITY, 9.81), (at.HOVER_SPEED, 2000.0),
+    (slice(at.ROTOR_SPEED, at.ROTOR_SPEED + 4), 2000.0), (slice(at.THRUST, at.THRUST + 4), 0.08),
+    (at.ROTATION, 1.0), (at.ROTATION + 4, 1.0), (at.ROTATION + 8, 1.0), (at.VELOCITY, 0.5),
+    (slice(at.LOWER_HEIGHT, at.UPPER_HEIGHT + 4), 0.1), (at.HEIGHT, 0.1))
+
 
 def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     """The variants of every effect of the registry but those of `without`, by name and in its order.
@@ -64,19 +72,19 @@ def random_part_of(name: str) -> Term:
     return Term(effect, SPECTRUM, ("turbulence",), values, True)
 
 
-def strength_term(terms: Sequence[Term]) -> Term:
+def strength_term(hypothesis: Sequence[Term]) -> Term:
     """The term whose strength is that of the effect: the random part of one that is ALWAYS_RANDOM, else the first."""
-    return terms[-1] if terms[0].name in ALWAYS_RANDOM else terms[0]
+    return hypothesis[-1] if hypothesis[0].name in ALWAYS_RANDOM else hypothesis[0]
 
 
-def mean_of(terms: Sequence[Term]) -> list[Term]:
+def mean_of(hypothesis: Sequence[Term]) -> list[Term]:
     """The terms that change the mean of the gap."""
-    return [t for t in terms if t.shows_in == MEAN]
+    return [t for t in hypothesis if t.shows_in == MEAN]
 
 
-def random_of(terms: Sequence[Term]) -> list[Term]:
+def random_of(hypothesis: Sequence[Term]) -> list[Term]:
     """The terms that add power, whose phase is not known."""
-    return [t for t in terms if t.shows_in == SPECTRUM]
+    return [t for t in hypothesis if t.shows_in == SPECTRUM]
 
 
 def is_random(name: str) -> bool:
@@ -97,17 +105,13 @@ def term_of(effect: NamedEffect) -> Term:
 
 
 def _random(effect: Effect) -> bool:
-    """Whether two seeds give two forces on the same signals, of a small drone that flies 0.1 m high at 0.5 m/s."""
+    """Whether two seeds give two forces on the same signals, those of PROBE."""
     if effect.wrench is None:
         return False
     from airtouch.simulation import replay
-    signals = np.zeros((50, at.COUNT))
-    signals[:, at.STEP], signals[:, at.MASS], signals[:, at.GRAVITY] = 0.01, 0.03, 9.81
-    signals[:, at.HOVER_SPEED], signals[:, at.ROTOR_SPEED:at.ROTOR_SPEED + 4] = 2000.0, 2000.0
-    signals[:, at.THRUST:at.THRUST + 4] = 0.08
-    signals[:, at.ROTATION], signals[:, at.ROTATION + 4], signals[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
-    signals[:, at.VELOCITY] = 0.5
-    signals[:, at.LOWER_HEIGHT:at.UPPER_HEIGHT + 4], signals[:, at.HEIGHT] = 0.1, 0.1
+    signals = np.zeros((PROBE_SAMPLES, at.COUNT))
+    for columns, value in PROBE:
+        signals[:, columns] = value
     active = Active(effect, effect.values())
     first, second = (replay.wrench_of(active, signals, seed) for seed in (1, 2))
     return not np.allclose(first, second)

@@ -28,10 +28,10 @@ class Shape(NamedTuple):
     values: tuple[float, ...]
 
 
-class Bursts(NamedTuple):
-    """Names of two parameters: share of the samples, and how many of them go in a row.
+class LossRuns(NamedTuple):
+    """Names of the two parameters of lost samples: share of all samples, and how many are lost in a row.
 
-    Bursts are Poisson's, their lengths geometric.
+    Runs begin as in a Poisson process, their lengths are geometric.
     """
 
     share: str
@@ -57,7 +57,7 @@ class Signature:
     at_edges: whether it shows in what a flight does at edges.
     scales_torque: whether it only multiplies torque, and would shrink any trim.
     spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
-    bursts: for what is counted in bursts, the parameters that say so.
+    loss_runs: for what loses samples in runs, the parameters that say so.
     comes_and_goes: whether it may act in a part of a flight only.
 
     What is beside it:
@@ -81,7 +81,7 @@ class Signature:
     at_edges: bool = False
     scales_torque: bool = False
     spectrum: str = ""
-    bursts: Bursts | None = None
+    loss_runs: LossRuns | None = None
     comes_and_goes: bool = False
     without_random: Mapping[str, float] | None = None
     always_random: bool = False
@@ -102,7 +102,7 @@ class Signature:
     @property
     def loses_rows(self) -> bool:
         """Whether it takes rows from the log; what else shows in the logged times moves them."""
-        return self.bursts is not None
+        return self.loss_runs is not None
 
     @property
     def sensed(self) -> bool:
@@ -160,7 +160,7 @@ SIGNATURES: dict[str, Signature] = {
     "sensor_latency": Signature(("delay",), commands_only=True),
     "actuator_delay": Signature(("delay",)),
     "time_jitter": Signature(("rms",), CLOCK),
-    "packet_loss": Signature(("share",), CLOCK, bursts=Bursts("share", "burst")),
+    "packet_loss": Signature(("share",), CLOCK, loss_runs=LossRuns("share", "burst")),
     "range_step": Signature(("residual", "kick"), commands_only=True, at_edges=True),
     "flow_scale": Signature(("share", "transient"), commands_only=True, at_edges=True),
     "downwash": Signature(

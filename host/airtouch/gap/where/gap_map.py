@@ -145,7 +145,7 @@ def _rms(of_sums: Sums, phase: int) -> np.ndarray:
 
 
 def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
-          floor: np.ndarray) -> np.ndarray:
+                 floor: np.ndarray) -> np.ndarray:
     """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
     with np.errstate(invalid="ignore"):
         reduction = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, TINY))
@@ -170,10 +170,12 @@ def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
     long = table.seconds >= LEAST_SECONDS
     for r, b, c in np.argwhere(long[:, None, None] & shown & np.isfinite(table.rms)):
         cells.append(Cell(
-            CHANNELS[c].name, MAP_BANDS_HZ[b], phase.kind, float(table.rms[r, b, c]), float(phase.floor[r, b, c]),
-            CHANNELS[c].unit, float(table.low[r, b, c]), float(table.high[r, b, c]), REGIMES[r], int(table.blocks[r]),
-            int(table.flights[r]), None if after is None else float(after.rms[r, b, c]),
-            float(phase.floor_high[r, b, c]), None if phase.best is None else phase.best[r, b, c] or None))
+            channel=CHANNELS[c].name, band_hz=MAP_BANDS_HZ[b], phase=phase.kind, gap=float(table.rms[r, b, c]),
+            floor=float(phase.floor[r, b, c]), unit=CHANNELS[c].unit, low=float(table.low[r, b, c]),
+            high=float(table.high[r, b, c]), regime=REGIMES[r], blocks=int(table.blocks[r]),
+            flights=int(table.flights[r]), after=None if after is None else float(after.rms[r, b, c]),
+            floor_high=float(phase.floor_high[r, b, c]),
+            by=None if phase.best is None else phase.best[r, b, c] or None))
     return cells
 
 

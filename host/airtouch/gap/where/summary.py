@@ -59,7 +59,7 @@ def sure_ratio(cell: Cell) -> float:
 
 def significant(cell: Cell) -> bool:
     """Whether the gap has an interval, and it lies above that of the floor, which is TINY at least."""
-    return sure_ratio(cell) > 1.0
+    return cell.low is not None and stands_out(cell)
 
 
 def stands_out(cell: Cell) -> bool:
@@ -68,7 +68,7 @@ def stands_out(cell: Cell) -> bool:
     The cells of flights without a gyro (`gap.balance`) have no interval. They may stand out, so that a headline can
     name one, and none is `significant`: neither a list of the largest cells nor the colours of a report show them.
     """
-    return (cell.gap if cell.low is None else cell.low) > (cell.floor_high or cell.floor)
+    return over_floor(cell, cell.low) > 1.0
 
 
 def stays(cell: Cell) -> bool:

@@ -128,7 +128,10 @@ def _error_turn(f, a, b, c):
 
 @jit
 def _spread(est):
-    """P = F P F', whose zeros are left out."""
+    """P = F P F' with F = [[1, A, B], [0, C, D], [0, 0, E]] in blocks of 3.
+
+    est.f holds columns 3 to 8 of F, and a to g are what they are multiplied by. Zeros are left out.
+    """
     p, t, f = est.p, est.t, est.f
     for j in range(9):
         a, b, c, d, e, g = p[3, j], p[4, j], p[5, j], p[6, j], p[7, j], p[8, j]

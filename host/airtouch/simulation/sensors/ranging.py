@@ -14,6 +14,7 @@ from airtouch.simulation.sensors import filters
 _F = np.float64
 RANGE_MS, FLOW_MS = 7, 3  #: ticks of the first down range reading and of the first flow reading
 RANGES, FLOWS = 16, 64  #: readings that the delay lines hold
+LEAST_COSINE = 0.3  #: between beam and plumb, a tilt of 73 degrees; chosen, so that the distance stays finite
 MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
 CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
 CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
@@ -105,7 +106,7 @@ def measure(plant, state, ground, generator):
     top = s.below_top = _below(s, ground, pose[0], pose[1], eye)
     if plant.range_reach > 0.0:
         top = _surface(ground, pose[0], pose[1], eye, plant.range_reach, 0.0)
-    tilt = max(1.0 - 2.0 * (pose[7] * pose[7] + pose[8] * pose[8]), 0.3)  # cosine between beam and plumb
+    tilt = max(1.0 - 2.0 * (pose[7] * pose[7] + pose[8] * pose[8]), LEAST_COSINE)  # cosine between beam and plumb
     true = (eye - top) / tilt
     changed = top != s.seen_top
     if changed:

@@ -15,6 +15,9 @@ MOST_BLOCKS, MOST_VARIABLES, MOST_BYTES = 16, 128, 26
 MEMORY_VARIABLE = 0xFFFF
 CODES = {"uint8_t": 1, "uint16_t": 2, "uint32_t": 3, "int8_t": 4, "int16_t": 5, "int32_t": 6, "float": 7,
          "FP16": 8}
+FLOAT, FP16 = CODES["float"], CODES["FP16"]
+SIGNED = (CODES["int8_t"], CODES["int16_t"], CODES["int32_t"])
+FP16_LARGEST = 65504.0  #: largest finite value of a half-precision float
 FORMATS = {1: "B", 2: "H", 3: "I", 4: "b", 5: "h", 6: "i", 7: "f", 8: "e"}
 LENGTHS = {code: struct.calcsize("<" + letter) for code, letter in FORMATS.items()}
 TICK_MS = 10  #: ms per row of the simulator
@@ -122,8 +125,8 @@ class LogService:
 
 def encode(value: float, sent: int) -> bytes:
     """The bytes of a value in type `sent`, as in the firmware: integers wrap, FP16 overflows to infinity."""
-    if sent in (7, 8):
-        if sent == 8 and math.isfinite(value) and abs(value) > 65504.0:
+    if sent in (FLOAT, FP16):
+        if sent == FP16 and math.isfinite(value) and abs(value) > FP16_LARGEST:
             value = math.copysign(math.inf, value)
         return struct.pack("<" + FORMATS[sent], value)
     whole = int(value) if math.isfinite(value) else 0
@@ -132,10 +135,10 @@ def encode(value: float, sent: int) -> bytes:
 
 def hold(value: float, kind: int) -> float:
     """The value as a variable of type `kind` stores it: integers are truncated and limited to their range."""
-    if kind in (7, 8):
+    if kind in (FLOAT, FP16):
         return value
     if not math.isfinite(value):
         return 0
-    bits, signed = 8 * LENGTHS[kind], kind in (4, 5, 6)
+    bits, signed = 8 * LENGTHS[kind], kind in SIGNED
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
     return min(max(int(value), low), high)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 GET_ITEM, GET_INFO = 2, 3
-GROUP, START, STOP = 0x80, 0x81, 0x80
+START, STOP = 0x81, 0x80  #: type bytes of the entries that begin and end a group
 MOST_NAME = 24  #: characters of group and name together that fit into a packet
 
 

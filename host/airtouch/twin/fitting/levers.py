@@ -73,19 +73,24 @@ def _of_vehicle(vehicle: Vehicle) -> tuple[Lever, ...]:
     """Mission, thrust, battery, motors and inertia."""
     yaw = vehicle.yaw_torque_over_thrust_m
     return (
-        Lever(MISSION, "height_m", 0.0, -0.1, 0.1, 0.01, "m"),
-        Lever(MISSION, "pulse_mps", -0.2, -0.6, 0.6, 0.03, "m/s"),
-        Lever("thrust_coefficient", "loss", 0.0, -0.3, 0.3, 0.02, "1", 0.03),
-        *(Lever("trim", key, 0.0, -0.15, 0.15, 0.01, TRIM_UNIT, 0.02) for key in ROTOR_SIGNS),
-        Lever("battery_sag", "capacity", 0.6, 0.2, 2.0, 0.1, "1"),
-        Lever("battery_sag", "charge", 0.7, 0.3, 1.0, 0.1, "1", 0.2),
-        Lever("motor_lag", "factor", 1.0, 0.4, 2.0, 0.1, "1"),
-        Lever("actuator_delay", "delay", 0.004, 0.0, 0.03, 0.002, "s"),
-        Lever("sensor_latency", "delay", 0.001, 0.0, 0.006, 0.0005, "s"),
-        Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
-        Lever(VEHICLE, "rotor_inertia_kg_m2", vehicle.rotor_inertia_kg_m2 or ROTOR_INERTIA, 0.0, 3e-7, 1e-8, "kg m²"),
-        Lever(VEHICLE, "acc_lowpass_hz", vehicle.acc_lowpass_hz or ACC_LOWPASS_HZ, 15.0, 80.0, 2.0, "Hz"),
-        *(Lever(VEHICLE, f"inertia_kg_m2.{i}", value, 0.5 * value, 2.0 * value, 0.06 * value, "kg m²")
+        Lever(MISSION, "height_m", start=0.0, low=-0.1, high=0.1, step=0.01, unit="m"),
+        Lever(MISSION, "pulse_mps", start=-0.2, low=-0.6, high=0.6, step=0.03, unit="m/s"),
+        Lever("thrust_coefficient", "loss", start=0.0, low=-0.3, high=0.3, step=0.02, unit="1", spread=0.03),
+        *(Lever("trim", key,
+                start=0.0, low=-0.15, high=0.15, step=0.01, unit=TRIM_UNIT, spread=0.02)
+          for key in ROTOR_SIGNS),
+        Lever("battery_sag", "capacity", start=0.6, low=0.2, high=2.0, step=0.1, unit="1"),
+        Lever("battery_sag", "charge", start=0.7, low=0.3, high=1.0, step=0.1, unit="1", spread=0.2),
+        Lever("motor_lag", "factor", start=1.0, low=0.4, high=2.0, step=0.1, unit="1"),
+        Lever("actuator_delay", "delay", start=0.004, low=0.0, high=0.03, step=0.002, unit="s"),
+        Lever("sensor_latency", "delay", start=0.001, low=0.0, high=0.006, step=0.0005, unit="s"),
+        Lever(VEHICLE, "yaw_torque_over_thrust_m", start=yaw, low=0.3 * yaw, high=3 * yaw, step=0.15 * yaw, unit="m"),
+        Lever(VEHICLE, "rotor_inertia_kg_m2",
+              start=vehicle.rotor_inertia_kg_m2 or ROTOR_INERTIA, low=0.0, high=3e-7, step=1e-8, unit="kg m²"),
+        Lever(VEHICLE, "acc_lowpass_hz",
+              start=vehicle.acc_lowpass_hz or ACC_LOWPASS_HZ, low=15.0, high=80.0, step=2.0, unit="Hz"),
+        *(Lever(VEHICLE, f"inertia_kg_m2.{i}",
+                start=value, low=0.5 * value, high=2.0 * value, step=0.06 * value, unit="kg m²")
           for i, value in enumerate(vehicle.inertia_kg_m2)),
     )
 
@@ -93,16 +98,16 @@ def _of_vehicle(vehicle: Vehicle) -> tuple[Lever, ...]:
 def _of_free_air() -> tuple[Lever, ...]:
     """Noise of the motors, gusts, drag and flapping."""
     return (
-        Lever("motor_noise", "rms", 0.006, 0.0, 0.05, 0.0015, "1"),
-        Lever("motor_noise", "time", 0.8, 0.05, 2.0, 0.15, "s"),
-        Lever("motor_noise", "fast", 0.005, 0.0, 0.05, 0.0015, "1"),
-        Lever("motor_noise", "fast_time", 0.005, 0.002, 0.1, 0.002, "s"),
-        Lever("gust", "rms", 0.1, 0.0, 1.0, 0.03, "m/s"),
-        Lever("gust", "lever", 0.0, -0.1, 0.1, 0.01, "m"),
-        Lever("gust", "shear", 0.0, 0.0, 5.0, 0.5, "1"),
-        Lever("rotor_drag", "horizontal", 0.0147, 0.0, 0.08, 0.004, "N s/m"),
-        Lever("blade_flapping", "tilt", 0.01, 0.0, 0.1, 0.01, "rad s/m"),
-        Lever("blade_flapping", "hub", 0.02, 0.0, 0.1, 0.02, "m"),
+        Lever("motor_noise", "rms", start=0.006, low=0.0, high=0.05, step=0.0015, unit="1"),
+        Lever("motor_noise", "time", start=0.8, low=0.05, high=2.0, step=0.15, unit="s"),
+        Lever("motor_noise", "fast", start=0.005, low=0.0, high=0.05, step=0.0015, unit="1"),
+        Lever("motor_noise", "fast_time", start=0.005, low=0.002, high=0.1, step=0.002, unit="s"),
+        Lever("gust", "rms", start=0.1, low=0.0, high=1.0, step=0.03, unit="m/s"),
+        Lever("gust", "lever", start=0.0, low=-0.1, high=0.1, step=0.01, unit="m"),
+        Lever("gust", "shear", start=0.0, low=0.0, high=5.0, step=0.5, unit="1"),
+        Lever("rotor_drag", "horizontal", start=0.0147, low=0.0, high=0.08, step=0.004, unit="N s/m"),
+        Lever("blade_flapping", "tilt", start=0.01, low=0.0, high=0.1, step=0.01, unit="rad s/m"),
+        Lever("blade_flapping", "hub", start=0.02, low=0.0, high=0.1, step=0.02, unit="m"),
     )
 
 
@@ -110,51 +115,55 @@ def _of_sensor_noise(vehicle: Vehicle) -> tuple[Lever, ...]:
     """Noise of IMU, optical flow and range."""
     gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
     return (
-        *(Lever(VEHICLE, f"acc_noise_ratio.{i}", vehicle.acc_noise_ratio[i], 0.05, 6.0, 0.1, f"of {acc:g} m/s²")
+        *(Lever(VEHICLE, f"acc_noise_ratio.{i}",
+                start=vehicle.acc_noise_ratio[i], low=0.05, high=6.0, step=0.1, unit=f"of {acc:g} m/s²")
           for i in range(3)),
-        *(Lever(VEHICLE, f"gyro_noise_ratio.{i}", vehicle.gyro_noise_ratio[i], 0.05, 6.0, 0.1, f"of {gyro:g} rad/s")
+        *(Lever(VEHICLE, f"gyro_noise_ratio.{i}",
+                start=vehicle.gyro_noise_ratio[i], low=0.05, high=6.0, step=0.1, unit=f"of {gyro:g} rad/s")
           for i in range(3)),
-        *(Lever(VEHICLE, f"flow_noise_mps.{i}", vehicle.flow_noise_mps[i], 0.0, 0.5, 0.015, "m/s") for i in range(2)),
-        Lever(VEHICLE, "flow_noise_time_s", vehicle.flow_noise_time_s, 0.02, 3.0, 0.1, "s"),
-        Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "1"),
-        Lever(VEHICLE, "range_drift_time_s", vehicle.range_drift_time_s, 0.05, 3.0, 0.1, "s"),
+        *(Lever(VEHICLE, f"flow_noise_mps.{i}",
+                start=vehicle.flow_noise_mps[i], low=0.0, high=0.5, step=0.015, unit="m/s")
+          for i in range(2)),
+        Lever(VEHICLE, "flow_noise_time_s", start=vehicle.flow_noise_time_s, low=0.02, high=3.0, step=0.1, unit="s"),
+        Lever(VEHICLE, "range_drift_rms", start=vehicle.range_drift_rms, low=0.0, high=0.05, step=0.002, unit="1"),
+        Lever(VEHICLE, "range_drift_time_s", start=vehicle.range_drift_time_s, low=0.05, high=3.0, step=0.1, unit="s"),
     )
 
 
 def _of_edges() -> tuple[Lever, ...]:
     """The air over a platform and at its edges."""
     return (
-        Lever("ground_effect", "strength", 1.4, 0.0, 3.0, 0.15, "1", 0.3),
-        Lever("ground_effect", "fade", 0.08, 0.03, 0.3, 0.01, "m"),
-        Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1", 0.3),
-        Lever("ground_effect", "turbulence", 0.6, 0.0, 3.0, 0.1, "1"),
-        Lever("ground_effect", "turbulence_time", 0.04, 0.005, 0.3, 0.006, "s"),
-        Lever("ground_effect", "heave", 0.6, 0.0, 2.0, 0.1, "1"),
-        Lever("ground_effect", "pitch", 0.8, 0.0, 2.0, 0.1, "1"),
-        Lever("ground_effect", "swirl", 0.004, 0.0, 0.05, 0.001, "m"),
-        Lever("ground_effect", "leaving", 0.02, -0.1, 0.1, 0.006, "1", 0.01),
+        Lever("ground_effect", "strength", start=1.4, low=0.0, high=3.0, step=0.15, unit="1", spread=0.3),
+        Lever("ground_effect", "fade", start=0.08, low=0.03, high=0.3, step=0.01, unit="m"),
+        Lever("ground_effect", "even", start=0.3, low=0.0, high=1.0, step=0.2, unit="1", spread=0.3),
+        Lever("ground_effect", "turbulence", start=0.6, low=0.0, high=3.0, step=0.1, unit="1"),
+        Lever("ground_effect", "turbulence_time", start=0.04, low=0.005, high=0.3, step=0.006, unit="s"),
+        Lever("ground_effect", "heave", start=0.6, low=0.0, high=2.0, step=0.1, unit="1"),
+        Lever("ground_effect", "pitch", start=0.8, low=0.0, high=2.0, step=0.1, unit="1"),
+        Lever("ground_effect", "swirl", start=0.004, low=0.0, high=0.05, step=0.001, unit="m"),
+        Lever("ground_effect", "leaving", start=0.02, low=-0.1, high=0.1, step=0.006, unit="1", spread=0.01),
     )
 
 
 def _of_flow_and_range(near: NearRange) -> tuple[Lever, ...]:
     """What optical flow and range read over a platform and at its edges."""
     return (
-        Lever("flow_scale", "share", -0.04, -0.1, 1.0, 0.03, "1", 0.02),
-        Lever("flow_scale", "transient", 0.7, -1.0, 1.0, 0.08, "1", 0.25),
-        Lever("flow_scale", "time", 0.15, 0.02, 1.0, 0.04, "s"),
-        Lever("flow_scale", "wait", 0.14, 0.0, 0.4, 0.015, "s", 0.04),
-        Lever("flow_scale", "above", 0.07, 0.03, 0.15, 0.005, "m"),
-        Lever("flow_scale", "focus", 0.06, 0.01, 0.3, 0.008, "m"),
-        Lever("flow_latency", "delay", 0.02, 0.0, 0.2, 0.008, "s"),
-        Lever("range_bias", "near", near.near, -0.2, 0.1, 0.008, "m", 0.012),
-        Lever("range_bias", "fade", near.fade, 0.01, 0.2, 0.006, "m"),
-        Lever("range_bias", "dip", -0.035, -0.1, 0.1, 0.006, "m"),
-        Lever("range_bias", "dip_fade", 0.06, 0.02, 0.3, 0.008, "m"),
-        Lever("range_bias", "time", 0.06, 0.03, 1.0, 0.02, "s"),
-        Lever("range_bias", "reach", 0.02, 0.0, 0.1, 0.006, "m", 0.01),
-        Lever("range_bias", "delay", near.delay, 0.0, 0.15, 0.008, "s", 0.012),
-        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.012),
-        Lever("range_step", "kick", 0.0, -0.1, 0.1, 0.006, "m"),
+        Lever("flow_scale", "share", start=-0.04, low=-0.1, high=1.0, step=0.03, unit="1", spread=0.02),
+        Lever("flow_scale", "transient", start=0.7, low=-1.0, high=1.0, step=0.08, unit="1", spread=0.25),
+        Lever("flow_scale", "time", start=0.15, low=0.02, high=1.0, step=0.04, unit="s"),
+        Lever("flow_scale", "wait", start=0.14, low=0.0, high=0.4, step=0.015, unit="s", spread=0.04),
+        Lever("flow_scale", "above", start=0.07, low=0.03, high=0.15, step=0.005, unit="m"),
+        Lever("flow_scale", "focus", start=0.06, low=0.01, high=0.3, step=0.008, unit="m"),
+        Lever("flow_latency", "delay", start=0.02, low=0.0, high=0.2, step=0.008, unit="s"),
+        Lever("range_bias", "near", start=near.near, low=-0.2, high=0.1, step=0.008, unit="m", spread=0.012),
+        Lever("range_bias", "fade", start=near.fade, low=0.01, high=0.2, step=0.006, unit="m"),
+        Lever("range_bias", "dip", start=-0.035, low=-0.1, high=0.1, step=0.006, unit="m"),
+        Lever("range_bias", "dip_fade", start=0.06, low=0.02, high=0.3, step=0.008, unit="m"),
+        Lever("range_bias", "time", start=0.06, low=0.03, high=1.0, step=0.02, unit="s"),
+        Lever("range_bias", "reach", start=0.02, low=0.0, high=0.1, step=0.006, unit="m", spread=0.01),
+        Lever("range_bias", "delay", start=near.delay, low=0.0, high=0.15, step=0.008, unit="s", spread=0.012),
+        Lever("range_step", "residual", start=0.0, low=-0.1, high=0.1, step=0.008, unit="m", spread=0.012),
+        Lever("range_step", "kick", start=0.0, low=-0.1, high=0.1, step=0.006, unit="m"),
     )
 
 

@@ -7,6 +7,7 @@ twice, gives the height over the floor for some tenths of a second.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,6 +32,8 @@ TOP_RANGE_M = 0.1  #: m around the median step in which the platform's height is
 #: m, largest difference of the steps at one platform, whose readings differ by height: 0.735 to 0.766 m on folds 0 to 2
 #: (host/docs/twin-findings.md), twice that
 SAME_PLATFORM_M = 0.06
+#: typical change of top, near and fade (m) and delay (s): the unit of the solver's steps; no source: round number
+PARAMETER_SCALE = (0.01, 0.01, 0.01, 0.01)
 MIN_FLIGHTS = 4  #: least number of flights, as `flights.MIN_FLIGHTS`
 
 
@@ -45,6 +48,19 @@ class NearRange:
     near: float
     fade: float
     delay: float
+
+
+class EdgeHeights(NamedTuple):
+    """What the samples (m,) over the surface at an edge say of its height.
+
+    height: over the floor, m. climb: its slope, m/s. reading: the down range, m. std: standard deviation of height less
+    reading, m, with the edge as one measurement.
+    """
+
+    height: np.ndarray
+    climb: np.ndarray
+    reading: np.ndarray
+    std: np.ndarray
 
 
 def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRange | None:
@@ -69,16 +85,15 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
         return np.r_[(modelled - reading) / std, PRIOR_WEIGHT * (p[1:] - PRIOR[:, 0]) / PRIOR[:, 1]]
 
     top = float(np.median(steps))
-    solution = least_squares(residual, [top, *PRIOR[:, 0]], loss="soft_l1", x_scale=[0.01, 0.01, 0.01, 0.01],
+    solution = least_squares(residual, [top, *PRIOR[:, 0]], loss="soft_l1", x_scale=PARAMETER_SCALE,
                              bounds=([top - TOP_RANGE_M, *LOW], [top + TOP_RANGE_M, *HIGH])).x
     return NearRange(*(float(v) for v in solution))
 
 
-def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
-    """Height over the floor (m,), m, its slope (m,), m/s, and the down range (m,), m, of each edge.
+def around(course: Course, x: np.ndarray) -> list[EdgeHeights]:
+    """Dead-reckoned heights and readings of each edge; an edge without readings over both surfaces is left out.
 
-    The fourth value is the standard deviation (m,) of height less down range, m, with each edge as one measurement.
-    x: (n, 12) channels. An edge without readings over both surfaces is not in the list.
+    x: (n, 12) channels.
     """
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / SAMPLE_RATE_HZ
     change = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
@@ -88,7 +103,7 @@ def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
               slice(course.entry + 2, min(course.entry + carried, course.exit - 3))),
              (slice(course.exit + guard, min(course.exit + anchor, course.landing)), course.exit + guard,
               slice(max(course.exit - carried + guard, course.entry + 2), course.exit - 3)))
-    out: list[tuple[np.ndarray, ...]] = []
+    out: list[EdgeHeights] = []
     for floor, tie, over in spans:
         valid = down[floor] > 0.5 * course.before_m
         if valid.sum() < int(MIN_ANCHOR * anchor) or over.stop - over.start < guard:
@@ -96,5 +111,5 @@ def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
         drift = np.polyfit(t[floor][valid] - t[tie], (down - change)[floor][valid], 1)
         height = change + np.polyval(drift, t - t[tie])
         std = (READING_STD_M + DRIFT_M * (t[over] - t[tie]) ** 2) * np.sqrt(over.stop - over.start)
-        out.append((height[over], np.gradient(height, dt)[over], down[over], std))
+        out.append(EdgeHeights(height[over], np.gradient(height, dt)[over], down[over], std))
     return out

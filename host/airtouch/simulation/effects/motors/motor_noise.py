@@ -6,6 +6,7 @@ from airtouch.simulation.effects.effect import Effect, Parameter
 
 
 def settings(plant, v):
+    """Add both noises to the plant's, as independent ones; the correlation times are those of the last effect."""
     plant["motor_noise"] = np.hypot(plant["motor_noise"], v["rms"])
     plant["motor_noise_time"] = v["time"]
     plant["motor_hiss"] = np.hypot(plant["motor_hiss"], v["fast"])

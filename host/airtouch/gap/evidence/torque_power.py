@@ -1,0 +1,69 @@
+"""Power that effects of the loop add to the floor of the torque in the replay view."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data, spectra, step_doubt
+from airtouch.gap.evidence.layout import Layout
+from airtouch.gap.loop.torque_share import Change
+from airtouch.gap.signals.channels import COUNT, TORQUE
+from airtouch.gap.signals.response import FIRST_BIN
+from airtouch.gap.signals.spectra import AIR, REST, frequencies, squared
+from airtouch.gap.signatures.signature import signature_of
+from airtouch.simulation.effects import Active
+
+#: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
+TORQUE_DOUBT = 0.25
+
+
+@dataclass(frozen=True)
+class TorquePower:
+    """The replay view's values (replay,) as far as this power depends on them.
+
+    base: the gap without effects, 0 where unknown; known: whether a value counts; torque: whether it is one of the
+    torque; noise: power of the floor, without what lost rows add.
+    """
+
+    data: Data
+    layout: Layout
+    base: np.ndarray
+    known: np.ndarray
+    torque: np.ndarray
+    noise: np.ndarray
+
+    def added_by(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (replay,) that effects add.
+
+        It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
+        """
+        law = self.data.study.controller
+        loop = beside_edges(active) if law and len(self.base) else []
+        of_loop = law.torque_change(loop, frequencies(AIR)) if law and loop else None
+        if of_loop is None:
+            return np.zeros(len(self.base))
+        gather = self.layout.gather
+        change = np.where(self.known, gather(spectra(self.data, loop)) - self.base, 0.0)
+        steps = step_doubt(self.data, loop)
+        doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
+        return doubt + self.noise * self._noise_growth(of_loop)
+
+    def _noise_growth(self, change: Change) -> np.ndarray:
+        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
+        before, after = change.incoherent
+        table = np.zeros((len(before), COUNT))
+        nominal = self.data.study.floor.power[AIR][:, TORQUE]
+        table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
+        return self.layout.per_bin({AIR: table, REST: np.zeros(self.layout.keep[REST].shape)})
+
+
+def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) -> bool:
+    """Whether the loops of roll and pitch differ between two hypotheses."""
+    law = data.study.controller
+    return law is not None and not law.same_loop(before, after)
+
+
+def beside_edges(active: Sequence[Active]) -> list[Active]:
+    """The effects that show beside edges: in the replay, or in the loop that is part of it."""
+    return [a for a in active if not signature_of(a.effect).edges_only]

@@ -1,0 +1,96 @@
+"""What comes and goes, in made flights with a push for some seconds: when it is named, and before what."""
+
+from dataclasses import replace
+
+import pytest
+from scipy.stats import t as student
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.naming import judging
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
+from airtouch.gap.signatures.scatter import FALSE_SHARE, size_of
+from hovers import ALWAYS, FLOOR, scattered, select_from, with_a_push
+
+
+def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
+    pushed = [with_a_push(9.0, 15.0)]
+    selection, data = select_from(pushed, ("mass",), scattered(), ())
+    assert [s.name for s in selection.named] == ["downwash"]
+    ((name, since, until),) = selection.steps[0].terms[0].gate
+    assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
+    assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
+    single = selection.singles["downwash"]
+    without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
+    assert single.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.choice_cost)
+    assert selection.least["downwash"] == judging.LEAST_GAIN
+    for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
+        other, _ = select_from(pushed, ("mass",), study, without)
+        assert "downwash" not in other.singles
+
+
+@pytest.mark.parametrize(("size", "named"), [((0.0, 0.0), True), ((0.5, 0.1), True), ((3.0, 0.5), False)])
+def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have(size, named):
+    """size: mean and standard deviation of `size_of` in nominal flights."""
+    study = scattered()
+    study = replace(study, scatter=replace(study.scatter, passing={"downwash": size}))
+    selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
+    for step in selection.steps:
+        beyond = study.scatter.unusual({"downwash": size_of(step.gain / data.seconds, step.strength.mean)})
+        assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
+
+
+@pytest.mark.parametrize(("names", "nominal_sizes", "mps2", "named"), [
+    (("mass",), {}, 0.5, ["mass"]), (("mass",), {"mass": [3.0]}, 0.5, ["downwash"]), (("imu_noise",), {}, 0.15, [])])
+def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, nominal_sizes, mps2, named):
+    """A push for 25 of 30 s, of which its mass gains more.
+
+    A mass that nominal flights have as well does not count; what follows the flight's own height does.
+    """
+    pushed = with_a_push(0.0 if mps2 == 0.5 else 2.0, 25.0, mps2=mps2)
+    selection, _ = select_from([pushed], names, scattered(**nominal_sizes), ())
+    assert [s.name for s in selection.named] == named
+    assert ("downwash" in selection.singles) == ("downwash" in named)
+
+
+@pytest.mark.parametrize(("less", "named"), [(judging.LEAST_GAIN - 1.0, []), (judging.LEAST_GAIN + 1.0, ["downwash"])])
+def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
+    """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
+    flights, study = [with_a_push(9.0, 15.0)], scattered()
+    gain = gated_effects(Data(study, flights))["downwash"].gain
+    monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
+    assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
+
+
+def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_nominal_flights_have():
+    """A push all along, harder for half of the flight: the harder half alone gains most, and less beside a mass."""
+    harder = with_a_push(8.0, 23.0, mps2=0.35)
+    flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
+    selection, data = select_from(flights, ("mass",), scattered(), ())
+    wake, mass = selection.steps
+    assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
+    rates = (nats / data.seconds for nats in (mass.share, wake.share, wake.gain))
+    least, share, gain = (size_of(rate, wake.strength.mean) for rate in rates)
+
+    def names_where_nominal_flights_have(size):
+        """FALSE_SHARE of the nominal flights have a larger one."""
+        study, spread = scattered(), 0.1
+        middle = size - spread * student.ppf(1.0 - FALSE_SHARE, study.scatter.freedom)
+        study = replace(study, scatter=replace(study.scatter, passing={"downwash": (middle, spread)}))
+        return {s.name for s in select_from(flights, ("mass",), study, ())[0].steps}
+
+    assert names_where_nominal_flights_have(0.5 * (share + gain)) == {"mass"}
+    assert names_where_nominal_flights_have(0.5 * (least + share)) == {"mass", "downwash"}
+
+
+@pytest.mark.parametrize(("overhead", "key", "since_s"), [
+    ((9.0, 12.0), KNOWN_OVERHEAD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
+def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
+    """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
+    study = replace(scattered(), overhead=(("pushed", *overhead),))
+    selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    (step,) = selection.named
+    assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
+    assert (step.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
