@@ -76,7 +76,7 @@ def pool_of(jobs: int, groups: list[Group]) -> ProcessPoolExecutor:
                                initargs=(groups,))
 
 
-def groups(folder: Path) -> Iterator[Group]:
+def nominal_groups(folder: Path) -> Iterator[Group]:
     """The groups of nominal flights, recorded and simulated."""
     by_group = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
@@ -248,7 +248,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--passing", action="store_true")
     args = parser.parse_args()
-    large_enough = [g for g in groups(args.flights) if len(g.logs) >= LEAST]
+    large_enough = [g for g in nominal_groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
         with pool_of(args.jobs, large_enough) as pool:
             shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"

@@ -58,7 +58,7 @@ class InFloat(Detector, Protocol):
 
 
 @runtime_checkable
-class Choosing(Protocol):
+class Choosing(Detector, Protocol):
     """A detector with several models, which picks one by the sensors that a log holds."""
 
     def model_for(self, model: Any, log: FlightLog) -> Any:

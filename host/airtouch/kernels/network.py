@@ -149,12 +149,12 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     weighted = [layer for layer in layers if layer.weighted]
     packed = [packed_weights(layer) for layer in weighted]
     constants = [layer.c_constants() for layer in weighted]
-    weights = _joined([np.pad(np.ravel(one), (0, -one.size % 4)) for one, _, _ in packed], np.int8)
-    counts = _joined([one for _, one, _ in packed], np.uint16)
-    skips = _joined([one for _, _, one in packed], np.uint8)
-    bias = _joined([one for one, _, _ in constants], np.int32)
-    multiplier = _joined([one for _, one, _ in constants], np.int32)
-    shift = _joined([one for _, _, one in constants], np.int8)
+    weights = _joined([np.pad(np.ravel(w), (0, -w.size % 4)) for w, _, _ in packed], np.int8)
+    counts = _joined([count for _, count, _ in packed], np.uint16)
+    skips = _joined([skip for _, _, skip in packed], np.uint8)
+    bias = _joined([b for b, _, _ in constants], np.int32)
+    multiplier = _joined([m for _, m, _ in constants], np.int32)
+    shift = _joined([s for _, _, s in constants], np.int8)
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,

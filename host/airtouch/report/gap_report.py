@@ -75,8 +75,8 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "gap.html").read_text("utf-8"))
     absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],
-              "remaining": [],
-              "remaining_count": 0, "unexplained": [], "nearest": [], "steps": (), "calibration": [], "anchor": ANCHOR}
+              "remaining": [], "remaining_count": 0, "unexplained": [], "nearest": [], "steps": (), "calibration": [],
+              "anchor": ANCHOR}
     own = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
     return template.render({
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),

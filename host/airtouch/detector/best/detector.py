@@ -108,8 +108,8 @@ def flight_events(log: FlightLog, model: BestModel) -> StreamEvents:
 def fit(
     flights: Sequence[FlightLog], seed: int = 0, *, start: BestModel | None = None,
     pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, emphasis: Sequence[float] | None = None,
-    free_air: Sequence[FlightLog] = (),
-    recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
+    free_air: Sequence[FlightLog] = (), recipe: Recipe | None = None, decoder: DecoderConfig | None = None,
+    most_flights: int | None = None,
     progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None,
     lag_of: Labelled | None = None, **changes: Any
 ) -> BestModel:

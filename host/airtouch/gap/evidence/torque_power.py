@@ -20,7 +20,7 @@ TORQUE_DOUBT = 0.25
 
 @dataclass(frozen=True)
 class TorquePower:
-    """The replay view's values (replay,) as far as this power depends on them.
+    """Works out the power that effects of the loop add in the replay view. Its arrays are (replay,).
 
     base: the gap without effects, 0 where unknown; known: whether a value counts; torque: whether it is one of the
     torque; noise: power of the floor, without what lost rows add.
@@ -65,5 +65,5 @@ def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) 
 
 
 def beside_edges(active: Sequence[Active]) -> list[Active]:
-    """The effects that show beside edges: in the replay, or in the loop that is part of it."""
+    """The effects that show elsewhere than at edges alone: in the replay, or in the loop that is part of it."""
     return [a for a in active if not signature_of(a.effect).edges_only]

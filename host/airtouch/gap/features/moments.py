@@ -83,7 +83,7 @@ def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
     samples = in_phase if in_phase.sum() > FEWEST else signals.air
     assert signals.flight.rates is not None
     slow = [x[samples].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
-                                           signals.table[:, RANGE_RESIDUAL])]
+                                              signals.table[:, RANGE_RESIDUAL])]
     fast = (signals.table - _smoothed(signals.table))[samples].var(axis=0)
     return np.concatenate([_means(signals, samples), *slow, np.log(fast + LEAST_VARIANCE)])
 

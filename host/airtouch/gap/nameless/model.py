@@ -52,8 +52,8 @@ def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
 
 def nameless_floor(data: Data) -> NamelessFloor:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
-    halves = [PartResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
-    if len(halves) < 2:
+    flights = [PartResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
+    if len(flights) < 2:
         return no_floor()
-    floor = NamelessFloor(column_floor(halves), no_floor().power)
-    return NamelessFloor(floor.columns, power_floor([h.floor_powers(floor) for h in halves]))
+    floor = NamelessFloor(column_floor(flights), no_floor().power)
+    return NamelessFloor(floor.columns, power_floor([flight.floor_powers(floor) for flight in flights]))

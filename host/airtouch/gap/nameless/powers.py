@@ -22,7 +22,7 @@ NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and scatter (nepers) 
 
 
 class Powers(NamedTuple):
-    """Residuals of a half, value by value (n,).
+    """Residuals of a part of the flights, value by value (n,).
 
     over_expected: power over the expected power; freedom, tail: of the law (`evidence.likelihood.Likelihood`); cell:
     number of the cell.

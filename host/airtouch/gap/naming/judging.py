@@ -26,7 +26,7 @@ LEAST_GAIN = 12.0
 #: 46 flights of a fresh set (2026-11-21)
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
-NEAR_BOUND = 0.999  #: of a parameter's bound, from which it is at it; chosen, for a fit that ends just short of it
+NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound; chosen: fits end just short of one
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
 
 
 def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
-            inference: Inference, progress: Callable[[str], None]) -> Selection:
+                           inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
     candidates: variants by name; alone: every candidate judged alone; progress: is told every name.

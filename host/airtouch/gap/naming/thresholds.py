@@ -13,8 +13,8 @@ from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
-#: of what the effects before it gain, that a further one must gain: in simulated flights of what they gain where it
-#: does, in recorded ones of all, as no model of air is exact; both chosen
+#: a further effect must gain this share of what the effects before it gain: in simulated flights of what they gain
+#: where it does, in recorded ones of all, as no model of air is exact; both chosen
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1
 #: the same of an effect that changes the loop, beside one that changes or shakes it: with this project's firmware twice
 #: what wrong ones gained at most beside right ones in 43 simulated flights; with others as little as the loop model is

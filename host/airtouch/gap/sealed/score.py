@@ -150,7 +150,7 @@ def misses(sheet: Sheet) -> list[dict[str, Any]]:
 
 
 def ideal(key: Key, flights: Sequence[str]) -> Figure:
-    """How many flights a test could tell from nominal ones that is told effect and strength; n: of those known."""
+    """How many flights a test for the true effect at its true strength sees; n: of those whose nats the key has."""
     return share(nats > SEEN for n in flights if (nats := key.flights[n].nats) is not None)
 
 
