@@ -127,8 +127,8 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], befor
     for name, candidate in best.items():
         mine = [t for t in candidate.terms if t.name == name]
         own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
-        stretched = own.shows_in == MEAN and at_bound(own, candidate.strength.mean).any()
-        measured = candidate.strength
-        rarity = scatter.evidence(name, measured.mean, measured.covariance, measured.apart) if scatter else np.inf
+        strength = candidate.strength
+        stretched = own.shows_in == MEAN and at_bound(own, strength.mean).any()
+        rarity = scatter.evidence(name, strength.mean, strength.covariance, strength.apart) if scatter else np.inf
         out[name] = replace(candidate, evidence=min(candidate.gain - before, 0.0 if stretched else rarity))
     return out

@@ -25,9 +25,9 @@ TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too 
 class Strength:
     """Scaled parameters of one term, as both halves of the flights have them.
 
-    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects; apart (k,): half of what the halves
-    differ by. k: of all parameters that the effect may have free; those that its variant leaves alone are 0, and nobody
-    knows how far they lie from it.
+    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects, (0, 0) where nobody asks for it;
+    apart (k,): half of what the halves differ by. k: of all parameters that the effect may have free; those that its
+    variant leaves alone are 0, and nobody knows how far they lie from it.
     """
 
     mean: np.ndarray = field(default_factory=lambda: np.zeros(0))

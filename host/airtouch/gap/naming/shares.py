@@ -10,7 +10,7 @@ from dataclasses import replace
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
-from airtouch.gap.naming.judging import Trial, gain_of, price_of
+from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import CLOCK
@@ -49,8 +49,7 @@ def _gained_while_certain(trial: Trial, steps: Sequence[Candidate], place: int) 
         return steps[-1].gained_while_certain
     later = frozenset().union(*(_own(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
-    return sum(gain_of(trial, test, refits[train].terms) - gain_of(trial, test, refits[train].terms, True)
-               for train, test in ROUND_TRIP)
+    return lost_beside_random(trial, refits)
 
 
 def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:

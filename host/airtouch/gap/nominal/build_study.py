@@ -10,10 +10,10 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
+from airtouch.gap.loop.command_spectra import TINY
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
-from airtouch.gap.signals.quiet_blocks import TINY
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import (
     AIR,

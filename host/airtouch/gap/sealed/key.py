@@ -68,7 +68,7 @@ def key_from(table: Mapping[str, Any]) -> Key:
 
 
 def key_of(folder: Path) -> Path:
-    """Where the key of a set lies when nothing else is said: beside the folder."""
+    """Where the key of a set lies by default: beside the set's folder."""
     return folder.resolve().with_name(folder.resolve().name + ".key.json")
 
 

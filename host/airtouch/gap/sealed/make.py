@@ -145,14 +145,14 @@ def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[l
     """
     singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
     names = list(severities)
-    every = [Draw(n, level) for level in range(3) for n in names]
+    draws = [Draw(n, level) for level in range(3) for n in names]
     if not names:
         raise AirTouchError("no effect is strong enough to be drawn; give other kinds")
     if count > singles + none and not any(_may_pair(a, b) for a, b in combinations(names, 2)):
         raise AirTouchError(f"{', '.join(names)}: no two of them make a pair; give more kinds")
     cases: list[list[Draw]] = []
     while len(cases) < singles:  # every kind at every severity equally often
-        cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
+        cases += [[draws[i]] for i in rng.permutation(len(draws))][:singles - len(cases)]
     for _ in range(count - singles - none):
         while True:
             a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))

@@ -129,9 +129,9 @@ def by_effect(sheet: Sheet) -> dict[str, Any]:
 
 def of_flights_without_effect(sheet: Sheet) -> dict[str, Any]:
     """false_alarms: flights free of effects that are not called `none`; false_unknown: those called `unknown`."""
-    said = [_verdict(sheet.full_registry.get(n)) for n in sheet.without_effect]
-    return {"false_alarms": share(verdict != "none" for verdict in said),
-            "false_unknown": share(verdict == "unknown" for verdict in said)}
+    verdicts = [_verdict(sheet.full_registry.get(n)) for n in sheet.without_effect]
+    return {"false_alarms": share(verdict != "none" for verdict in verdicts),
+            "false_unknown": share(verdict == "unknown" for verdict in verdicts)}
 
 
 def of_pairs(sheet: Sheet) -> dict[str, Any]:
@@ -207,19 +207,19 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
     errors, held = defaultdict(list), defaultdict(list)
     for n, e in sheet.single_effect.items():
         effects = sheet.full_registry[n]["effects"] if sheet.is_first[n] else []
-        found = next((f for f in effects if f["name"] == e.name), None)
-        if found is None:
+        named = next((f for f in effects if f["name"] == e.name), None)
+        if named is None:
             continue
         term = terms(e.name)[0]
-        known = {k: q for k, q in found["parameters"].items() if "low" in q and k in e.values}
+        known = {k: q for k, q in named["parameters"].items() if "low" in q and k in e.values}
         size = np.sqrt(sum(((e.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
         if not known or size == 0.0:
             continue
         off = np.sqrt(sum(((q["value"] - e.values[k]) / term.step(k)) ** 2 for k, q in known.items()))
         errors[e.kind].append(float(off / size))
         held[e.kind] += [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()]
-    every = np.array([x for v in errors.values() for x in v])
-    return {"error": median(every), "coverage": share(x for v in held.values() for x in v),
+    all_errors = np.array([x for v in errors.values() for x in v])
+    return {"error": median(all_errors), "coverage": share(x for v in held.values() for x in v),
             "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share(held[k])}
                           for k, v in sorted(errors.items())}}
 

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from airtouch.gap.loop.command_spectra import TINY
+
 QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
 #: power of the modelled torque over the nominal one, scaled to the flight (`are_quiet`), from which a set-point
 #: stepped; chosen
 STEPPED_TORQUE = 2.0
 CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
 ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
-TINY = 1e-30  #: least power that is divided by, far below any measured
 
 
 def of_nominal_flights(modelled: Sequence[np.ndarray], power: np.ndarray,

@@ -24,11 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from airtouch.gap.loop.command_spectra import TINY
 from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
 from airtouch.gap.signals import quiet_blocks
 from airtouch.gap.signals.channels import TORQUE
-from airtouch.gap.signals.quiet_blocks import TINY
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
