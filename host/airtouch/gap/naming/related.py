@@ -46,7 +46,7 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
     return Selection(
         singles=alone, steps=tuple(steps), nameless=NamelessGain(inference.nameless_alone, inference.against.nats),
         parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
-        nominal=NominalFlights(trial.data.study.nominal, 0.0, simulated=True, same_models=True))
+        nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

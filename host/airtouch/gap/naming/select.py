@@ -104,7 +104,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     selection = Selection(
         singles=state.singles, steps=state.steps, parts=trial.parts, least=state.least,
         nameless=NamelessGain(alone, beside, clock_left(trial.data, last)),
-        nominal=NominalFlights(study.nominal, _nameless_gain_of_nominal_flights(trial.data), study.simulated,
+        nominal=NominalFlights(study.nominal_count, _nameless_gain_of_nominal_flights(trial.data), study.simulated,
                                study.same_models),
         assumed=bool(random_of(last)) if study.simulated else assumes(trial.data, last))
     return replace(selection, contradicted=contradicted(trial, selection.chosen)) if study.simulated else selection
