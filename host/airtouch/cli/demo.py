@@ -44,7 +44,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     get an HTML report with plots.
     """
     need("train", "the demo trains a detector (airtouch gap demo needs nothing more), which")
-    from airtouch.report.write import write_report
+    from airtouch.report.evaluation_report import write_report
 
     started = time.monotonic()
     report = out / "report.html"

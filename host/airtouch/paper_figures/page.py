@@ -3,16 +3,13 @@
 import csv
 import io
 from collections import Counter
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-import jinja2
 
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
 from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNTESTABLE
-from airtouch.report.write import embed
+from airtouch.report.html_page import data_url, rendered
 
 CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNTESTABLE: "open"}
 
@@ -24,9 +21,8 @@ def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
     """
     verdicts = [(entry, claim) for entry in records.values() for claim in entry["claims"].values()]
     count = Counter(claim["verdict"] for _, claim in verdicts)
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string((resources.files("airtouch.paper_figures") / "page.html").read_text("utf-8"))
-    text = template.render(
+    text = rendered(
+        "page.html", folder="airtouch.paper_figures",
         records=[{**entry, "image": _image(out, entry)} for entry in records.values()], classes=CLASSES, count=count,
         verdicts=CLASSES, total=len(CLAIMS), judged=len(verdicts), command=command, version=__version__,
         quick=any(entry.get("quick") for entry in records.values()))
@@ -41,4 +37,4 @@ def cells(table: bytes) -> list[list[str]]:
 
 
 def _image(out: Path, entry: dict[str, Any]) -> str:
-    return "" if "missing" in entry else embed((out / f"{entry['name']}.png").read_bytes())
+    return "" if "missing" in entry else data_url((out / f"{entry['name']}.png").read_bytes())

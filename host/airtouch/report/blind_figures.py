@@ -9,40 +9,41 @@ from matplotlib.figure import Figure
 
 from airtouch.report.style import BLUE, GREY, png, style
 
-Rows = list[tuple[str, str, str, str]]
+Rows = list[tuple[str, str, str, str]]  #: of a table of four columns, as text
 
 
 def rows(score: Mapping[str, Any]) -> Rows:
     """Rows (figure, value with 95 % interval, n, goal) of a blind check's score, for the terminal and the docs."""
     out: Rows = []
 
-    def add(name: str, value: Mapping[str, Any] | None, goal: str = "", key: str = "value") -> None:
-        if value is None or value.get(key) is None:
+    def add(name: str, figure: Mapping[str, Any] | None, goal: str = "") -> None:
+        """Add the row of a figure that the score has: its value, with `low` and `high` where it has an interval."""
+        if figure is None or figure.get("value") is None:
             return
-        text = f"{value[key]:.3f}"
-        if "low" in value:
-            text = f"{value[key]:.1%} ({value['low']:.1%} to {value['high']:.1%})"
-        out.append((name, text, str(value.get("n", "")), goal))
+        text = f"{figure['value']:.3f}"
+        if "low" in figure:
+            text = f"{figure['value']:.1%} ({figure['low']:.1%} to {figure['high']:.1%})"
+        out.append((name, text, str(figure.get("n", "")), goal))
 
     add("top-1, single effects", score["top_1"], "at least 95 %")
     add("top-3, single effects", score["top_3"])
     for level, goal in (("weakest", "at least 80 %"), ("2x", ""), ("4x", "")):
-        of = score["by_severity"].get(level, {})
-        add(f"top-1, {level} severity", of.get("top_1"), goal)
-        add(f"test for the true effect at its true strength, {level} severity", of.get("ideal"))
+        of_level = score["by_severity"].get(level, {})
+        add(f"top-1, {level} severity", of_level.get("top_1"), goal)
+        add(f"test for the true effect at its true strength, {level} severity", of_level.get("ideal"))
     add("exact set, single effects", score["exact"])
     add("false alarms, no effect", score["false_alarms"], "at most 2 %")
     add("pairs: exact set", score["pairs_exact"], "at least 80 %")
     add("pairs: one right", score["pairs_one_right"], "at least 97 %")
-    for group, part in score["unknown"].items():
-        goals = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
-        for what, name in (("auroc", ""), ("auroc_told_apart", ", where the data tell the effects apart")):
-            value = part.get(what)
-            out.append((f"effect left out, {group}: AUROC of unknown{name}", "" if value is None else f"{value:.3f}",
-                        str(part["wrong_name"]["n"]), goals[0]))
-        add(f"effect left out, {group}: given a wrong name", part["wrong_name"])
-        add(f"effect left out, {group}: the same where the data tell the two apart", part.get("wrong_name_told_apart"),
-            goals[1])
+    for group, of_group in score["unknown"].items():
+        goal_of_auroc, goal_of_names = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
+        for key, condition in (("auroc", ""), ("auroc_told_apart", ", where the data tell the effects apart")):
+            auroc = of_group.get(key)
+            out.append((f"effect left out, {group}: AUROC of unknown{condition}",
+                        "" if auroc is None else f"{auroc:.3f}", str(of_group["wrong_name"]["n"]), goal_of_auroc))
+        add(f"effect left out, {group}: given a wrong name", of_group["wrong_name"])
+        add(f"effect left out, {group}: the same where the data tell the two apart",
+            of_group.get("wrong_name_told_apart"), goal_of_names)
     add("shrink with the right effect", score["shrink"]["right"], "at least 90 %")
     add("shrink with a wrong effect", score["shrink"]["wrong"], "at most 20 %")
     add("parameters: median relative error", score["parameters"]["error"], "at most 10 %")

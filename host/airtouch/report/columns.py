@@ -2,7 +2,7 @@
 
 from typing import Any
 
-#: column -> (key of the summary, format); misses and false edges always stand beside the error
+#: column -> (path in the summary, format); misses and false edges always stand beside the error
 COLUMNS = {
     "missed": ("missed", "{:.0%}"),
     "false/min": ("false_per_minute", "{:.1f}"),
@@ -17,12 +17,15 @@ COLUMNS = {
 
 
 def cell(table: dict[str, Any], key: str, form: str) -> str:
-    """A figure of a summary with its interval on a second line; "-" for None. key: path in the summary, with "/"."""
+    """A figure of a summary with its interval on a second line; "-" for None.
+
+    table: the summary, with `intervals`; key: path in it, with "/" between keys; form: format of the number.
+    """
     value, interval = _value_at(table, key), _value_at(table["intervals"], key)
     if value is None:
         return "-"
-    return form.format(value) if interval is None else "{}\n{}".format(
-        form.format(value), " - ".join(form.format(bound) for bound in interval))
+    text = form.format(value)
+    return text if interval is None else f"{text}\n{' - '.join(form.format(bound) for bound in interval)}"
 
 
 def _value_at(source: Any, path: str) -> Any:

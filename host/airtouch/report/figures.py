@@ -1,6 +1,7 @@
 """Plots of flights and scores, each as the bytes of a PNG."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +17,23 @@ from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
 
 #: detector -> its colour in every plot
 COLOURS = {"best": BLUE, "paper": RED, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
-KINDS = {"entry": "v", "exit": "^", "edge": "o"}
+MARKERS = {"entry": "v", "exit": "^", "edge": "o"}  #: of each kind of edge
+LEAST_BAND_POWER = 1e-30  #: least band power that is drawn, in a channel's unit squared; far below any measured
+LEAST_FORCE_POWER = 1e-12  #: N^2, least power of the disturbance force that is drawn
+LOWEST_FORCE_LIMIT = 1e-10  #: N^2, lowest end of that axis; chosen
+
+
+class PlottedFlight(NamedTuple):
+    """One flight as all panes of a plot show it.
+
+    time_s (n,): of its samples; trace: of the detector whose signals are shown; rows: traces by detector, that one
+    first, whose edges are shown.
+    """
+
+    time_s: np.ndarray
+    log: FlightLog
+    trace: Trace
+    rows: Mapping[str, Trace]
 
 
 def colour_of(name: str) -> str:
@@ -30,11 +47,12 @@ def flight(
 ) -> bytes:
     """PNG of one flight, from signals to edges, in panes over the same time axis.
 
-    The panes: signals, band power, probability with detected and true edges, disturbance force
-    with its FR-CFAR threshold, down range. Panes without a signal in the trace are left out.
-    others: traces of other detectors, whose edges are shown below those of `trace`. name: label of `trace`.
+    The panes: signals, band power, probability, detected edges, disturbance force with its FR-CFAR threshold, down
+    range. Panes without a signal in the trace are left out. edges: true ones, marked in every pane. others: traces of
+    other detectors, whose edges are shown below those of `trace`. name: label of `trace`.
     """
-    panes: list[Callable[..., None]] = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
+    panes: list[Callable[[Axes, PlottedFlight], None]] = []
+    panes += [_accelerations, _rates, _motors] if "channels" in trace.signals else []
     panes += [_band_power] if "band_power" in trace.signals else []
     panes += [_probability, _edges]
     panes += [_force, _cfar] if "force" in trace.signals else []
@@ -42,9 +60,9 @@ def flight(
     with style():
         figure = Figure(figsize=(7.2, 1.15 * len(panes) + 0.9), layout="constrained")
         axes = figure.subplots(len(panes), 1, sharex=True, squeeze=False)[:, 0]
-        t = np.arange(len(log)) * SAMPLE_PERIOD_S
+        plotted = PlottedFlight(np.arange(len(log)) * SAMPLE_PERIOD_S, log, trace, {name: trace, **others})
         for ax, pane in zip(axes, panes, strict=True):
-            pane(ax, t, log, trace, {name: trace, **others})
+            pane(ax, plotted)
             for edge in edges or ():
                 ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=GREEN, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
@@ -85,77 +103,85 @@ def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
         return png(figure)
 
 
-def _accelerations(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    channels = trace.signals["channels"][:, :3] - [0, 0, 9.81]
-    ax.plot(t, channels, lw=0.6, label=["x", "y", "z - g"])
+def _accelerations(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the accelerations, without gravity."""
+    channels = plotted.trace.signals["channels"][:, :3] - [0, 0, 9.81]
+    ax.plot(plotted.time_s, channels, lw=0.6, label=["x", "y", "z - g"])
     _finish(ax, "acceleration\nm/s²", channels)
 
 
-def _rates(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    rates = np.rad2deg(trace.signals["channels"][:, 3:6])
-    ax.plot(t, rates, lw=0.6, label=["x", "y", "z"])
+def _rates(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the rates of the gyro."""
+    rates = np.rad2deg(plotted.trace.signals["channels"][:, 3:6])
+    ax.plot(plotted.time_s, rates, lw=0.6, label=["x", "y", "z"])
     _finish(ax, "rates\ndeg/s", rates)
 
 
-def _motors(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    motors = trace.signals["channels"][:, 6:] / 1000
-    ax.plot(t, motors, lw=0.6, label=["m2-m1", "m3-m1", "m4-m1"])
+def _motors(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the differences of the motors' commands to that of motor 1."""
+    motors = plotted.trace.signals["channels"][:, 6:] / 1000
+    ax.plot(plotted.time_s, motors, lw=0.6, label=["m2-m1", "m3-m1", "m4-m1"])
     _finish(ax, "motors\n10³ PWM", motors)
 
 
-def _band_power(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    level = 10 * np.log10(np.maximum(trace.signals["band_power"].astype(float), 1e-30))
+def _band_power(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the band power of every channel, in dB over its median."""
+    level = 10 * np.log10(np.maximum(plotted.trace.signals["band_power"].astype(float), LEAST_BAND_POWER))
     level -= np.nanmedian(level, axis=0)
     ax.imshow(level.T, aspect="auto", cmap="magma", vmin=-5, vmax=20, interpolation="nearest",
-              extent=(t[0], t[-1], len(NAMES) - 0.5, -0.5))
+              extent=(plotted.time_s[0], plotted.time_s[-1], len(NAMES) - 0.5, -0.5))
     ax.set_yticks(range(len(NAMES)), NAMES, fontsize=6)
     ax.set_ylabel("band power\ndB on median", fontsize=8)
 
 
-def _probability(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[str, Trace]) -> None:
-    ax.plot(t, trace.probability, color=colour_of(next(iter(rows))), lw=0.9)
+def _probability(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the probability of being over a platform."""
+    ax.plot(plotted.time_s, plotted.trace.probability, color=colour_of(next(iter(plotted.rows))), lw=0.9)
     ax.set_ylim(-0.05, 1.05)
     ax.set_ylabel("P(over)", fontsize=8)
 
 
-def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[str, Trace]) -> None:
-    for row, (name, some) in enumerate(rows.items()):
-        for kind, marker in KINDS.items():
-            samples = [e.sample for e in some.edges if e.kind == kind]
+def _edges(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the edges that each detector has detected, a row for each."""
+    for row, (name, trace) in enumerate(plotted.rows.items()):
+        for kind, marker in MARKERS.items():
+            samples = [e.sample for e in trace.edges if e.kind == kind]
             ax.plot(np.array(samples) * SAMPLE_PERIOD_S, np.full(len(samples), row), marker, ms=6,
                     color=colour_of(name), ls="none")
-    ax.set_yticks(range(len(rows)), rows, fontsize=7)
-    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.set_yticks(range(len(plotted.rows)), plotted.rows, fontsize=7)
+    ax.set_ylim(len(plotted.rows) - 0.5, -0.5)
     ax.set_ylabel("edges\n▼ in, ▲ out", fontsize=8)
 
 
-def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    force = trace.signals["force"][:, 2] * 1000
-    ax.plot(t, force, lw=0.6)
-    flying = airborne(log)  # on the ground the force is the weight
+def _force(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the vertical disturbance force; its limits are those in the air, as on the ground it is the weight."""
+    force = plotted.trace.signals["force"][:, 2] * 1000
+    ax.plot(plotted.time_s, force, lw=0.6)
+    flying = airborne(plotted.log)
     _finish(ax, "force f_w,z\nmN", force[flying] if flying.any() else force, legend=False)
 
 
-def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    """FR-CFAR's cells under test, its threshold and its alerts."""
-    power = np.maximum(trace.signals["cfar_power"].astype(float), 1e-12)
-    ax.semilogy(t, power, lw=0.6, label="tested")
-    threshold = np.maximum(trace.signals["threshold"].astype(float), 1e-12)
-    ax.semilogy(t, threshold, lw=0.9, color=RED, label="threshold T")
-    alert = trace.signals["alert"].astype(bool)
-    ax.plot(t[alert], power[alert], ".", ms=5, color="black", label="alert")
-    ax.set_ylim(max(float(np.nanpercentile(power, 5)), 1e-10), None)
+def _cfar(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw FR-CFAR's cells under test, its threshold and its alerts."""
+    power = np.maximum(plotted.trace.signals["cfar_power"].astype(float), LEAST_FORCE_POWER)
+    ax.semilogy(plotted.time_s, power, lw=0.6, label="tested")
+    threshold = np.maximum(plotted.trace.signals["threshold"].astype(float), LEAST_FORCE_POWER)
+    ax.semilogy(plotted.time_s, threshold, lw=0.9, color=RED, label="threshold T")
+    alert = plotted.trace.signals["alert"].astype(bool)
+    ax.plot(plotted.time_s[alert], power[alert], ".", ms=5, color="black", label="alert")
+    ax.set_ylim(max(float(np.nanpercentile(power, 5)), LOWEST_FORCE_LIMIT), None)
     ax.legend(loc="upper right", ncols=3, fontsize=6, frameon=False)
     ax.set_ylabel("FR-CFAR\nN²", fontsize=8)
 
 
-def _range(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    ax.plot(t, log["zrange_m"], color=GREEN, lw=0.9)
+def _range(ax: Axes, plotted: PlottedFlight) -> None:
+    """Draw the measured range to the ground."""
+    ax.plot(plotted.time_s, plotted.log["zrange_m"], color=GREEN, lw=0.9)
     ax.set_ylabel("down range\nm (truth)", fontsize=8)
 
 
 def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
-    """Set the label and the limits."""
+    """Set the label, and the limits by the values; with a legend unless it says not."""
     limit(ax, values)
     ax.set_ylabel(label, fontsize=8)
     if legend:

@@ -12,13 +12,15 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
 from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
 
-BEFORE, AFTER, FLOOR = RED, GREEN, GREY
-#: changes of the style of plots that are read on a phone
+BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with the named effects, and of its floor
+#: changes of `style.STYLE` for plots that are read on a phone
 PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
-PHONE_DPI = 170  #: dots per inch, sharp there
-SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: of the axis of a signal: `style.limit`
-WIDTH_IN = 4.4  #: inch, width of a plot; readable on a phone
+PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
+SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
+LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
+WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
 BELOW_IN, RIGHT_IN = 0.5, 0.15  #: inch, room below the lowest pane and to the right of all
+#: colour behind the curves of each phase that is shaded
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
@@ -53,13 +55,14 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     rows = len(shown)
     with style(PHONE):
         figure, axes = _panes(rows, 1.35, legend_in=0.25)
-        for ax, some in zip(axes, shown, strict=True):
-            for key, colour, width in (("floor", FLOOR, 1.6), ("before", BEFORE, 1.3), ("after", AFTER, 1.3)):
-                if getattr(some, key) is not None:
-                    ax.loglog(frequency_hz[1:], np.maximum(getattr(some, key)[1:], 1e-12), color=colour, lw=width,
-                              label=key)
-            ax.set_title(CHANNEL_WORDS[some.channel], loc="left")
-            ax.set_ylabel(f"({some.unit})²/Hz")
+        for ax, spectrum in zip(axes, shown, strict=True):
+            for label, power, colour, width in (("floor", spectrum.floor, FLOOR, 1.6),
+                                                ("before", spectrum.before, BEFORE, 1.3),
+                                                ("after", spectrum.after, AFTER, 1.3)):
+                if power is not None:
+                    ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), color=colour, lw=width, label=label)
+            ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left")
+            ax.set_ylabel(f"({spectrum.unit})²/Hz")
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
@@ -85,9 +88,9 @@ def commands(curves: MeanSpectra) -> bytes:
 
 def _panes(rows: int, pane_in: float, *, left_in: float = 0.75, above_in: float = 0.3, legend_in: float = 0.0,
            ) -> tuple[Figure, np.ndarray]:
-    """A figure with panes (rows,) one below another, of a fixed layout: one that matplotlib finds is drawn twice.
+    """A figure of a fixed layout, and its panes (rows,) one below another: to find a layout, matplotlib draws twice.
 
-    pane_in: inch, height of each; left_in, above_in: room beside and above each; legend_in: above all.
+    pane_in: height of each pane, inch; left_in, above_in: room beside and above each; legend_in: above all.
     """
     height_in = BELOW_IN + rows * (pane_in + above_in) + legend_in
     figure = Figure(figsize=(WIDTH_IN, height_in))
@@ -103,6 +106,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
 
 
 def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
+    """Set plain ticks, Hz, on the frequency axis that the panes share."""
     for ax in axes:
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_formatter(NullFormatter())

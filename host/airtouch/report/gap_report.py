@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
-
-import jinja2
+from typing import Any, NamedTuple
 
 from airtouch import __version__
 from airtouch.extras import lacking
@@ -16,13 +14,15 @@ from airtouch.gap.answer.pictures import Pictures
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.second_process import map_on_two_cores
+from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables
-from airtouch.report.write import embed
+from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
+MOST_NAMED = 5  #: flights that the page names; chosen
 
 
 def write_measurement(path: Path, measurement: Measurement, pictures: Pictures | None = None, *, command: str,
@@ -60,7 +60,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None,
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
-        remaining=words.remaining_in_words(left[:gap_tables.MOST_LEFT]), remaining_count=len(left),
+        remaining=words.remaining_in_words(left[:gap_tables.MOST_REMAINING]), remaining_count=len(left),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),
@@ -71,18 +71,16 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
 
 def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], pictures: Pictures | None,
           **context: Any) -> str:
-    """The HTML of a page: what diagnosis and measurement share, and `context`; what it lacks is left out."""
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string((resources.files("airtouch.report") / "gap.html").read_text("utf-8"))
+    """The HTML of a page: what diagnosis and measurement share, and `context`, whose parts a page may lack."""
     absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],
               "remaining": [], "remaining_count": 0, "unexplained": [], "nearest": [], "steps": (), "calibration": [],
               "anchor": ANCHOR}
-    own = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
-    return template.render({
+    shows_how_to_add = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
+    return rendered("gap.html", **{
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
         "legend": gap_tables.LEGEND, "has_headline": headline is not None,
         "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
-        "example": example_effect() if own else "",
+        "example": example_effect() if shows_how_to_add else "",
         "has_after": any(c.after is not None for c in cells), "version": __version__})
 
 
@@ -96,38 +94,55 @@ def _notes(notes: Sequence[str], pictures: Pictures | None) -> list[str]:
     return [*notes, *([NO_PICTURES] if pictures is not None and lacking("plots") else [])]
 
 
+class Plot(NamedTuple):
+    """A plot of the page: its title, the text below it, and what draws it as a PNG."""
+
+    title: str
+    text: str
+    draw: Callable[[], bytes]
+
+
 def _images(pictures: Pictures | None) -> list[dict[str, str]]:
-    """Plots of the headline's signal, of the gap's spectra and of the commands' spectra, as data URLs with text."""
+    """The plots as data URLs, each with title and text; none where they are not asked for or cannot be drawn."""
     if pictures is None or lacking("plots"):
         return []
+    plots = _plots(pictures)
+    drawn = map_on_two_cores(lambda plot: plot.draw(), plots)
+    return [{"title": plot.title, "data": data_url(png), "text": plot.text}
+            for plot, png in zip(plots, drawn, strict=True)]
+
+
+def _plots(pictures: Pictures) -> list[Plot]:
+    """Plots of the headline's signal, of the gap's spectra and of the commands' spectra, as far as there are any."""
     from airtouch.report import gap_figures
 
-    drawn: list[tuple[str, str, Callable[[], bytes]]] = []
+    plots = []
     if pictures.signal is not None:
-        one = pictures.signal
-        name = gap_tables.capital(gap_tables.CHANNEL_WORDS[one.channel])
-        drawn.append((f"{name}, up to {one.band_hz[1]:g} Hz",
-                      f"Flight {Path(one.flight).name}. Grey: the floor; blue: take-off and landing; "
-                      "yellow: over a platform.", partial(gap_figures.signals, one)))
+        signal = pictures.signal
+        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.band_hz[1]:g} Hz",
+                          f"Flight {Path(signal.flight).name}. Grey: the floor; blue: take-off and landing; yellow: "
+                          "over a platform.", partial(gap_figures.signals, signal)))
     if pictures.spectra:
-        drawn.append(("Spectra of the gap in the air", "Mean over all blocks." + (
-            " A random effect cannot be predicted sample by sample: its green curve is what is "
-            "left of the power." if any(s.after is not None for s in pictures.spectra) else ""),
-            partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
+        text = "Mean over all blocks."
+        if any(s.after is not None for s in pictures.spectra):
+            text += (" A random effect cannot be predicted sample by sample: its green curve is what is left of the "
+                     "power.")
+        plots.append(Plot("Spectra of the gap in the air", text,
+                          partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:
-        drawn.append(("Spectra of the motor commands",
-                      "Delays, gains and noise in the loop show here, as a shape that differs.",
-                      partial(gap_figures.commands, pictures.commands)))
-    files = map_on_two_cores(lambda one: one[2](), drawn)
-    return [{"title": title, "data": embed(file), "text": text}
-            for (title, text, _), file in zip(drawn, files, strict=True)]
+        plots.append(Plot("Spectra of the motor commands",
+                          "Delays, gains and noise in the loop show here, as a shape that differs.",
+                          partial(gap_figures.commands, pictures.commands)))
+    return plots
 
 
 def _flights(names: Sequence[str], vehicle: str, baseline: Sequence[str]) -> str:
+    """Which flights of which vehicle the page is about, and what they are compared with."""
     return (f"Flights: {_few(names)}. Vehicle: {vehicle}. "
             + (f"Baseline: {_few(baseline)}." if baseline else "No baseline flights were given."))
 
 
 def _few(names: Sequence[str]) -> str:
-    shown = ", ".join(Path(n).name for n in names[:5])
-    return shown + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    """The file names of the first MOST_NAMED flights, and how many more there are."""
+    shown, more = ", ".join(Path(n).name for n in names[:MOST_NAMED]), len(names) - MOST_NAMED
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,7 +1,7 @@
 """Rows of the gap report's tables, ready for the page."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from airtouch.gap.answer.words import digits, leading, quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
@@ -9,13 +9,23 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, ratio, short
 
-#: (least ratio of gap to floor, background colour, text colour)
-SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),
-          (2.5, "#f2a27f", "#1f2328"), (1.5, "#f9cdb5", "#1f2328"), (0.0, "#fde9df", "#1f2328"))
-QUIET = ("#f3f4f6", "#8a8f98")
-LEGEND = [(*QUIET, "floor"), *((colour, ink, f"> {least:g}×" if least else "< 1.5×")
-                               for least, colour, ink in reversed(SHADES))]
-MOST_LEFT = 10  #: remaining cells that the page names in words
+
+class Shade(NamedTuple):
+    """Colours of a cell from a least ratio of gap to floor on."""
+
+    least: float
+    background: str
+    ink: str
+
+
+#: shades of cells that stand out of their floor, the largest ratio first; chosen
+SHADES = (Shade(20.0, "#7f1d1d", "#ffffff"), Shade(10.0, "#b3261e", "#ffffff"), Shade(5.0, "#dd6b4d", "#ffffff"),
+          Shade(2.5, "#f2a27f", "#1f2328"), Shade(1.5, "#f9cdb5", "#1f2328"), Shade(0.0, "#fde9df", "#1f2328"))
+AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
+#: (background colour, text colour, text) of each shade
+LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
+          *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
+MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
 
 
 def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
@@ -24,36 +34,41 @@ def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
 
 
 def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
-    """One table for each phase, that with the most energy first. Rows are channels, columns are bands.
+    """The heat map of each phase, that with the most energy first: its name, rows and text, and whether it is open.
 
-    The headline's phase is open, and the first where any cell stands out; the others are folded.
+    Rows are channels, columns are bands. The headline's phase is open, and the first where any cell stands out; the
+    others are folded.
     """
-    place = {(c.phase, c.channel, c.band_hz): c for c in cells if c.regime == "all"}
-    marked = (headline.phase, headline.channel, headline.band_hz) if headline else None
-    out = []
-    for n, phase in enumerate(summary.phases(cells)):
-        rows = []
-        for channel in CHANNELS:
-            some = [place.get((phase.name, channel.name, band)) for band in bands(cells)]
-            if any(some):
-                rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [_map_cell(c, marked) for c in some]})
-        shown = (n == 0 and phase.over > 0) or (headline is not None and phase.name == headline.phase)
-        worse = f", {phase.worse} worse than before" if phase.worse else ""
-        out.append({"name": capital(PHASE_WORDS[phase.name]), "rows": rows, "open": shown,
-                    "text": f"{phase.over} of {phase.cells} cells over the floor"
-                            + ("" if phase.after is None else f", {phase.stay} with the effects in the model{worse}")})
-    return out
+    return [{"name": capital(PHASE_WORDS[phase.name]), "rows": _map_rows(cells, phase.name, headline),
+             "open": (place == 0 and phase.over > 0) or (headline is not None and phase.name == headline.phase),
+             "text": _phase_text(phase)} for place, phase in enumerate(summary.phases(cells))]
 
 
-def _map_cell(cell: Cell | None, marked: tuple[str, str, tuple[float, float]] | None) -> dict[str, Any] | None:
-    """A cell of the heat map with whether it is the headline's, at `marked`; None for no cell."""
-    if cell is None:
-        return None
-    return {**heat_map_cell(cell), "headline": (cell.phase, cell.channel, cell.band_hz) == marked}
+def _map_rows(cells: Sequence[Cell], phase: str, headline: Cell | None) -> list[dict[str, Any]]:
+    """Rows of the heat map of a phase: the channel's name, and a cell for each band, None where there is none."""
+    place = {(c.channel, c.band_hz): c for c in cells if c.regime == "all" and c.phase == phase}
+    of_headline = (headline.channel, headline.band_hz) if headline and headline.phase == phase else None
+    rows = []
+    for channel in CHANNELS:
+        keys = [(channel.name, band) for band in bands(cells)]
+        if any(key in place for key in keys):
+            rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
+                {**heat_map_cell(place[key]), "headline": key == of_headline} if key in place else None
+                for key in keys]})
+    return rows
+
+
+def _phase_text(phase: summary.Phase) -> str:
+    """How many cells of a phase stand out, without and with the named effects, in words."""
+    text = f"{phase.over} of {phase.cells} cells over the floor"
+    if phase.after is None:
+        return text
+    worse = f", {phase.worse} worse than before" if phase.worse else ""
+    return f"{text}, {phase.stay} with the effects in the model{worse}"
 
 
 def phase_rows(phases: Sequence[summary.Phase]) -> list[dict[str, Any]]:
-    """Rows of the gap before and after the named effects, one for each phase."""
+    """A row for each phase: the gap before and after the named effects over the floor, and counts of cells."""
     return [{"name": capital(PHASE_WORDS[p.name]), "before": short(p.before),
              "after": "-" if p.after is None else short(p.after), "over": p.over, "stay": p.stay, "worse": p.worse}
             for p in phases]
@@ -66,44 +81,49 @@ def capital(text: str) -> str:
 
 def heat_map_cell(cell: Cell) -> dict[str, str]:
     """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
-    times = ratio(cell)
-    sure = summary.significant(cell)
-    colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
-    title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, "
-             f"floor {short(cell.floor)} {cell.unit}, "
+    times, significant = ratio(cell), summary.significant(cell)
+    shade = next(s for s in SHADES if times >= s.least) if significant else AT_FLOOR
+    title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, floor {short(cell.floor)} {cell.unit}, "
              f"{cell.blocks} blocks of {cell.flights} flights")
-    after = "" if cell.after is None or not sure else f"{short(cell.after / max(cell.floor, 1e-12))}×"
-    return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": colour, "ink": ink,
-            "title": title, "after": after}
+    after = "" if cell.after is None or not significant else f"{short(summary.ratio_after(cell))}×"
+    return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": shade.background,
+            "ink": shade.ink, "title": title, "after": after}
 
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
-    """Rows of the largest cells."""
-    return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": f"{short(c.gap)}",
-             "interval": interval(c),
-             "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
-             "unit": c.unit + (f"; caused by {c.by}" if c.by else ""),
-             "ratio": short(ratio(c))} for c in cells]
+    """Rows of the largest cells, in their units, with the effect that takes most from each beside its unit."""
+    return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": short(c.gap),
+             "interval": interval(c), "after": "-" if c.after is None else short(c.after), "floor": short(c.floor),
+             "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(ratio(c))} for c in cells]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Rows of the parameters of the named effects."""
-    return [{"effect": e.name if i == 0 else "", "parameter": k, "value": (form := digits(q)).format(q.value),
-             "interval": "" if q.low is None or q.high is None else f"{form.format(q.low)} to {form.format(q.high)}",
-             "unit": "" if q.unit == "1" else q.unit,
-             "seconds": "acts " + seconds if i == 0 and (seconds := seconds_in_words(e))
-             else ""}
-            for e in diagnosis.effects for i, (k, q) in enumerate(e.parameters.items())]
+    """A row for each parameter of the named effects; the first of an effect has its name and its seconds."""
+    rows = []
+    for effect in diagnosis.effects:
+        name, seconds = effect.name, seconds_in_words(effect)
+        for parameter, q in effect.parameters.items():
+            form = digits(q)
+            rows.append({"effect": name, "parameter": parameter, "value": form.format(q.value),
+                         "interval": _interval(q, form), "unit": "" if q.unit == "1" else q.unit,
+                         "seconds": f"acts {seconds}" if seconds else ""})
+            name = seconds = ""
+    return rows
+
+
+def _interval(q: Quantity, form: str) -> str:
+    """The interval of a quantity, "" where there is none. form: format of a number, as `{:.2f}`."""
+    return "" if q.low is None or q.high is None else f"{form.format(q.low)} to {form.format(q.high)}"
 
 
 def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Rows of the leading candidates, and of `none` and `unknown` at any rank."""
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
-             "shrink": f"{r.shrink.value:.2f}", "why": r.why,
-             "interval": "" if r.shrink.low is None or r.shrink.high is None
-             else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in leading(diagnosis.ranking)]
+             "shrink": f"{r.shrink.value:.2f}", "why": r.why, "interval": _interval(r.shrink, "{:.2f}")}
+            for r in leading(diagnosis.ranking)]
 
 
+HOW_FAR_COLUMNS = ("before", "after", "floor", "shrink")  #: of the table of how far the gap closes
 #: why the arm with the vehicle as declared has another gap before
 OTHER_START = ("without the calibration on the baseline flights, so model, floor and the gap before are others than "
                "above")
@@ -114,21 +134,22 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
     `why` of a row says why its gap before differs from the first row's, or is empty. None without figures.
     """
-    keys = ("before", "after", "floor", "shrink")
-    sources: list[tuple[str, Mapping[str, Any]]] = []
     named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
+    figures: list[tuple[str, Mapping[str, Any]]] = []
     if diagnosis.gap:
-        sources.append((named, {**diagnosis.gap, "shrink": diagnosis.shrink}))
+        figures.append((named, {**diagnosis.gap, "shrink": diagnosis.shrink}))
     if diagnosis.control is not None:
-        sources.append((f"wrong effect: {diagnosis.control.name}", diagnosis.control.plain()))
-    sources += [(f"{named}, vehicle as {name}", arm.plain()) for name, arm in diagnosis.arms.items()
+        figures.append((f"wrong effect: {diagnosis.control.name}", diagnosis.control.plain()))
+    figures += [(f"{named}, vehicle as {name}", arm.plain()) for name, arm in diagnosis.arms.items()
                 if arm.share != diagnosis.shrink]
-    starts = [figure(some.get("before")) for _, some in sources]
-    rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys],
-             "why": OTHER_START if start not in ("-", starts[0]) else ""}
-            for (name, some), start in zip(sources, starts, strict=True)]
-    rows = [r for r in rows if any(v != "-" for v in r["cells"])]
-    return {"columns": keys, "rows": rows} if rows else None
+    rows = []
+    for name, by_column in figures:
+        cells = [figure(by_column.get(column)) for column in HOW_FAR_COLUMNS]
+        before = cells[0]
+        first = rows[0]["cells"][0] if rows else before
+        rows.append({"name": name, "cells": cells, "why": OTHER_START if before not in ("-", first) else ""})
+    rows = [row for row in rows if set(row["cells"]) != {"-"}]
+    return {"columns": HOW_FAR_COLUMNS, "rows": rows} if rows else None
 
 
 def figure(value: Any) -> str:

@@ -1,6 +1,7 @@
 """Plots of a twin beside the recorded flights, each as the bytes of a PNG."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airtouch.parameters import SAMPLE_RATE_HZ
@@ -10,7 +11,8 @@ from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, UNITS
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES
 
-REAL, TWIN = GREEN, BLUE
+#: (label, colour) of each of a pair
+SOURCES = (("recorded", GREEN), ("simulated", BLUE))
 
 
 def overlaid(pair: tuple[Signals, Signals]) -> bytes:
@@ -19,8 +21,8 @@ def overlaid(pair: tuple[Signals, Signals]) -> bytes:
         figure = Figure(figsize=(7.2, 10.5), layout="constrained")
         axes = figure.subplots(6, 2, sharex=True)
         for k, axis in enumerate(axes.T.ravel()):
-            for one, colour, label in zip(pair, (REAL, TWIN), ("recorded", "simulated"), strict=True):
-                axis.plot(one.time_s, one.channels[:, k], color=colour, lw=0.7, label=label)
+            for flight, (label, colour) in zip(pair, SOURCES, strict=True):
+                axis.plot(flight.time_s, flight.channels[:, k], color=colour, lw=0.7, label=label)
             axis.set_title(f"{NAMES[k]}, {UNITS[k]}", loc="left")
             axis.axvline(0.0, color=GREY, lw=0.6)
         axes[0, 0].legend(frameon=False)
@@ -30,21 +32,18 @@ def overlaid(pair: tuple[Signals, Signals]) -> bytes:
 
 
 def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
-    """PNG of the twelve channels around the edges of one height class, entry beside exit.
+    """PNG of the twelve channels around the edges of one height class, entry beside exit, as quartiles over flights.
 
-    Lines are medians over flights, bands reach from the first to the third quartile.
+    kinds: by kind of edge the recorded and the simulated flights.
     """
     time = (np.arange(BEFORE + AFTER) - BEFORE) / SAMPLE_RATE_HZ
     with style():
         figure = Figure(figsize=(7.2, 15.0), layout="constrained")
-        axes = figure.subplots(12, 2, sharex=True, sharey="row")
+        axes = figure.subplots(len(NAMES), 2, sharex=True, sharey="row")
         for column, (kind, pair) in enumerate(kinds.items()):
-            for one, colour, label in zip(pair, (REAL, TWIN), ("recorded", "simulated"), strict=True):
-                low, middle, high = one.quartiles
-                for k in range(12):
-                    axis = axes[k, column]
-                    axis.plot(time, middle[:, k], color=colour, lw=1.0, label=f"{label}, {one.flights} flights")
-                    axis.fill_between(time, low[:, k], high[:, k], color=colour, alpha=0.15, lw=0)
+            for around, (label, colour) in zip(pair, SOURCES, strict=True):
+                for k, axis in enumerate(axes[:, column]):
+                    _quartiles(axis, time, around.quartiles[:, :, k], colour, f"{label}, {around.flights} flights")
                     axis.axvline(0.0, color=GREY, lw=0.6)
                     axis.set_title(f"{kind}: {NAMES[k]}, {UNITS[k]}", loc="left")
         axes[0, 0].legend(frameon=False)
@@ -54,19 +53,17 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
 
 
 def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
-    """PNG of band powers in free air of eleven channels, median and quartiles over flights.
+    """PNG of band powers in free air of eleven channels, as quartiles over flights.
 
-    pair: recorded and simulated, each (3, 11, bands), dB.
+    pair: quartiles of the recorded and of the simulated flights, (3, 11, bands) each, dB.
     """
     place = np.arange(len(BANDS_HZ))
     with style():
         figure = Figure(figsize=(7.2, 9.0), layout="constrained")
         axes = figure.subplots(4, 3, sharex=True).ravel()
         for k in range(ch.DOWN):
-            for one, colour, label in zip(pair, (REAL, TWIN), ("recorded", "simulated"), strict=True):
-                low, middle, high = one[:, k]
-                axes[k].plot(place, middle, color=colour, lw=1.0, label=label)
-                axes[k].fill_between(place, low, high, color=colour, alpha=0.15, lw=0)
+            for quartiles, (label, colour) in zip(pair, SOURCES, strict=True):
+                _quartiles(axes[k], place, quartiles[:, k], colour, label)
             axes[k].set_title(f"{NAMES[k]}, dB", loc="left")
         axes[0].legend(frameon=False)
         axes[-1].set_axis_off()
@@ -74,6 +71,13 @@ def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
             axis.set_xticks(place, [f"{a:g}-{b:g}" for a, b in BANDS_HZ], rotation=90)
             axis.set_xlabel("Hz")
         return png(figure)
+
+
+def _quartiles(axis: Axes, x: np.ndarray, quartiles: np.ndarray, colour: str, label: str) -> None:
+    """Draw the median as a line in a band from the first to the third quartile. quartiles (3, n): at places x (n,)."""
+    low, median, high = quartiles
+    axis.plot(x, median, color=colour, lw=1.0, label=label)
+    axis.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
 
 
 def class_in_words(name: str) -> str:

@@ -1,16 +1,14 @@
 """The page of `airtouch twin`: recorded and simulated flights side by side."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
-import jinja2
 import numpy as np
 
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
 from airtouch.report import twin_figures
-from airtouch.report.write import embed
+from airtouch.report.html_page import data_url, rendered
 from airtouch.twin.comparison.compare import Comparison
 from airtouch.twin.comparison.curves import Curves
 from airtouch.twin.comparison.words import answer, gap_row
@@ -31,15 +29,13 @@ def write_report(path: Path, recorded: RecordedFlights, comparison: Comparison, 
               ("Spectra in free air", "", twin_figures.spectra(curves.spectra)),
               *(("Around the edges, medians and quartiles", twin_figures.class_in_words(name),
                  twin_figures.edges(kinds)) for name, kinds in curves.edges.items())]
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string((resources.files("airtouch.report") / "twin.html").read_text("utf-8"))
-    page = template.render(
-        answer=answer(comparison.auroc), auroc=comparison.auroc,
+    page = rendered(
+        "twin.html", answer=answer(comparison.auroc), auroc=comparison.auroc,
         misfit=[(g, misfit_before.get(g), v) for g, v in comparison.misfit.items()],
         gaps=[gap_row(g) for g in comparison.gaps[:MOST_GAPS]],
         levers=[(lever.name, f"{value:.4g}", f"{lever.start:.4g}", lever.unit)
                 for lever, value in zip(levers, values, strict=True)],
-        images=[(title, text, embed(data)) for title, text, data in images],
+        images=[(title, text, data_url(data)) for title, text, data in images],
         flights=len(recorded.courses), simulated=len(comparison.flights), lost=comparison.diverged,
         left_out=recorded.left_out,
         speeds=sorted({c.speed_from for c in recorded.courses}), command=command, version=__version__)

@@ -1,12 +1,8 @@
-"""The HTML report on scored flights."""
+"""The report on scored flights: a self-contained HTML page with tables, plots and a few flights."""
 
-import base64
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-import jinja2
 
 from airtouch import __version__
 from airtouch.detector.evaluation.score import FlightScore
@@ -14,6 +10,7 @@ from airtouch.detector.evaluation.score_report import ScoreReport
 from airtouch.logs.files import write_bytes
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.report.columns import COLUMNS, cell
+from airtouch.report.html_page import data_url, rendered
 
 
 def write_report(
@@ -26,7 +23,7 @@ def write_report(
     left_out: Sequence[tuple[str, str]] = (),
     force: bool = False,
 ) -> None:
-    """Write score table, plots and a few flights as a self-contained HTML file.
+    """Write score table, plots and a few flights to a file.
 
     parameters, command: printed at the end of the page. left_out: (file, reason) of flights that were not scored.
     Raises AirTouchError for a file that exists, without `force`.
@@ -34,24 +31,17 @@ def write_report(
     from airtouch.report import figures
 
     first = next(iter(scored.summaries))
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
-    template = environment.from_string(source)
-    answers = [answer(*row) for row in sorted(scored.summaries.items(), key=_missed_count)]
-    page = template.render(
-        title=title, answers=answers, summaries=scored.summaries, columns=COLUMNS, cell=cell,
-        breakdowns=scored.breakdowns,
-        errors=embed(figures.error_distribution(scored.hits)),
-        reliability=embed(figures.reliability(scored.reliability)),
+    fewest_missed_first = sorted(scored.summaries.items(), key=lambda row: row[1]["missed_count"])
+    page = rendered(
+        "evaluation.html",
+        title=title, answers=[answer(*row) for row in fewest_missed_first], summaries=scored.summaries,
+        columns=COLUMNS, cell=cell, breakdowns=scored.breakdowns,
+        errors=data_url(figures.error_distribution(scored.hits)),
+        reliability=data_url(figures.reliability(scored.reliability)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
-                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
+                  "image": data_url(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
-
-
-def _missed_count(row: tuple[str, Mapping[str, Any]]) -> int:
-    """Sort key of the sentences: number of missed edges."""
-    return row[1]["missed_count"]
 
 
 def answer(name: str, table: Mapping[str, Any]) -> str:
@@ -79,8 +69,3 @@ def in_words(score: FlightScore) -> str:
                          f"{abs(edge.error_s):.2f} s {side}{metres}")
     false = score.note if score.false is None else f"{len(score.false)} false edges"
     return "; ".join([*parts, false]) + "."
-
-
-def embed(image: bytes) -> str:
-    """A PNG as a data URL."""
-    return "data:image/png;base64," + base64.b64encode(image).decode()

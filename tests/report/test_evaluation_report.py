@@ -23,7 +23,7 @@ from airtouch.logs import Edge
 from airtouch.logs.flight_log import FlightLog
 from airtouch.report import figures
 from airtouch.report.columns import COLUMNS, cell
-from airtouch.report.write import answer, in_words, write_report
+from airtouch.report.evaluation_report import answer, in_words, write_report
 
 N = 600
 EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
