@@ -53,7 +53,7 @@ SIMULATED = 4  #: groups of simulated flights; no source: round number
 #: ones those least alike
 OWN_TRIM, OWN_TRIM_FLIGHTS = ("paper-low", "paper-9cm", "paper-mixed", "steps"), 6
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
-#: a log's name, and a function that reads it
+#: a log's name, and a function that reads it, which can be sent to a worker process
 Log = tuple[str, Callable[[], FlightLog]]
 
 
@@ -67,13 +67,21 @@ class Group(NamedTuple):
     logs: list[Log]
 
 
-_GROUPS: list[Group] = []  #: all groups of this run, in its worker processes; `pool_of` fills it
+class Task(NamedTuple):
+    """Flights of a group to be held against others: of other groups of the same drone; None for those of their own."""
+
+    group: Group
+    others: list[Log] | None = None
+
+    @property
+    def note(self) -> str:
+        """What is added to the names of the comparisons."""
+        return "" if self.others is None else ", other groups"
 
 
-def pool_of(jobs: int, groups: list[Group]) -> ProcessPoolExecutor:
-    """Worker processes that hold the groups; they are forked, so that no log is sent to them."""
-    return ProcessPoolExecutor(jobs, multiprocessing.get_context("fork"), initializer=_GROUPS.extend,
-                               initargs=(groups,))
+def pool_of(jobs: int) -> ProcessPoolExecutor:
+    """Worker processes, which are forked: they need not import anything again."""
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("fork"))
 
 
 def nominal_groups(folder: Path) -> Iterator[Group]:
@@ -114,7 +122,7 @@ def nothing_done(log: FlightLog) -> FlightLog:
 
 def _read(path: Path) -> Log:
     """A log's name, and a function that reads it."""
-    return path.name, lambda: read(path)
+    return path.name, partial(read, path)
 
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
@@ -131,13 +139,12 @@ def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
         yield name, look(Data(study, [flight]))
 
 
-def _compare(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
-    """A group's flights held against each other, or against those of other groups of the same drone; JSON-ready."""
-    i, others = task
-    comparisons = held_out(_GROUPS[i].logs, _GROUPS[i].vehicle, _rest(_GROUPS, i) if others else None)
-    return i, others, [{"file": _name(name, others), "rate": one.rate, "passing": dict(one.passing),
-                        "strengths": {k: v.tolist() for k, v in one.strengths.items()},
-                        "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in comparisons]
+def _compare(task: Task) -> list[dict]:
+    """The rows of a task's comparisons, one for each flight of the group; JSON-ready."""
+    comparisons = held_out(task.group.logs, task.group.vehicle, task.others)
+    return [{"file": name + task.note, "rate": apparent.rate, "passing": dict(apparent.passing),
+             "strengths": {k: v.tolist() for k, v in apparent.strengths.items()},
+             "errors": {k: v.tolist() for k, v in apparent.errors.items()}} for name, apparent in comparisons]
 
 
 def passing_alone(data: Data) -> ApparentStrengths:
@@ -145,15 +152,15 @@ def passing_alone(data: Data) -> ApparentStrengths:
     return ApparentStrengths({}, {}, 0.0, passing_sizes(data))
 
 
-def _passing_of(i: int) -> list[ApparentStrengths]:
-    """The same of every flight of a group."""
-    return [one for _, one in held_out(_GROUPS[i].logs, _GROUPS[i].vehicle, look=passing_alone)]
+def _passing_of(group: Group) -> list[ApparentStrengths]:
+    """What comes and goes in every flight of a group, held against the others."""
+    return [apparent for _, apparent in held_out(group.logs, group.vehicle, look=passing_alone)]
 
 
 def with_passing(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
     """The classes of the table that is shipped, with what comes and goes in their flights measured anew."""
     flights = defaultdict(list)
-    for group, sizes in zip(groups, pool.map(_passing_of, range(len(groups))), strict=True):
+    for group, sizes in zip(groups, pool.map(_passing_of, groups), strict=True):
         flights[group.of] += sizes
     return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
 
@@ -163,15 +170,9 @@ def counts_of(text: str) -> dict[str, str]:
     return dict(re.findall(r'^\["(.+)"\]  # (.+)$', text, re.MULTILINE))
 
 
-def _rest(groups: list[Group], i: int) -> list[Log]:
-    """Flights of the same drone in other groups."""
-    own = groups[i]
+def _rest(groups: list[Group], own: Group) -> list[Log]:
+    """Flights of a group's drone in other groups."""
     return [log for group in groups if group.drone == own.drone and group.name != own.name for log in group.logs]
-
-
-def _name(name: str, others: bool) -> str:
-    """The name of a comparison, with a note if it is between groups."""
-    return name + (", other groups" if others else "")
 
 
 def _ready(logs: list[Log], vehicle: Vehicle) -> list[tuple[str, Flight]]:
@@ -206,16 +207,16 @@ def compare_all(groups: list[Group], keep: Path | None, jobs: int) -> dict[str, 
     row_of = {}
     if keep and keep.exists():
         row_of = {r["file"]: r for r in map(json.loads, keep.read_text().splitlines())}
-    todo = [(i, others) for i, group in enumerate(groups) for others in (False, True)
-            if any(_name(name, others) not in row_of for name, _ in group.logs)
-            and (not others or len(_rest(groups, i)) > 1)]
-    with pool_of(jobs, groups) as pool:
-        for i, others, rows in pool.map(_compare, todo):
+    tasks = [task for group in groups for task in (Task(group), Task(group, _rest(groups, group)))
+             if any(name + task.note not in row_of for name, _ in group.logs)
+             and (task.others is None or len(task.others) > 1)]
+    with pool_of(jobs) as pool:
+        for task, rows in zip(tasks, pool.map(_compare, tasks), strict=True):
             row_of |= {row["file"]: row for row in rows}
             if keep:
                 with keep.open("a") as out:
                     out.writelines(json.dumps(row) + "\n" for row in rows)
-            print(f"{groups[i].of}, {groups[i].name}{', other groups' if others else ''}: {len(rows)} flights",
+            print(f"{task.group.of}, {task.group.name}{task.note}: {len(rows)} flights",
                   file=sys.stderr, flush=True)
     return row_of
 
@@ -226,16 +227,22 @@ def scatter_of_classes(groups: list[Group], row_of: dict[str, dict]) -> tuple[di
     for group in groups:
         names[group.of].add(group.name)
         flown_by[group.of] = group.vehicle.name
-        for others in (False, True):
-            for row in (row_of[key] for name, _ in group.logs if (key := _name(name, others)) in row_of):
-                strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
-                cases[group.of].append(ApparentStrengths(strengths, errors, row["rate"], row["passing"]))
-                if not others:
+        for task in (Task(group), Task(group, [])):
+            files = [name + task.note for name, _ in group.logs]
+            for row in (row_of[file] for file in files if file in row_of):
+                cases[group.of].append(_apparent(row))
+                if task.others is None:
                     alike[group.of].append(cases[group.of][-1])
     classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
     counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(names[of])} groups"
               for of, flights in cases.items()}
     return classes, counts
+
+
+def _apparent(row: dict) -> ApparentStrengths:
+    """What a row of `_compare` holds."""
+    strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
+    return ApparentStrengths(strengths, errors, row["rate"], row["passing"])
 
 
 def main() -> None:
@@ -250,7 +257,7 @@ def main() -> None:
     args = parser.parse_args()
     large_enough = [g for g in nominal_groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
-        with pool_of(args.jobs, large_enough) as pool:
+        with pool_of(args.jobs) as pool:
             shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
             write(args.out, text_of(with_passing(pool, large_enough), counts_of(shipped.read_text(encoding="utf-8"))))
     else:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -37,6 +37,17 @@ class Shrink:
     def plain(self) -> dict[str, Any]:
         """JSON-ready."""
         return {"before": self.before, "after": self.after, "shrink": self.share.plain()}
+
+
+class OverallGap(TypedDict, total=False):
+    """Gap of the whole flights on held-out data: rms over the floor's, without unit; empty where it is not known.
+
+    before, after: without the named effects in the model and with them, equal where none is named; floor: 1.
+    """
+
+    before: float
+    after: float
+    floor: float
 
 
 @dataclass(frozen=True)
@@ -167,10 +178,9 @@ class NextStep:
 class Diagnosis:
     """The answer to where, which and how far.
 
-    verdict: "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
-    unit (dimensionless, floor 1 per bin), judged on held-out blocks; control: the same with
-    a deliberately wrong effect, None where none was wrong; arms: shrink with the vehicle as declared and as calibrated.
-    Terminal, report and JSON show this and compute nothing of their own.
+    verdict: "effect", "none" or "unknown"; shrink: share of the gap that the named effects take away, None where none
+    is named; control: the same with a deliberately wrong effect, None where none was wrong; arms: shrink with the
+    vehicle as declared and as calibrated. Terminal, report and JSON show this and compute nothing of their own.
     """
 
     verdict: str
@@ -178,7 +188,7 @@ class Diagnosis:
     ranking: tuple[RankedCandidate, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     where: tuple[Cell, ...]
-    gap: Mapping[str, float]
+    gap: OverallGap
     shrink: Quantity | None
     control: Control | None
     arms: Mapping[str, Shrink] = field(default_factory=dict)
@@ -214,7 +224,7 @@ class Diagnosis:
         parts = [self.verdict, ", ".join(e.name for e in self.effects)]
         if self.ranking:
             parts.append(f"probability {self.ranking[0].probability:.0%}")
-        before, after = (self.gap.get(k) for k in ("before", "after"))
+        before, after = self.gap.get("before"), self.gap.get("after")
         if before is not None and after is not None:
             parts.append(f"gap {before:.3g} before, {after:.3g} after (floor 1)")
         return f"Diagnosis({'; '.join(s for s in parts if s)})"

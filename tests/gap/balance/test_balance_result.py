@@ -35,6 +35,12 @@ def test_the_other_name_of_a_weight_is_counted_with_the_answer():
     assert ranking[2].why.startswith("counted with mass") and ranking[1].why == "4 times less probable than mass"
 
 
+def test_a_weight_whose_probability_underflows_is_not_counted_with_another_effect():
+    shrink = {n: Shrink(3.0, 1.0, Quantity(1.0)) for n in ("slung_load", "mass")}
+    ranking = balance_result._ranking("slung_load", {"slung_load": 1.0, "mass": 0.0}, shrink)
+    assert ranking[1].why.endswith("times less probable than slung_load")
+
+
 def test_names_of_half_the_probability_fit_alike():
     total = {"none": 0.26, "mass": 0.5, "slung_load": 0.24, "unknown": 0.3}
     assert alike([], total, "mass", 0.5) == (("mass", "none"),)

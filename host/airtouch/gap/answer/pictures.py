@@ -23,7 +23,7 @@ from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
 FEWEST_BLOCKS = 8  #: blocks of nominal flights above which their mean power is the floor of a spectrum
-TINY = 1e-12  #: power of a floor at least, in a channel's unit squared
+LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel's unit squared/Hz; chosen
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
     if not flown:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > FEWEST_BLOCKS else
-                       sensor_power(sensor_noise(study.vehicle), AIR), TINY)
+                       sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
     after = _power_after(study, flown, effects, floor) if effects else None
     return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])

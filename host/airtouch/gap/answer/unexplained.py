@@ -20,7 +20,7 @@ from airtouch.simulation import signals as at
 MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
 FEWEST = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
 CHANCE = 0.01  #: probability of a correlation by chance alone, all signals together (Bonferroni); chosen
-TINY = 1e-9  #: ratio to the floor at least, of which a logarithm is taken
+LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; far below any measured
 
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
@@ -99,7 +99,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
     """
     from scipy.stats import spearmanr  # slow to import, and seldom needed
 
-    power = np.concatenate([np.log(np.maximum(ratio, TINY)) for _, ratio in ratios])[::2]  # they overlap by half
+    power = np.concatenate([np.log(np.maximum(ratio, LEAST_RATIO)) for _, ratio in ratios])[::2]  # they overlap by half
     known = np.isfinite(power)
     if known.sum() < FEWEST:
         return []

@@ -61,7 +61,7 @@ def _named(effect: NamedEffect) -> str:
 
 def _how_far(diagnosis: Diagnosis) -> str:
     """How far the effects named close the gap; how large it is where none is named."""
-    before, after = (diagnosis.gap.get(k) for k in ("before", "after"))
+    before, after = diagnosis.gap.get("before"), diagnosis.gap.get("after")
     if before is None or after is None:
         return "How far it would close is not known."
     if diagnosis.verdict == "none":

@@ -16,8 +16,7 @@ from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
 from airtouch.gap.balance.hover_posterior import (
     HIGH,
     LOW,
-    OFF_CENTRE,
-    WEIGHT,
+    OTHER_WEIGHT,
     Likeliest,
     alike,
     answer_of,
@@ -29,7 +28,17 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import BASELINE, Cell, Control, Diagnosis, GapMap, Quantity, RankedCandidate, Shrink
+from airtouch.gap.result import (
+    BASELINE,
+    Cell,
+    Control,
+    Diagnosis,
+    GapMap,
+    OverallGap,
+    Quantity,
+    RankedCandidate,
+    Shrink,
+)
 from airtouch.gap.where import summary
 from airtouch.vehicle import Vehicle
 
@@ -117,7 +126,7 @@ def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
     return Shrink(before, after, Quantity(share(after), min(low, share(after)), max(high, share(after))))
 
 
-def _gap(verdict: str, shrink: Shrink) -> dict[str, float]:
+def _gap(verdict: str, shrink: Shrink) -> OverallGap:
     """The gap before and after in deviations of the floor; unchanged where no effect is named."""
     return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
 
@@ -132,13 +141,12 @@ def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[st
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     together = _weights_together(first, probability_of)
     best = max(together.values())
-    other_weight = OFF_CENTRE if first == WEIGHT else WEIGHT
 
     def reason(name: str, probability: float) -> str:
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
-        if name == other_weight and probability == 0.0:
+        if name == OTHER_WEIGHT.get(first) and probability == 0.0:
             return f"counted with {first}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
@@ -148,10 +156,8 @@ def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[st
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
     """The probabilities, those of a weight's two forms summed in the one that is the answer, if it is."""
-    if first not in (WEIGHT, OFF_CENTRE):
-        return dict(probability_of)
-    other = OFF_CENTRE if first == WEIGHT else WEIGHT
-    if other not in probability_of:
+    other = OTHER_WEIGHT.get(first)
+    if other is None or other not in probability_of:
         return dict(probability_of)
     return {**probability_of, first: probability_of[first] + probability_of[other], other: 0.0}
 

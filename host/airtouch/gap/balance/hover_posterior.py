@@ -16,6 +16,7 @@ LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for 
 COMPETES = 0.5  #: of the answer's probability, from which on another name counts as one that fits alike; chosen
 #: the two names of a weight: on the vehicle; so far off centre that its own mass does not show
 WEIGHT, OFF_CENTRE = "mass", "com_offset"
+OTHER_WEIGHT = {WEIGHT: OFF_CENTRE, OFF_CENTRE: WEIGHT}  #: the other name of each
 
 
 @dataclass(frozen=True)

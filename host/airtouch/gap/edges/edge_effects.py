@@ -24,7 +24,7 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 #: speed (m/s) and seconds of a crossing where a log does not show them; chosen
-USUAL_MPS, USUAL_S = 0.3, 2.5
+ASSUMED_MPS, ASSUMED_CROSSING_S = 0.3, 2.5
 SPEEDS_MPS, LENGTHS_M = (0.1, 0.9), (0.4, 2.0)  #: of simulated crossings: what such missions can fly; chosen
 LEAST_CLEARANCE_M = 0.01  #: of simulated crossings; chosen
 #: m from take-off to the platform, and beyond it at the end; s that the vehicle takes to stop; chosen
@@ -77,7 +77,7 @@ def response_per_step(floor: EdgeFloor, flight: Flight, effect: str, parameter: 
 
 
 def crossing_of(flight: Flight) -> Crossing:
-    """The flight's first way over a platform; USUAL_MPS and USUAL_S stand in for what the log does not show."""
+    """The flight's first way over a platform; what the log does not show of it is ASSUMED_MPS or ASSUMED_CROSSING_S."""
     edges = edges_of(flight)
     if not edges:
         raise ValueError(f"{flight.name}: no edge in this flight")
@@ -85,11 +85,11 @@ def crossing_of(flight: Flight) -> Crossing:
     leave = next((e for e in edges if e.kind == "exit" and (entry is None or e.sample > entry.sample)), None)
     edge = entry or leave or edges[0]
     high, low = max(edge.height_before_m, edge.height_after_m), min(edge.height_before_m, edge.height_after_m)
-    speed = USUAL_MPS
+    speed = ASSUMED_MPS
     if flight.log.has(*VELOCITY[:2]):
         v = interpolate_missing(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
-    seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else USUAL_S
+    seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else ASSUMED_CROSSING_S
     speed = float(np.clip(speed, *SPEEDS_MPS))
     length = float(np.clip(seconds * speed, *LENGTHS_M))
     return Crossing(round(high, 1), round(max(low, LEAST_CLEARANCE_M), 2), round(speed, 1), round(length, 1))

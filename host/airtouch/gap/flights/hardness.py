@@ -31,22 +31,22 @@ LARGEST_STEP = 1.0  #: of the regression, in log power and in slope; chosen
 class Slopes:
     """How the power of the gap rises with hardness, and the nominal range of hardness.
 
-    slope (bins, COUNT): of log power against hardness; nominal flights lie between calmest and hardest, their mean is
-    usual.
+    slope (bins, COUNT): of log power against hardness; nominal flights lie between calmest and hardest, about
+    mean.
     """
 
     slope: np.ndarray
     calmest: float
-    usual: float
+    mean: float
     hardest: float
 
     def level(self, hardness: np.ndarray) -> np.ndarray:
-        """Power (blocks, bins, COUNT) relative to that at the usual hardness.
+        """Power (blocks, bins, COUNT) relative to that at the mean hardness of nominal flights.
 
         A flight calmer or harder than every nominal one has a floor as far beyond theirs as the slopes are trusted.
         """
         x = np.clip(hardness, self.calmest - CALMER, self.hardest + HARDER)
-        return np.exp((x - self.usual)[:, None, None] * self.slope)
+        return np.exp((x - self.mean)[:, None, None] * self.slope)
 
 
 def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:

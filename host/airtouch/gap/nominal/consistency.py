@@ -102,7 +102,7 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
     notes = []
     for f in flights:
         hardness = hardness_of(f, starts(f, AIR), LENGTH[AIR])
-        middle = float(np.median(hardness)) if len(hardness) else slopes.usual
+        middle = float(np.median(hardness)) if len(hardness) else slopes.mean
         if slopes.calmest <= middle <= slopes.hardest:
             continue
         word, end, limit = (("harder", slopes.hardest, "at most") if middle > slopes.hardest

@@ -62,9 +62,10 @@ OF_VEHICLES = frozenset({"rotor_x", "rotor_y", "rotor_inertia", "yaw_torque_over
 LEFT_OUT = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_voltage", "voltage_exponent", "firmware",
                       "battery_cells", "power_per_thrust15", "motor_noise_time", "motor_hiss_time", "range_bias_fade",
                       "thrust_curve", "thrust_scale", "rate_scale", "thrust_per_speed2", "loss_burst"})
-#: what signals are about in an ordinary flight, by which they are divided; chosen. Thrusts are shares of the weight
-USUAL_MPS, USUAL_RADPS, USUAL_S, USUAL_TILT = 0.3, 0.2, 10.0, 0.05
-USUAL_THRUST, USUAL_DIFFERENCE = 0.05, 0.02
+#: scales by which signals are divided, about as large as these are in an ordinary flight; chosen. Those of the thrust
+#: and of its difference between sides are shares of the weight, that of the tilt is a sine
+SPEED_SCALE_MPS, RATE_SCALE_RADPS, TIME_SCALE_S, TILT_SCALE = 0.3, 0.2, 10.0, 0.05
+THRUST_SCALE, DIFFERENCE_SCALE = 0.05, 0.02
 FOR_EVER = 1e9  #: s, beyond any flight; and beyond any parameter
 ANY_VEHICLE = "crazyflie-2.1-flow"  #: one on which it is tried which properties effects change
 
@@ -85,21 +86,21 @@ def _disturbance(p, s, memory, stream, out):
     if kind == Follows.CONSTANT:
         x = 1.0
     elif kind == Follows.VELOCITY:
-        x = s[at.VELOCITY + axis] / USUAL_MPS
+        x = s[at.VELOCITY + axis] / SPEED_SCALE_MPS
     elif kind == Follows.SPEED:
-        x = math.sqrt(vx * vx + vy * vy + vz * vz) / USUAL_MPS
+        x = math.sqrt(vx * vx + vy * vy + vz * vz) / SPEED_SCALE_MPS
     elif kind == Follows.THRUST:
-        x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / USUAL_THRUST
+        x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / THRUST_SCALE
     elif kind == Follows.ROLL_THRUST:
-        x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / USUAL_DIFFERENCE
+        x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / DIFFERENCE_SCALE
     elif kind == Follows.PITCH_THRUST:
-        x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / USUAL_DIFFERENCE
+        x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / DIFFERENCE_SCALE
     elif kind == Follows.BODY_RATE:
-        x = s[at.RATES + axis] / USUAL_RADPS
+        x = s[at.RATES + axis] / RATE_SCALE_RADPS
     elif kind == Follows.NEAR_GROUND:
         x = math.exp(-s[at.HEIGHT] / p[TIME])
     elif kind == Follows.TIME:
-        x = s[at.TIME] / USUAL_S
+        x = s[at.TIME] / TIME_SCALE_S
     elif kind == Follows.WAVE:
         x = math.sin(2.0 * math.pi * s[at.TIME] / p[TIME])
     elif kind == Follows.NOISE:
@@ -107,11 +108,11 @@ def _disturbance(p, s, memory, stream, out):
         memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
         x = memory[0]
     elif kind == Follows.TILT:
-        x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / USUAL_TILT
+        x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / TILT_SCALE
     elif kind == Follows.POSITION:
         x = s[at.POSITION]
     elif kind == Follows.SQUARED_VELOCITY:
-        x = vx * abs(vx) / USUAL_MPS ** 2
+        x = vx * abs(vx) / SPEED_SCALE_MPS ** 2
     else:
         x = 4.0 * s[t + min(int(p[TIME]), 3)] / weight - 1.0
     for i in range(6):

@@ -2,7 +2,7 @@
 
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
-from airtouch.gap.where.summary import TINY
+from airtouch.gap.where.summary import SMALLEST_FLOOR
 
 #: each phase as a phrase
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
@@ -29,4 +29,4 @@ def short(value: float) -> str:
 
 def ratio(cell: Cell) -> float:
     """The cell's gap over its floor."""
-    return cell.gap / max(cell.floor, TINY)
+    return cell.gap / max(cell.floor, SMALLEST_FLOOR)

@@ -25,7 +25,7 @@ from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
-from airtouch.gap.where.summary import TINY
+from airtouch.gap.where.summary import SMALLEST_FLOOR
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
@@ -148,7 +148,7 @@ def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.nd
                  floor: np.ndarray) -> np.ndarray:
     """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
     with np.errstate(invalid="ignore"):
-        reduction = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, TINY))
+        reduction = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, SMALLEST_FLOOR))
     best = np.array(effects, dtype=object)[reduction.argmax(axis=0)]
     return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
