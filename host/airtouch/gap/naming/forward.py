@@ -20,10 +20,10 @@ WORTH_AGAIN = 0.25
 
 @dataclass(frozen=True)
 class Search:
-    """What effects are searched among.
+    """The flights, and the candidates among which effects are searched.
 
-    alone: every candidate judged alone; least: nats that each must gain as the first effect; progress: is told the
-    name of every candidate that is judged.
+    candidates: variants of each effect by name; alone: every candidate judged alone; least: nats that each must gain as
+    the first effect; progress: is told the name of every candidate that is judged.
     """
 
     trial: Trial
@@ -37,9 +37,9 @@ class Search:
 class State:
     """Where a forward selection stands.
 
-    steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last of
-    them, and need: nats that each must gain over it; singles: the best variant of every candidate, as judged before an
-    effect was named; least: nats that each must gain as the first effect.
+    steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last
+    step, by name; need: nats that each of these must gain over it; singles: the best variant of every candidate, as
+    judged before an effect was named; least: nats that each must gain as the first effect.
     """
 
     steps: tuple[Step, ...]
@@ -60,14 +60,14 @@ class State:
 
     @property
     def deviations(self) -> int:
-        """How many steps stand there without a name."""
+        """How many steps are not named: deviations that nominal flights have as well."""
         return len(self.steps) - len(self.named)
 
 
 def forward(search: Search, passing: Candidate | None) -> State:
-    """Effects added one by one, after one that comes and goes where there is such; with what each adds to the others.
+    """The state in which a forward selection ends, its steps with their shares.
 
-    passing: the effect that comes and goes.
+    passing: an effect that comes and goes, which is the first step; None for none.
     """
     state = _begun(search, passing)
     while len(state.named) < MOST_EFFECTS:
@@ -97,10 +97,10 @@ def _worth_adding(state: State) -> dict[str, Candidate]:
 
 
 def _best_of(judged: Mapping[str, Candidate]) -> Candidate | None:
-    """The best of those that were fitted, and not only looked at; None where there is none.
+    """The best of the candidates that were fitted in full; None where there is none.
 
-    Likelihoods of real flights are too sure of themselves (TEMPERATURE): of two that gain nearly as much, that whose
-    strength is the rarer in nominal flights.
+    Likelihoods of real flights are too sure of themselves (TEMPERATURE). So of two that gain nearly as much the one is
+    better whose strength is the rarer in nominal flights.
     """
     return max((c for c in judged.values() if c.full), default=None,
                key=lambda c: c.gain / TEMPERATURE + min(c.evidence, CERTAIN))
@@ -110,8 +110,8 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     """The state with a further step: named, or a deviation where its evidence or its gain is too small for a name."""
     singles = state.singles
     if not state.named:  # what nominal flights have as well stands beside every candidate
-        there = {s.name for s in state.steps}
-        singles = {**singles, **{n: c for n, c in state.tried.items() if n not in there}}
+        added = {s.name for s in state.steps}
+        singles = {**singles, **{n: c for n, c in state.tried.items() if n not in added}}
     left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
     steps = (*state.steps, Step.of(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
@@ -126,9 +126,9 @@ def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidat
             ) -> tuple[dict[str, Candidate], dict[str, float]]:
     """Candidates judged beside the steps so far, and the nats that each must gain.
 
-    before: as judged before the newest step, with their gain over the steps then. Beside a deviation of nominal flights
-    only those are judged again that gained something without it: a deviation takes gain from others, it seldom lends
-    any.
+    before: candidates as judged before the newest step, with their gain over the steps then. Beside a deviation of
+    nominal flights only those are judged again that gained something without it, as a deviation takes gain from others
+    and seldom adds any.
     """
     trial, named = search.trial, any(s.named for s in steps)
     gained = {n for n, c in before.items() if c.gain > WORTH_AGAIN * FIRST_GAIN}

@@ -1,6 +1,7 @@
-"""When recorded flights may name an effect: it must close a part of their gap where they differ by it anyway.
+"""Whether recorded flights may name an effect of the control loop, or one that comes and goes.
 
-Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither is what a gap comes from.
+Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither makes a gap. So such an
+effect is named only where it closes a part of the gap.
 """
 
 from collections.abc import Sequence
@@ -21,13 +22,15 @@ STANDS_OUT = 1.1
 
 
 def must_close_the_gap(data: Data, selection: Selection) -> bool:
-    """Whether these are recorded flights whose named effect lies between any two days: a loop's, or one that passes.
+    """Whether these are recorded flights with one named effect, of the control loop or one that comes and goes.
 
-    An effect whose seconds are known from another vehicle's log is no gust.
+    An effect whose seconds are known from another vehicle's log is no gust, and need not close the gap.
     """
     if not data.study.recorded:
         return False
-    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != KNOWN_OVERHEAD)
+    if names_one_of_the_loop(data, selection):
+        return True
+    return names_one_that_passes(selection) and selection.named[0].key != KNOWN_OVERHEAD
 
 
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
@@ -36,22 +39,22 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
     gap: before it is in the model, in units of the floor; closed: share of it that the effect takes away. What comes
     and goes is held to that only where a gap stands out that it could take away.
     """
-    return closed < LEAST_CLOSED and (changes_the_loop(data, selection) or gap > STANDS_OUT)
+    return closed < LEAST_CLOSED and (names_one_of_the_loop(data, selection) or gap > STANDS_OUT)
 
 
 def with_none_named(selection: Selection) -> Selection:
-    """The same flights with no effect named; what the nameless model gains is that of none."""
+    """The selection with no effect named, beside which the nameless model gains what it gains over none."""
     nameless = replace(selection.nameless, beside=selection.nameless.alone)
     return replace(selection, steps=(), nameless=nameless, assumed=False)
 
 
-def comes_and_goes(selection: Selection) -> bool:
+def names_one_that_passes(selection: Selection) -> bool:
     """Whether one effect is named, and it comes and goes."""
     chosen = selection.chosen
     return chosen is not None and len(selection.named) == 1 and all(t.gate for t in chosen.terms)
 
 
-def changes_the_loop(data: Data, selection: Selection) -> bool:
+def names_one_of_the_loop(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
     chosen = selection.chosen
     return chosen is not None and len(selection.named) == 1 and _of_the_loop(data, chosen.terms)
@@ -72,7 +75,7 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether terms that always act change the control loop."""
-    law, mean = data.study.controller, [t for t in terms if t.shows_in == MEAN and not t.gate]
-    if law is None or not mean:
+    loop, mean = data.study.controller, [t for t in terms if t.shows_in == MEAN and not t.gate]
+    if loop is None or not mean:
         return False
-    return law.changes_loop([t.active() for t in mean]) or any(t.signature.loop_only for t in mean)
+    return loop.changes_loop([t.active() for t in mean]) or any(t.signature.loop_only for t in mean)

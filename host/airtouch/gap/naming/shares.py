@@ -1,4 +1,4 @@
-"""What each of several effects adds to the others: the gain of all, less that of all but one.
+"""The share of each of several effects: what it adds to the others, the gain of all less that of all but one.
 
 Both are gains as `judging.cross_validated` has them: effects before the first random one are not charged with what they
 gain less once the commands' floor is less certain.
@@ -27,7 +27,7 @@ def with_shares(trial: Trial, steps: Sequence[Step]) -> list[Step]:
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
-    last, dropped = steps[-1], _own(steps, place)
+    last, dropped = steps[-1], _new_keys(steps, place)
     others = _without(last.terms, dropped)
     gain = clock_gains(trial.data, others)
     if all(t.shows_in == CLOCK for t in others):
@@ -41,13 +41,13 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
 
 def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:
     """`Charges.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
-    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_newest(steps, i))), 0)
+    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_new_terms(steps, i))), 0)
     earlier = [i for i in range(first_random) if i != place]
     if not earlier:
         return 0.0
     if place > first_random:
         return steps[-1].charges.gained_while_certain
-    later = frozenset().union(*(_own(steps, i) for i in range(len(steps)) if i not in earlier))
+    later = frozenset().union(*(_new_keys(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
     return lost_beside_random(trial, refits)
 
@@ -57,15 +57,15 @@ def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
 
 
-def _newest(steps: Sequence[Step], place: int) -> list[Term]:
+def _new_terms(steps: Sequence[Step], place: int) -> list[Term]:
     """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
     before = {_key(t) for t in steps[place - 1].terms} if place else set()
     return [t for t in steps[place].terms if _key(t) not in before]
 
 
-def _own(steps: Sequence[Step], place: int) -> frozenset[tuple]:
+def _new_keys(steps: Sequence[Step], place: int) -> frozenset[tuple]:
     """Keys of the terms that the step at a place has added."""
-    return frozenset(_key(t) for t in _newest(steps, place))
+    return frozenset(_key(t) for t in _new_terms(steps, place))
 
 
 def _without(terms: Sequence[Term], dropped: frozenset[tuple]) -> list[Term]:

@@ -83,5 +83,5 @@ def assumes(data: Data, terms: Sequence[Term]) -> bool:
 
 def changes_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether one of the mean effects, at its values, changes the control loop; False where no loop is modelled."""
-    law = data.study.controller
-    return law is not None and any(law.changes_loop((t.active(),)) for t in mean_of(terms))
+    loop = data.study.controller
+    return loop is not None and any(loop.changes_loop((t.active(),)) for t in mean_of(terms))
