@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
-from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signals.study import Study
 from airtouch.robust import deviation
@@ -19,7 +19,6 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 TRIM = slice(0, TORQUE.stop)  #: channels of force and torque, m/s^2 and rad/s^2
-LIFT = 2  #: channel of the force along the thrust
 FEWEST = 3  #: flights of which one can be unlike the others
 #: robust standard deviations off the others' median beyond which a flight's trim is odd; chosen
 ODD = 6.0
@@ -45,12 +44,19 @@ def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -
         return list(flights), []
     trim = trims(flights, vehicle)
     median = np.median(trim, axis=0)
-    unlike = (np.abs(trim - median) > np.maximum(ODD * deviation(trim), far)).any(axis=1)
+    distance = (trim - median) / np.maximum(ODD * deviation(trim), far)
+    unlike = (np.abs(distance) > 1.0).any(axis=1)
     if unlike.sum() > len(flights) // MOST_LEFT_OUT:
         return list(flights), []
-    notes = [f"{f.name}: declared nominal, yet unlike the others (lift {t[LIFT] - median[LIFT]:+.2g} m/s^2); left out"
-             for f, t, out in zip(flights, trim, unlike, strict=True) if out]
+    notes = [f"{f.name}: declared nominal, yet unlike the others ({_farthest(t - median, d)}); left out"
+             for f, t, d, out in zip(flights, trim, distance, unlike, strict=True) if out]
     return [f for f, out in zip(flights, unlike, strict=True) if not out], notes
+
+
+def _farthest(offset: np.ndarray, distance: np.ndarray) -> str:
+    """The channel of the largest distance (6,) in words, with its offset (6,), m/s^2 and rad/s^2."""
+    channel = CHANNELS[TRIM][int(np.argmax(np.abs(distance)))]
+    return f"{CHANNEL_WORDS[channel.name]} {offset[COLUMN[channel.name]]:+.2g} {channel.unit}"
 
 
 def of_one_trim(vehicle: Vehicle, flights: Sequence[Flight]) -> bool:
