@@ -10,6 +10,7 @@ from airtouch.gap.nominal.consistency import (
     FAR,
     FAR_SIMULATED,
     differences,
+    logged_unlike,
     odd_flights,
     of_one_trim,
     split_unlike,
@@ -104,3 +105,16 @@ def test_differences_within_six_standard_errors_are_chance():
     steps = np.repeat(np.random.default_rng(1).normal(0.0, 1.0, 8), [13, 13, 13, 13, 12, 12, 12, 12])
     gusty = [flight(1.0, np.outer(sign * steps + 0.3 * (sign > 0), [0.0, 0.0, 1.0])) for sign in (1, -1)]
     assert abs(np.ptp(trims(gusty, VEHICLE)[:, 2])) > 0.2 and not differences(study(), gusty)
+
+
+@pytest.mark.parametrize(("meta", "baseline", "unlike"), [
+    ({"format": "usd"}, [{"format": "authors-12"}, {"format": "authors-13"}], True),
+    ({"format": "authors-14"}, [{"format": "authors-12"}], False),
+    ({"format": "canonical", "origin_format": "usd"}, [{"format": "usd"}, {"format": "px4"}], False),
+    ({"format": "usd"}, [], False)])
+def test_a_log_of_another_kind_than_the_baselines_is_told(meta, baseline, unlike):
+    test, *others = (flight(1.0, name=f"flight {i}") for i in range(1 + len(baseline)))
+    for one, of_log in zip((test, *others), (meta, *baseline), strict=True):
+        one.log.meta.update(of_log)
+    notes = logged_unlike([test], others)
+    assert bool(notes) == unlike and all("flight 0" in n and "(usd)" in n and "(authors)" in n for n in notes)

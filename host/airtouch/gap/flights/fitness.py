@@ -70,6 +70,11 @@ def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
     return FlightLog(columns, log.meta), unfit
 
 
+def log_kind(log: FlightLog) -> str:
+    """Format of a log, or of the log that it was converted from, up to its first "-": the authors' have several."""
+    return str(log.meta.get("origin_format") or log.meta.get("format", "")).split("-")[0]
+
+
 def stamped_at_arrival(log: FlightLog) -> bool:
     """Whether the host stamped the rows: the authors' logs."""
     return str(log.meta.get("format", "")).startswith("authors")

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COLUMN, TORQUE, residual
@@ -117,6 +118,14 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
         notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs "
                      f"by {limit} {theirs:.1f}): the floor is extrapolated; fly the baseline like the test")
     return notes
+
+
+def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list[str]:
+    """A note on each flight whose log is of another kind than every baseline log."""
+    kinds = {log_kind(f.log) for f in baseline}
+    return [f"{f.name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({', '.join(sorted(kinds))}): "
+            "what differs may be the logs; take a baseline that was logged like the test"
+            for f in flights if kinds and log_kind(f.log) not in kinds]
 
 
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:
