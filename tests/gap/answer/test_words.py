@@ -47,6 +47,13 @@ def test_what_got_worse_is_said():
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
 
 
+def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "hover", 0.1, after=0.4),
+             cell("force_y", "hover", 0.5, after=0.45)]
+    told = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
+    assert told in words.sentences(diagnosis(cells))[2]
+
+
 def test_headline_and_ranking_cannot_disagree():
     first, beside = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
     sentences = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],
