@@ -23,12 +23,11 @@ from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S, Parameters
 
 @dataclass(frozen=True)
 class Baseline:
-    """Settings; the paper names none of them. The defaults are `fit` on the 87 clean flights of the authors.
+    """Settings of the baseline. The paper names none; the defaults are those of `fit` on the authors' 87 clean flights.
 
-    correlation_window: samples over which channels are correlated. smoothing: samples
-    of the two means whose difference is the derivative. threshold: first derivative,
-    correlation sum per second, from which a zero of the second one counts:
-    noise alone crosses zero several times a second. lag_s: median delay in training.
+    correlation_window: samples over which channels are correlated. smoothing: samples of each of the two means whose
+    difference is the derivative. threshold: least first derivative, correlation sum per second, at which a zero of the
+    second one is an edge: noise alone crosses zero several times a second. lag_s: median delay in training, seconds.
     """
 
     correlation_window: int = 100
@@ -47,7 +46,10 @@ def run(log: FlightLog, model: Baseline | None = None) -> Trace:
 
 
 def fit(flights: Sequence[FlightLog], seed: int = 0, **_: Any) -> Baseline:
-    """Threshold, smoothing and lag for the best timed F1 over the training flights. Nothing is random."""
+    """The settings of the best timed F1 over the training flights (`tuning.timed_f1`), with their lag.
+
+    Nothing is random: the seed and other options are ignored.
+    """
     truth = [logs.true_edges(log) for log in flights]
     correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]
     slopes = {s: [derivative(c, s) for c in correlations] for s in (25, 50, 100)}
@@ -77,7 +79,7 @@ def lag_s(model: Baseline | None) -> float:
 
 
 def parameters(model: Baseline | None) -> dict[str, Any]:
-    """What a report prints."""
+    """The settings by name, for reports."""
     return asdict(model or Baseline())
 
 

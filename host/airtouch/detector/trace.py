@@ -1,4 +1,4 @@
-"""What a detector says about one flight."""
+"""A detector's output over one flight: probabilities and edges."""
 
 from dataclasses import dataclass, field
 

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
-from airtouch.gap.answer.named_effects import named_effects
+from airtouch.gap.answer.named_effects import at_end_of_range, named_effects
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
@@ -24,7 +24,7 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.nominal.consistency import differences, flown_unlike
+from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
@@ -96,6 +96,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
+    notes += at_end_of_range(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
                    calibrated=calibrated)
 
@@ -172,6 +173,7 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     notes += list(comparison.calibration.notes) if comparison.calibration else [NO_BASELINE]
     notes += differences(comparison.study, comparison.nominal)
     notes += flown_unlike(comparison.study, comparison.usable)
+    notes += logged_unlike(comparison.usable, comparison.nominal)
     if len(comparison.judged) < len(comparison.usable):
         notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
                      "chosen")
@@ -198,7 +200,7 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
                       ) -> tuple[Selection, Gap]:
     """What is chosen among the candidates, and the gap that it closes.
 
-    In recorded flights some effects must close a part of the gap to be named, those of the loop also beside others: see
+    In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
     `naming.recorded`. Where they do not, the others are judged without them.
     """
     variants = candidates.all_candidates(without)
@@ -211,8 +213,8 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
         if gap.named.share.value - gap_of_rest.named.share.value < recorded.LEAST_CLOSED:
             selection = replace(rest, singles={**selection.singles, **rest.singles}, least=selection.least)
             gap = gap_of_rest
-    if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
-            data, selection, gap.named.before, gap.named.share.value):
-        selection = recorded.with_none_named(selection)
+    closed = gap.named.share.value
+    if recorded.closes_too_little(data, selection, gap.named.before, closed):
+        selection = recorded.with_none_named(selection, closed)
         gap = gap_of(data, selection.parts, None)
     return selection, gap

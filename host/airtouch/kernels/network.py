@@ -1,6 +1,7 @@
 """The int8 and float network of gap8/kernels, whole batches and whole flights in one call."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -95,7 +96,7 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     """P(over a platform) at each sample of a flight, (n,), from its fused features (n, columns).
 
     Row i: the window that ends at i, as many rows as the network takes, z-scored by itself, quantised, through the
-    network, all in C. NaN where that window is not full or holds a value that is not finite.
+    network, all in C, on two threads. NaN where that window is not full or holds a value that is not finite.
     """
     network = model.int8
     rows, columns, channels = network.input_shape
@@ -103,10 +104,21 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     if x.ndim != 2 or x.shape[1] != columns * channels:
         raise AirTouchError(f"network: needs features (n, {columns * channels}), not {x.shape}")
     flat, keep = _flat_int8(network)
-    window, quantised = np.empty(rows * x.shape[1], np.float32), np.empty(rows * x.shape[1], np.int8)
-    logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
-    lib.networkInt8Flight(flat, pointer(x), len(x), x.shape[1], rows, pointer(window), pointer(quantised), _arena(flat),
-                          pointer(logits), pointer(valid))
+
+    def logits_from(start: int, end: int) -> tuple[np.ndarray, np.ndarray]:
+        """int8 logits (end - start, outputs) of the samples from start to end, and whether each is valid."""
+        before = min(start, rows - 1)  # samples that the first window needs
+        part = x[start - before:end]
+        window, quantised = np.empty(rows * x.shape[1], np.float32), np.empty(rows * x.shape[1], np.int8)
+        logits, valid = np.zeros((len(part), network.outputs), np.int8), np.zeros(len(part), np.uint8)
+        lib.networkInt8Flight(flat, pointer(part), len(part), x.shape[1], rows, pointer(window), pointer(quantised),
+                              _arena(flat), pointer(logits), pointer(valid))
+        return logits[before:], valid[before:]
+
+    middle = len(x) // 2
+    with ThreadPoolExecutor(2) as threads:  # the C call leaves Python's lock to the other half
+        first, second = threads.map(logits_from, (0, middle), (middle, len(x)))
+    logits, valid = (np.concatenate(pair) for pair in zip(first, second, strict=True))
     return np.where(valid, platform_probability(logits, network.layers[-1].output_scale), np.nan)
 
 

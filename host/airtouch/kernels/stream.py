@@ -21,7 +21,7 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     if x.ndim != 2 or x.shape[1] != network.channels:
         raise AirTouchError(f"network: needs samples (n, {network.channels}), not {x.shape}")
     flat, keep = flat_stream(network)
-    arena = ffi.new("int8_t[]", arena_bytes(network))
+    arena = ffi.new("int8_t[]", valid_size(lib.streamInt8BatchArena(flat)))
     outputs = np.empty((-(-len(x) // network.stride), network.outputs), dtype=np.int8)
     lib.streamInt8Flight(flat, pointer(x), len(x), arena, pointer(outputs))
     return outputs

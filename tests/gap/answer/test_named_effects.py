@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.named_effects import converged, with_reading
+from airtouch.gap.answer.named_effects import at_end_of_range, converged, with_reading
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import without_columns
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import VEHICLE, fly
 
@@ -47,6 +48,17 @@ def test_what_the_replay_knows_as_a_sum_stays_a_sum():
 
 def test_a_parameter_without_a_reading_stays():
     assert mass(0.10, 0.01, {}).value == pytest.approx(0.10)
+
+
+def test_a_parameter_at_the_end_of_its_range_is_told():
+    """Slow motors have a factor of at most 5; a wake's turbulence of 0 is none, and no end."""
+    def named(name, **values):
+        return NamedEffect(name, {k: Quantity(v) for k, v in values.items()})
+
+    (note,) = at_end_of_range([named("motor_lag", factor=5.0, fall=1.0), named("wind", x=1.0, y=0.0, z=-9.0)])
+    assert note.startswith("motor_lag: factor is at the end of its range (5)")
+    assert len(at_end_of_range([named("wind", x=10.0, y=0.0, z=-10.0)])) == 2
+    assert not at_end_of_range([named("downwash", strength=1.0, turbulence=0.0), named("motor_lag", factor=1.0)])
 
 
 def test_a_fit_goes_on_until_it_stands_still(study):

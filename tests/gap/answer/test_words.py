@@ -30,6 +30,15 @@ def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
     assert "500 to 475 times the floor" in sentences[2].replace("  ", " ")
 
 
+@pytest.mark.parametrize(("other", "begin"), [(0.2, "The gap lies mostly in lift"),
+                                              (9.0, "A part of the gap lies in lift")])
+def test_a_cell_that_the_effect_closes_is_not_called_most_of_the_gap_where_another_has_more(other, begin):
+    cells = [cell("force_z", "hover", 1.0, after=0.1), cell("torque_x", "hover", other, after=other)]
+    sentences = words.sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
+                                          headline=summary.headline(cells, True)))
+    assert sentences[0].startswith(begin) and sentences[1].startswith("Its cause is ground effect")
+
+
 def test_rotors_are_told_apart():
     weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
@@ -45,6 +54,13 @@ def test_what_got_worse_is_said():
     assert sentence.endswith("and 2 got worse.")
     ground = next(p for p in summary.phases(cells) if p.name == "ground")
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
+
+
+def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "hover", 0.1, after=0.4),
+             cell("force_y", "hover", 0.5, after=0.45)]
+    told = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
+    assert told in words.sentences(diagnosis(cells))[2]
 
 
 def test_headline_and_ranking_cannot_disagree():

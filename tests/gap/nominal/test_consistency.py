@@ -10,6 +10,7 @@ from airtouch.gap.nominal.consistency import (
     FAR,
     FAR_SIMULATED,
     differences,
+    logged_unlike,
     odd_flights,
     of_one_trim,
     split_unlike,
@@ -65,9 +66,12 @@ def test_one_odd_flight_of_many_leaves_the_others_of_one_trim():
     assert not of_one_trim(VEHICLE, baseline(0.0, 0.2))
 
 
-def test_the_note_tells_by_how_much_the_lift_is_off():
-    (note,) = split_unlike(VEHICLE, baseline(0.0, 0.0, 0.0, 0.5), FAR)[1]
-    assert note == "lift 0.5: declared nominal, yet unlike the others (lift +0.5 m/s^2); left out"
+@pytest.mark.parametrize(("offset", "told"), [((0.0, 0.0, 0.5), "lift +0.5"),
+                                              ((0.0, -0.9, 0.5), "sideways force -0.9")])
+def test_the_note_tells_the_channel_that_is_farthest_off(offset, told):
+    odd = flight(1.0, np.tile(offset, (100, 1)), name="odd")
+    (note,) = split_unlike(VEHICLE, [*baseline(0.0, 0.0, 0.0), odd], FAR)[1]
+    assert note == f"odd: declared nominal, yet unlike the others ({told} m/s^2); left out"
 
 
 def test_two_flights_cannot_say_which_is_unlike():
@@ -101,3 +105,16 @@ def test_differences_within_six_standard_errors_are_chance():
     steps = np.repeat(np.random.default_rng(1).normal(0.0, 1.0, 8), [13, 13, 13, 13, 12, 12, 12, 12])
     gusty = [flight(1.0, np.outer(sign * steps + 0.3 * (sign > 0), [0.0, 0.0, 1.0])) for sign in (1, -1)]
     assert abs(np.ptp(trims(gusty, VEHICLE)[:, 2])) > 0.2 and not differences(study(), gusty)
+
+
+@pytest.mark.parametrize(("meta", "baseline", "unlike"), [
+    ({"format": "usd"}, [{"format": "authors-12"}, {"format": "authors-13"}], True),
+    ({"format": "authors-14"}, [{"format": "authors-12"}], False),
+    ({"format": "canonical", "origin_format": "usd"}, [{"format": "usd"}, {"format": "px4"}], False),
+    ({"format": "usd"}, [], False)])
+def test_a_log_of_another_kind_than_the_baselines_is_told(meta, baseline, unlike):
+    test, *others = (flight(1.0, name=f"flight {i}") for i in range(1 + len(baseline)))
+    for one, of_log in zip((test, *others), (meta, *baseline), strict=True):
+        one.log.meta.update(of_log)
+    notes = logged_unlike([test], others)
+    assert bool(notes) == unlike and all("flight 0" in n and "(usd)" in n and "(authors)" in n for n in notes)

@@ -14,7 +14,9 @@ from airtouch.parameters import SAMPLE_PERIOD_S
 
 
 def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) -> list[FlightLog]:
-    """Every flight under the folders at 100 Hz with at most one sensor missing; tell() gets why others are left out.
+    """Every flight under the folders that lacks at most one sensor, at 100 Hz.
+
+    tell: called with the reason for each flight that is left out.
 
     Raises AirTouchError where a log's own down range shows an edge, and where no flight is usable.
     """
@@ -39,5 +41,6 @@ def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) 
 
 
 def _at_100_hz(log: FlightLog) -> FlightLog:
+    """The log itself within 2 % of 100 Hz, else resampled."""
     rate_hz = 1.0 / SAMPLE_PERIOD_S
     return log if abs(sample_period(log) * rate_hz - 1.0) < 0.02 else logs.resample(log, rate_hz)

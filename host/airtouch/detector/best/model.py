@@ -24,11 +24,11 @@ from airtouch.logs.files import write_bytes
 from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
-FORMAT = 1
+FORMAT = 1  #: version of the file's layout
 SHIPPED = "best.npz"
 #: sensor -> shipped model for logs that lack it
 SPARES = {"acceleration": "best_without_acceleration.npz"}
-KIND = {"format": FORMAT, "network": "stream"}
+KIND = {"format": FORMAT, "network": "stream"}  #: metadata that tell this file from that of another network
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
 #: settings of files written before these fields existed
 _BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
@@ -40,9 +40,10 @@ _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 class BestModel:
     """A trained model of `best`.
 
-    weights: float32 arrays by name (`network.weight_shapes`). int8: the network that flies. tflite: the same network
-    over one window, as a TFLite file. metadata: plain JSON: decoder, lag_s, flights, seed, command, ... spares: models
-    for logs that lack a sensor, by the sensor's name; each has a file of its own.
+    recipe: shape of its network, and how it was trained. weights: float32 arrays by name (`network.weight_shapes`).
+    int8: the network that flies. tflite: the same network over one window, as a TFLite file. metadata: plain JSON:
+    decoder, lag_s, flights, seed, command, ... spares: models for logs that lack a sensor, by the sensor's name; each
+    has a file of its own.
     """
 
     recipe: Recipe
@@ -71,6 +72,7 @@ class BestModel:
 
     @staticmethod
     def _settings(table: Any) -> DecoderConfig:
+        """The decoder's settings in a table of metadata; AirTouchError for those of another version."""
         try:
             return DecoderConfig(**table)
         except TypeError:
@@ -86,6 +88,7 @@ class BestModel:
         return total.hexdigest()
 
     def _int8_arrays(self) -> dict[str, np.ndarray]:
+        """The arrays "int8..." of the file."""
         arrays = {}
         for of, layer in zip(self.int8.graph, self.int8.layers, strict=True):
             parts = {"weights": layer.weights, "bias": layer.bias, "weight_scale": layer.weight_scale,
@@ -123,6 +126,7 @@ def load(path: str | Path | None = None) -> BestModel:
 
 @cache
 def _shipped(name: str) -> BestModel:
+    """A model that ships, read once."""
     with resources.as_file(resources.files("airtouch") / "models" / name) as path:
         return load(path)
 

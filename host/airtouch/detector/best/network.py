@@ -75,5 +75,6 @@ def window_logits(weights: Weights, graph: Graph) -> Callable[[Any], Any]:
 
 
 def _arrays(weights: Weights, layer: StreamLayer) -> tuple[np.ndarray, np.ndarray]:
+    """Kernel and bias of a layer."""
     kernel, bias = (weights[f"{layer.name}.{part}"] for part in PARTS)
     return kernel, bias

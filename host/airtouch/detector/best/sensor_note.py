@@ -11,13 +11,15 @@ FILE = "best_sensors.json"  #: beside the models, written by tools/sensor_figure
 
 @cache
 def figures() -> dict[str, dict[str, Any]]:
-    """Figures on unseen flights with all sensors ("all") and without each: of (which flights), edges, missed (share),
-    false_per_minute, mean_abs_error_s."""
+    """Figures on unseen flights with all sensors ("all") and without each of `sensors.SENSORS`.
+
+    Keys of each: of (which flights), edges, missed (share), false_per_minute, mean_abs_error_s.
+    """
     return json.loads((resources.files("airtouch") / "models" / FILE).read_text(encoding="utf-8"))
 
 
 def note(missing: Sequence[str]) -> str:
-    """One line on what is lost without these sensors, nothing without a missing one."""
+    """One line on what is lost without these sensors; "" if none is missing."""
     if not missing:
         return ""
     return f"no {missing[0]} in this log: {_text(figures()[missing[0]])}; with all sensors {_text(figures()['all'])}"

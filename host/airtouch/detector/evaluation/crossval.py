@@ -4,8 +4,8 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,65 +23,22 @@ from airtouch.logs.flight_log import FlightLog
 Tell = Callable[[str], None]
 
 
-def crossval(
-    name: str,
-    files: Sequence[FlightFile],
-    out: Path,
-    *,
-    folds: Folds | None = None,
-    seed: int = 0,
-    options: dict[str, Any] | None = None,
-    physical_filter: bool = True,
-    silenced: tuple[str, ...] = (),
-    silent_training: bool = False,
-    free_air: Sequence[FlightLog] = (),
-    detector: Detector | None = None,
-    tell: Tell = lambda _: None,
-) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
-    """(scores of all flights, one entry a fold, flights left out).
-
-    Finished folds are kept in `out` and not done again for the same flights, settings and version.
-    folds: which flights are held out together (`data.folds`), the manifest's folds if left out. options go to the
-    detector's `fit`. physical_filter False chooses the decoding again without it. silenced: sensors that are taken
-    from the flights that are scored; silent_training: from those trained on too. free_air: flights without edges to
-    train on too. detector: one that is not registered, under the name given.
-    """
-    detector = detector or get(name)
-    if not physical_filter and not isinstance(detector, Filtered):
-        raise AirTouchError(f"{name} has no physical filter to switch off")
-    folds = by_fold(files) if folds is None else folds
-    make_folder(out)
-    study = _Study(name, detector, seed, options or {}, physical_filter, silenced, silent_training, free_air, out)
-    readable, left_out = readable_flights(files, evaluate.spare_of(detector))
-    scores: list[FlightScore] = []
-    entries: list[dict[str, Any]] = []
-    for fold, members in folds.items():
-        key = cache_key(name, files, members, seed, study.hashed())
-        cache = out / f"{name}{study.variant()}_fold{fold}_{key}.json"
-        entry = read_fold(cache)
-        if entry is None:
-            entry = _score_fold(study, fold, key, files, members, readable, tell)
-            write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
-        else:
-            tell(f"fold {fold}: done before, {cache.name}")
-        scores += [FlightScore.from_dict(s) for s in entry["per_flight"]]
-        entries.append({k: v for k, v in entry.items() if k != "per_flight"})
-    return scores, entries, left_out
-
-
 @dataclass(frozen=True)
-class _Study:
-    """How every fold is trained and scored: the arguments of `crossval` of these names."""
+class Study:
+    """What is trained and scored in every fold; the defaults are a detector as it is, on flights as they are.
 
-    name: str
-    detector: Detector
-    seed: int
-    options: dict[str, Any]
-    physical_filter: bool
-    silenced: tuple[str, ...]
-    silent_training: bool
-    free_air: Sequence[FlightLog]
-    out: Path
+    seed: of every training. options: arguments of the detector's `fit`, by name. free_air: flights without edges to
+    train on too. silent_training: train without the sensors of `silenced` too.
+    Of the scoring alone: physical_filter: False chooses the decoding again without the filter. silenced: sensors
+    (`sensors.SENSORS`) that are taken from the flights that are scored.
+    """
+
+    seed: int = 0
+    options: Mapping[str, Any] = field(default_factory=dict)
+    free_air: Sequence[FlightLog] = ()
+    physical_filter: bool = True
+    silenced: tuple[str, ...] = ()
+    silent_training: bool = False
 
     def fit_options(self) -> dict[str, Any]:
         """Arguments of the detector's `fit`."""
@@ -101,31 +58,64 @@ class _Study:
         return "".join(("" if self.physical_filter else "-unfiltered", *(f"-no-{s}" for s in self.silenced)))
 
 
-def _score_fold(study: _Study, fold: int, key: str, files: Sequence[FlightFile], members: Sequence[FlightFile],
-                readable: dict[Path, FlightLog], tell: Tell) -> dict[str, Any]:
-    """A fold's entry: a model of the other flights, its settings, and the scores of the members."""
-    detector, test_paths = study.detector, {f.path for f in members}
-    test = [f for f in members if f.path in readable]
-    train = [sensors.without(readable[f.path], study.silenced if study.silent_training else ())
-             for f in files if f.path in readable and f.path not in test_paths]
-    tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
+def crossval(name: str, files: Sequence[FlightFile], out: Path, study: Study | None = None, *,
+             folds: Folds | None = None, detector: Detector | None = None, tell: Tell = lambda _: None,
+             ) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
+    """(scores of all flights, one entry a fold, flights left out with the reason).
+
+    Finished folds are kept in `out` and not done again for the same flights, study and version.
+    study: `Study()` for None. folds: which flights are held out together (`data.folds`); those of the manifest for
+    None. detector: one that is not registered, under `name`. tell: called with a line a fold.
+    Raises AirTouchError for an unknown detector, for a filter that it does not have, and for fewer than two folds.
+    """
+    detector, study = detector or get(name), study or Study()
+    if not study.physical_filter and not isinstance(detector, Filtered):
+        raise AirTouchError(f"{name} has no physical filter to switch off")
+    folds = by_fold(files) if folds is None else folds
+    make_folder(out)
+    readable, left_out = readable_flights(files, evaluate.spare_of(detector))
+    scores: list[FlightScore] = []
+    entries: list[dict[str, Any]] = []
+    for fold, members in folds.items():
+        key = cache_key(name, files, members, study.seed, study.hashed())
+        cache = out / f"{name}{study.variant()}_fold{fold}_{key}.json"
+        entry = read_fold(cache)
+        if entry is None:
+            test_paths = {f.path for f in members}
+            train = [readable[f.path] for f in files if f.path in readable and f.path not in test_paths]
+            test = [f for f in members if f.path in readable]
+            tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
+            model = out / f"{name}_fold{fold}_{key}.npz"
+            entry = {"fold": fold, **_score_fold(study, detector, train, [(f, readable[f.path]) for f in test], model)}
+            write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
+        else:
+            tell(f"fold {fold}: done before, {cache.name}")
+        scores += [FlightScore.from_dict(s) for s in entry["per_flight"]]
+        entries.append({k: v for k, v in entry.items() if k != "per_flight"})
+    return scores, entries, left_out
+
+
+def _score_fold(study: Study, detector: Detector, train: Sequence[FlightLog],
+                test: Sequence[tuple[FlightFile, FlightLog]], path: Path) -> dict[str, Any]:
+    """A fold's entry: the model of the training flights, kept in `path`, its settings, and its scores of the test."""
     started, cpu_before = time.monotonic(), time.process_time()
-    path = study.out / f"{study.name}_fold{fold}_{key}.npz"
+    silent = study.silenced if study.silent_training else ()
+    train = [sensors.without(log, silent) for log in train]
     model = model_of_fold(detector, train, path, study.seed, study.fit_options())
     if not study.physical_filter and isinstance(detector, Filtered):
         model = detector.retune(model, train, False)
-    results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], study.silenced), detector, model).score
-               for f in test]
-    return {"fold": fold, "model": path.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
+    results = [evaluate.evaluate_flight(f, sensors.without(log, study.silenced), detector, model).score
+               for f, log in test]
+    return {"model": path.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
             "seconds": round(time.monotonic() - started, 1),
             "cpu_seconds": round(time.process_time() - cpu_before, 1), "per_flight": [s.as_dict() for s in results]}
 
 
 def readable_flights(files: Sequence[FlightFile], spare: int = 0,
                      scored: bool = True) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
-    """Logs by path, and those that cannot be used with the reason; `spare` sensors may be missing.
+    """(usable logs by path, the other files each with the reason). Up to `spare` sensors may be missing.
 
-    scored: they are to be scored in metres too, so their speed must be known.
+    scored: whether the logs are to be scored in metres too, so that their speed must be known.
     """
     logs: dict[Path, FlightLog] = {}
     left_out = []
@@ -142,7 +132,7 @@ def readable_flights(files: Sequence[FlightFile], spare: int = 0,
 
 def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, seed: int,
                   options: dict[str, Any]) -> Any:
-    """The fold's model from `path`, else trained now and kept there, where it can be saved."""
+    """The fold's model, from `path` if that exists; else trained now, and saved there if such a model has a file."""
     if path.exists():
         return detector.load(path)
     model = detector.fit(flights, seed=seed, **options)

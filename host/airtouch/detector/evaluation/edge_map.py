@@ -164,7 +164,7 @@ def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
 
 
 def platforms(points: list[EdgePoint]) -> list[Platform]:
-    """Group the passes into platforms and fit each one's outline.
+    """The platforms of a flight, each with its outline.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
     no further apart than ROWS_APART times the median distance between successive rows.
@@ -193,10 +193,12 @@ def _distance(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoin
 
 
 def _ends(crossing: tuple[EdgePoint, EdgePoint]) -> np.ndarray:
+    """Positions of a pass's entry and exit, (2, 2), metres."""
     return np.array([[p.x_m, p.y_m] for p in crossing])
 
 
 def _adjacent(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint], reach: float) -> bool:
+    """Whether two passes overlap along the first one and lie at most `reach` metres apart across it."""
     a, b = _ends(one), _ends(other)
     direction = a[1] - a[0]
     length = float(np.hypot(*direction))
@@ -207,7 +209,10 @@ def _adjacent(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoin
 
 
 def _fit(group: list[tuple[EdgePoint, EdgePoint]]) -> Platform:
-    """Join the ends of the passes on either side, close the ring, simplify within the uncertainty."""
+    """The platform of a group of passes.
+
+    Its outline joins the ends of the passes on either side to a ring, simplified within the uncertainty.
+    """
     ends = [_ends(crossing) for crossing in group]
     direction = ends[0][1] - ends[0][0]
     aligned = [pair if (pair[1] - pair[0]) @ direction >= 0 else pair[::-1] for pair in ends]
@@ -249,4 +254,5 @@ def geojson(points: list[EdgePoint], platforms: list[Platform], properties: dict
 
 
 def _feature(geometry: shapely.Geometry, **properties: object) -> dict:
+    """A GeoJSON Feature."""
     return {"type": "Feature", "geometry": mapping(geometry), "properties": properties}

@@ -20,13 +20,13 @@ from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S
 
-SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
-MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value
+SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
+MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
 
 
 @dataclass(frozen=True)
 class Result:
-    """One flight, what the detector said of it, and how good that was."""
+    """One flight with the detector's trace of it and the trace's score."""
 
     log: FlightLog
     trace: Trace
@@ -55,7 +55,10 @@ def spare_of(detector: Detector) -> int:
 
 
 def check(log: FlightLog, spare: int = 0) -> None:
-    """Raise AirTouchError, one line, for a log that a detector cannot use which can do without `spare` sensors."""
+    """Raise AirTouchError, one line with the remedy, for a log that a detector cannot use.
+
+    spare: sensors of the three that the detector can do without (`spare_of`).
+    """
     period = sample_period(log)
     if abs(period - SAMPLE_PERIOD_S) > 0.02 * SAMPLE_PERIOD_S:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, the detectors need 100 Hz: "
@@ -89,7 +92,7 @@ def check(log: FlightLog, spare: int = 0) -> None:
 
 
 def remarks(log: FlightLog) -> list[str]:
-    """What `airtouch logs check` knows of a log that a score may suffer from: its clock, and what the reader found."""
+    """Warnings of the reader, and faults of the clock, from which a score of the log may suffer, a line each."""
     back = int((clock_steps(log) < 0).sum())
     clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
     return [str(w) for w in log.meta.get("warnings", [])] + clock
@@ -103,7 +106,7 @@ def truth(log: FlightLog) -> list[logs.Edge] | None:
 
 
 def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
-    """Run the detector on one flight and score it."""
+    """The detector's result on one flight; where it has several models, by the one that serves the log."""
     model = model_for(detector, model, log)
     return result_of(file, log, detector.run(log, model), detector, model)
 

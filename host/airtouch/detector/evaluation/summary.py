@@ -94,7 +94,12 @@ def by_wind(scores: Sequence[FlightScore]) -> dict[str, dict]:
 
 
 def _totals(score: FlightScore) -> dict[str, float]:
-    """What is added up over flights."""
+    """The numbers of a flight from whose sums over flights `_statistics` makes every figure.
+
+    m, s (and with "entry" or "exit" appended): summed absolute errors in metres and seconds, of n matched edges.
+    over_hits of over, beside_hits of beside: airborne samples that are classified correctly, of those over a platform
+    and of the others.
+    """
     matched = [(e, e.error_s) for e in score.edges if e.error_s is not None]
     judged = score.false is not None
     totals: dict[str, float] = {
@@ -115,7 +120,7 @@ def _totals(score: FlightScore) -> dict[str, float]:
         totals[f"m{name}"] = sum(abs(e.error_m) if e.error_m is not None else np.nan for e, _ in some)
     for radius in HIT_RADII_M:
         totals[f"hit_{radius:.2f}"] = sum(e.error_m is not None and abs(e.error_m) <= radius for e, _ in matched)
-    for name, value in zip(("over_found", "over", "rest_found", "rest"), score.windows, strict=True):
+    for name, value in zip(("over_hits", "over", "beside_hits", "beside"), score.windows, strict=True):
         totals[name] = value
     for index, value in enumerate(score.bins.ravel()):
         totals[f"bin_{index}"] = value
@@ -123,6 +128,7 @@ def _totals(score: FlightScore) -> dict[str, float]:
 
 
 def _totals_keys() -> list[str]:
+    """The names of the numbers of `_totals`."""
     return list(_totals(FlightScore("", Condition(), (), (), 0, 0.0)))
 
 
@@ -135,7 +141,7 @@ def _statistics(sums: Sums) -> dict[str, np.ndarray]:
         "missed": _ratio(sums["missed"], sums["true"]),
         "false_per_minute": _ratio(sums["false"], sums["minutes"]),
         "balanced_accuracy": 0.5 * (
-            _ratio(sums["over_found"], sums["over"]) + _ratio(sums["rest_found"], sums["rest"])),
+            _ratio(sums["over_hits"], sums["over"]) + _ratio(sums["beside_hits"], sums["beside"])),
     }
     for kind in ("entry", "exit"):
         for unit in ("m", "s"):
@@ -147,14 +153,17 @@ def _statistics(sums: Sums) -> dict[str, np.ndarray]:
     return figures
 
 
-def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    upper, lower = np.asarray(upper, float), np.asarray(lower, float)
-    return np.divide(upper, lower, out=np.full_like(upper, np.nan), where=lower > 0)
+def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
+    """Element by element, NaN where the denominator is 0."""
+    numerator, denominator = np.asarray(numerator, float), np.asarray(denominator, float)
+    return np.divide(numerator, denominator, out=np.full_like(numerator, np.nan), where=denominator > 0)
 
 
 def _plain(value: float) -> float | None:
+    """The value, None for NaN: JSON has no NaN."""
     return float(value) if np.isfinite(value) else None
 
 
 def _pair(interval: tuple[float, float] | None) -> list[float] | None:
+    """An interval as JSON holds it."""
     return None if interval is None else list(interval)

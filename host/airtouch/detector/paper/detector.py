@@ -64,7 +64,7 @@ def stride(model: Model) -> int:
 
 
 def run_float(log: FlightLog, model: Model) -> Trace:
-    """The same as `run` with the float network before quantisation. The difference is the cost of quantisation."""
+    """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
     features = flight_features(log, parameters=decoding(model)[0])
     windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
     logits = infer_float(model.float_layers, windows).astype(np.float64)
@@ -74,18 +74,19 @@ def run_float(log: FlightLog, model: Model) -> Trace:
 
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
+    """The trace of a flight whose P(over a platform) is known, (n,), with edges from the C pipeline."""
     settings, physical = decoding(model)
     events = pipeline(log, settings, probability, physical_filter=physical)
     return Trace(probability, detections(events.edge, probability), signals(features))
 
 
-def fit(
-    flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any
-) -> Model:
-    """Train, prune and quantise the network, then choose decoding settings and lag on held-out training flights.
+def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any) -> Model:
+    """A model trained on the flights, with decoding settings and lag chosen on those that it held out.
 
-    The held-out flights are those of early stopping; without any, all flights are used.
-    options: arguments of `training.train_paper` (epochs, sparsity, df_lambda, progress, ...).
+    The held-out flights are those of early stopping; without any, all flights are used. physical_filter: drop edges
+    without an FR-CFAR alert. options: arguments of `training.train_paper`: progress, command, and the fields of
+    `PaperRecipe` (epochs, sparsity, df_lambda, ...).
+    Raises as `train_paper` does.
     """
     from airtouch.detector.paper.training import train_paper
 
@@ -100,7 +101,7 @@ def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = T
 
 
 def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
-    """The model with decoding settings and lag for the best timed F1 over the flights."""
+    """The model with the decoding settings and the lag of the best timed F1 over the flights (`tuning.timed_f1`)."""
     inputs: list[DecodingInputs] = []
     for log in flights:
         features = flight_features(log)
@@ -146,7 +147,7 @@ def lag_s(model: Model | None) -> float:
 
 
 def parameters(model: Model | None) -> dict[str, Any]:
-    """Size, cost, pipeline and decoding settings, and how the network was trained."""
+    """Numbers by name, for reports: size, cost, pipeline and decoding settings, and how the network was trained."""
     model = model or load(None)
     metadata = model.metadata
     size = {"parameter_bytes": parameter_bytes(model.int8), "state_bytes": arena_bytes(model.int8),
@@ -157,7 +158,10 @@ def parameters(model: Model | None) -> dict[str, Any]:
 
 
 def decoding(model: Model) -> tuple[Parameters, bool]:
-    """The model's settings, and whether its physical filter is on."""
+    """The model's settings, and whether its physical filter is on.
+
+    Raises AirTouchError for settings of another version.
+    """
     try:
         return Parameters(**model.metadata["parameters"]), bool(model.metadata.get("physical_filter", True))
     except (KeyError, TypeError):
@@ -165,6 +169,6 @@ def decoding(model: Model) -> tuple[Parameters, bool]:
 
 
 def signals(features: Features) -> dict[str, np.ndarray]:
-    """What reports plot."""
+    """The features that reports plot, by name: (n,) or (n, k) arrays of `Features`."""
     names = ("channels", "band_power", "fused", "force", "cfar_power", "threshold", "alert")
     return {name: getattr(features, name) for name in names}

@@ -25,6 +25,7 @@ def render(model: Model) -> dict[str, str]:
 
 
 def _render_window(model: Model) -> dict[str, str]:
+    """File name -> text, for a model of z-scored windows."""
     inputs, outputs = golden_vectors(model.int8)
     what = "Made-up quantised windows and the outputs that every build must give, to the last bit."
     return {
@@ -138,7 +139,7 @@ def _decoding(model: Model, prefix: str) -> str:
 def _model_source(network: Int8Network, header: str, variable: str) -> str:
     """The C source of a network with its arrays. variable: its name in C."""
     names = iter(WEIGHTED)
-    parts = [layer(next(names) if one.weighted else "", one) for one in network.layers]
+    parts = [layer(next(names) if of.weighted else "", of) for of in network.layers]
     arrays = [text for text, _ in parts if text]
     rows = [f"    {initialiser}," for _, initialiser in parts]
     first, last = network.layers[0], network.layers[-1]

@@ -1,4 +1,4 @@
-"""What the paper's detector sees of a flight: fused features, disturbance force and FR-CFAR."""
+"""The features of the paper's detector: nine channels to fused features, disturbance force and FR-CFAR."""
 
 from dataclasses import dataclass
 
@@ -41,9 +41,11 @@ class Features:
 
 def pipeline(log: FlightLog, parameters: Parameters = DEFAULT, probability: np.ndarray | None = None, *,
              vehicle: Vehicle | None = None, physical_filter: bool = True) -> EdgeEvents:
-    """One flight through the C pipeline; probability (n,) is the network's, None for none yet.
+    """Features, force, alerts and edges of one flight of n samples, by the C pipeline.
 
+    probability: (n,) P(over a platform) by the network; None before it ran, and then without edges.
     vehicle: mass and thrust curve for the disturbance force, the flow-deck Crazyflie by default.
+    physical_filter: drop edges without an FR-CFAR alert.
     Raises AirTouchError that names the columns which the log lacks.
     """
     return kernels.edge_pipeline(
@@ -54,7 +56,7 @@ def pipeline(log: FlightLog, parameters: Parameters = DEFAULT, probability: np.n
 
 def flight_features(log: FlightLog, vehicle: Vehicle | None = None,
                     parameters: Parameters = DEFAULT) -> Features:
-    """Every signal of the paper's sections 4 and 5.1 for one flight, in one call of `pipeline`."""
+    """The features of one flight (the paper's sections 4 and 5.1). Arguments and errors as those of `pipeline`."""
     events = pipeline(log, parameters, vehicle=vehicle)
     return Features(nine_channels(log), events.band_power, events.features, events.force,
                     events.cfar_power, events.threshold, events.alert, events.armed)

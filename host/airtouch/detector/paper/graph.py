@@ -20,7 +20,10 @@ INPUT_SHAPE: Shape = (100, 3, 1)  #: samples, sensors, one value
 
 
 class Row(NamedTuple):
-    """A line of the list. kernel: rows and columns that it reads. outputs: channels, 0 for as many as it reads."""
+    """One layer as it is written in LAYERS, before its shapes are known.
+
+    kernel: rows and columns that an output reads. outputs: channels; 0 for as many as the layer before has.
+    """
 
     name: str
     operation: LayerKind

@@ -1,4 +1,4 @@
-"""A trained network as one `.npz` file: float and int8 weights, scales, and how they came about.
+"""A trained model of `paper` or `paper-stream` as one `.npz` file: float and int8 weights, scales, metadata.
 
 Arrays: "<layer>.kernel" and "<layer>.bias" float32 as Keras lays them out, "int8.<layer>.weights",
 "int8.<layer>.bias", "int8.<layer>.weight_scale", "int8.scale" and "int8.zero_point" (input, then
@@ -61,6 +61,7 @@ class Model:
         return total.hexdigest()
 
     def _scale_arrays(self) -> dict[str, np.ndarray]:
+        """The arrays "scale..." of the file; none where each window is z-scored by itself."""
         return {"scale.mean": self.scale.mean, "scale.deviation": self.scale.deviation} if self.scale else {}
 
     def to_bytes(self) -> bytes:
@@ -116,6 +117,7 @@ def parse(data: bytes, source: str) -> Model:
 
 
 def _scale(arrays: dict[str, np.ndarray], source: str) -> FixedScale:
+    """The inputs' scale; AirTouchError unless its deviations are positive."""
     scale = FixedScale(arrays["scale.mean"], arrays["scale.deviation"])
     if not (scale.deviation > 0).all():
         raise AirTouchError(f"{source}: the inputs' scale must be positive; {archive.REMEDY}")
@@ -123,6 +125,7 @@ def _scale(arrays: dict[str, np.ndarray], source: str) -> FixedScale:
 
 
 def _check_int8(arrays: dict[str, np.ndarray], source: str) -> None:
+    """Raise AirTouchError for scales that are not positive, and for zero points that int8 does not hold."""
     if any((arrays[name] <= 0).any() for name in arrays if name.endswith("scale")):
         raise AirTouchError(f"{source}: int8 scales must be positive; {archive.REMEDY}")
     if np.abs(arrays["zero_point"].astype(np.int64)).max() > 128 or arrays["zero_point"].max() > 127:

@@ -2,10 +2,9 @@
 
 A step computes one row of each layer (`gap8/kernels/rolling_int8.h`).
 
-The paper z-scores each window by itself, so that every sample computes all of it anew. On a fixed scale of
-the features' logarithm a window's answer follows from what was computed before, and nine in ten
-products fall away; most of the rest does with pruning. What it answers is, to the last bit, what the same
-network gives over windows.
+The paper z-scores each window by itself, so the network computes all of it anew for every sample. On a fixed scale of
+the features' logarithm most rows of a window were computed for the windows before, and nine in ten products are
+saved; pruning saves most of the rest. The answers equal those of the same network over whole windows, to the last bit.
 """
 
 from collections.abc import Sequence
@@ -23,9 +22,9 @@ from airtouch.kernels.rolling import rolling_size
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.networks.int8_network import rolling_multiplications
 
-STRIDE = 4  #: samples to one answer: what the two pools make together, so that no row is computed in vain
-#: zeros of the first dense layer and of the second convolution: a step within 8 k instructions of a RISC-V core
-#: (host/docs/gap8-network.md)
+STRIDE = 4  #: samples between two answers: the two pools halve the rows each, so that no row is computed in vain
+#: shares of zeros in the first dense layer and in the second convolution: with them a sample takes less than 8,000
+#: instructions of a RISC-V core in the mean (host/docs/gap8-network.md)
 SPARSITY, CONV_SPARSITY = 0.96, 0.8
 
 
@@ -41,7 +40,10 @@ def run_float(log: FlightLog, model: Model) -> Trace:
 
 def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, stride: int = STRIDE,
         sparsity: float = SPARSITY, conv_sparsity: float = CONV_SPARSITY, **options: Any) -> Model:
-    """Train, prune and quantise on a fixed scale, then choose decoding and lag as `paper.fit` does."""
+    """A model as `paper.fit` trains it, with inputs on a fixed scale and more zeros.
+
+    stride: samples between two answers. sparsity, conv_sparsity: shares of zeros. options: as those of `paper.fit`.
+    """
     from airtouch.detector.paper.training import train_paper
 
     model = train_paper(flights, seed=seed, fixed_scale=True, sparsity=sparsity, conv_sparsity=conv_sparsity, **options)
@@ -72,7 +74,7 @@ def lag_s(model: Model | None) -> float:
 
 
 def parameters(model: Model | None) -> dict[str, Any]:
-    """As `paper.parameters`, with the cost of a sample instead of a window's."""
+    """Numbers by name, as `paper.parameters`, with the cost of a sample instead of a window's."""
     model = model or load(None)
     stride = paper.stride(model)
     return {**paper.parameters(model), "stride": stride, "conv_sparsity": model.metadata.get("conv_sparsity"),

@@ -4,6 +4,7 @@ import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,18 +12,16 @@ from airtouch import __version__, logs
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.paper import network, normalisation, quantisation
 from airtouch.detector.paper.features import Features, feature_windows, flight_features
-from airtouch.detector.paper.losses import DEFAULT_LAMBDA, edge_loss
+from airtouch.detector.paper.losses import edge_loss
 from airtouch.detector.paper.model import Model
-from airtouch.detector.shared import pruning
+from airtouch.detector.paper.recipe import PaperRecipe
 from airtouch.detector.shared.tensorflow import use_tensorflow
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import infer_float, infer_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 
-EPOCHS = 10  #: the 200 of the paper overfit once flights are held out (host/docs/train.md)
 BATCH = 128  #: windows a batch; 32 in the paper
-SPARSITY = 0.8  #: fraction of zeros in the first dense layer; its cost: host/docs/ablations.md
 HELD_OUT = 0.15  #: fraction of the flights held out for early stopping; no source: round number
 PRUNED_BY = 0.6  #: fraction of the steps after which the pruning masks are fixed; no source: leaves time to recover
 PATIENCE = 3  #: epochs without a lower loss on the held-out flights, until training stops; no source: round number
@@ -53,34 +52,23 @@ class Windows:
         return Windows(self.x[chosen], self.over[chosen], self.alert[chosen], self.flight[chosen])
 
 
-def train_paper(
-    flights: Sequence[FlightLog],
-    *,
-    seed: int = 0,
-    epochs: int = EPOCHS,
-    sparsity: float = SPARSITY,
-    block: int = pruning.BLOCK,
-    df_lambda: float = DEFAULT_LAMBDA,
-    conv_sparsity: float = 0.0,
-    fixed_scale: bool = False,
-    progress: Progress | None = None,
-    command: str = "airtouch.detector.paper.training.train_paper",
-) -> Model:
-    """Train, prune and quantise; the same arguments give the same bits on one machine.
+def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe | None = None, *,
+                progress: Progress | None = None, command: str = "airtouch.detector.paper.training.train_paper",
+                **changes: Any) -> Model:
+    """A model trained on the flights, pruned and quantised; the same arguments give the same bits on one machine.
 
-    flights: with down range, for the true edges. sparsity: share of zeros in the first dense
-    layer, in blocks of `block` inputs (4, or 1 for single weights); conv_sparsity: in the second
-    convolution. df_lambda: weight of the disturbance-force loss. fixed_scale: inputs on a fixed scale
-    instead of z-scored windows, so that the network can roll over samples. Training stops early on
-    flights held out by seed.
+    flights: with down range, for the true edges; some of them, drawn by the seed, are held out to stop early
+    (`held_out`). recipe: `PaperRecipe()` for None; changes: fields of it, by name. progress: called as the training
+    goes; None for silence. command: what the model's metadata names as its origin.
+    The decoding settings and the lag are not chosen yet (`detector.tune`).
     Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
     """
-    _check(epochs, sparsity, block, df_lambda, conv_sparsity)
+    recipe = replace(recipe or PaperRecipe(), **changes)
     use_tensorflow(seed)
     report = progress or (lambda *_: None)
     features = features_of(flights, report)
     scale = None
-    if fixed_scale:
+    if recipe.fixed_scale:
         scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
     windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features, strict=True))])
     validation = held_out(len(flights), seed)
@@ -88,13 +76,12 @@ def train_paper(
     if not in_training.any() or len(np.unique(windows.over[in_training])) < 2:
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
                             "give more flights")
-    weights, ran = fit_windows(windows.select(in_training), windows.select(~in_training), epochs, sparsity, block,
-                               df_lambda, report, conv_sparsity)
+    weights, epochs_run = fit_windows(windows.select(in_training), windows.select(~in_training), recipe, report)
     int8, tflite = quantisation.quantise(weights, windows.x[in_training])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
-        "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block,
-        "lambda": df_lambda, "conv_sparsity": conv_sparsity,
+        "seed": seed, "epochs": recipe.epochs, "epochs_run": epochs_run, "sparsity": recipe.sparsity,
+        "block": recipe.block, "lambda": recipe.df_lambda, "conv_sparsity": recipe.conv_sparsity,
         "flights": [os.path.basename(log.source) for log in flights],
         "held_out": [os.path.basename(flights[i].source) for i in validation], "data_sha256": data_hash(windows),
     }, scale)
@@ -179,33 +166,32 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
     return stop + (start - stop) * 0.5 * (1.0 + float(np.cos(np.pi * part)))
 
 
-def fit_windows(train: Windows, validation: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-                progress: Progress, conv_sparsity: float = 0.0) -> tuple[dict[str, np.ndarray], int]:
-    """The trained weights and the number of epochs."""
-    model, losses = fit_keras(train, validation, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
+def fit_windows(train: Windows, validation: Windows, recipe: PaperRecipe,
+                progress: Progress) -> tuple[dict[str, np.ndarray], int]:
+    """The trained weights, and the number of epochs until the training stopped."""
+    model, losses = fit_keras(train, validation, recipe, progress)
     return network.weights_of_keras(model), len(losses)
 
 
-def fit_keras(train: Windows, validation: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-              progress: Progress, conv_sparsity: float = 0.0):
+def fit_keras(train: Windows, validation: Windows, recipe: PaperRecipe, progress: Progress):
     """The trained Keras model, and the loss on the held-out windows after each epoch.
 
-    Without held-out windows it is the loss on the training windows. With sparsity 0 windows may have any length.
+    Without held-out windows it is the loss on the training windows. Without sparsity windows may have any length.
     """
     import keras
 
     train, validation = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, validation))
-    batches = max(len(train.x) // BATCH, 1)
+    batches, epochs = max(len(train.x) // BATCH, 1), recipe.epochs
     pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
     constraints, callbacks = {}, []
-    shares = {network.PRUNED: sparsity, network.PRUNED_CONV: conv_sparsity}
+    shares = {network.PRUNED: recipe.sparsity, network.PRUNED_CONV: recipe.conv_sparsity}
     shares = {name: share for name, share in shares.items() if share > 0}
     if shares:
-        constraints, schedule = network.pruning_of(shares, batches * pruned_epochs, block)
+        constraints, schedule = network.pruning_of(shares, batches * pruned_epochs, recipe.block)
         callbacks = [schedule]
     model = network.build_keras(constraints, train.x.shape[1])
     rate = _rate_table(batches * epochs)
-    model.compile(keras.optimizers.Adam(rate), loss=edge_loss(df_lambda, class_weights(train.over)),
+    model.compile(keras.optimizers.Adam(rate), loss=edge_loss(recipe.df_lambda, class_weights(train.over)),
                   steps_per_execution=min(BATCHES_A_CALL, batches))
     stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
                                              start_from_epoch=pruned_epochs)
@@ -243,16 +229,3 @@ def _batches(windows: Windows, shuffle: bool):
         order = order.shuffle(len(windows.x), reshuffle_each_iteration=True)
     order = order.batch(BATCH, drop_remainder=shuffle and len(windows.x) >= BATCH)
     return order.map(lambda i: (tf.gather(x, i), tf.gather(target, i))).prefetch(4)
-
-
-def _check(epochs: int, sparsity: float, block: int, df_lambda: float, conv_sparsity: float) -> None:
-    """Raise AirTouchError for settings out of range."""
-    if epochs < 1:
-        raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
-    for share in (sparsity, conv_sparsity):
-        if not 0.0 <= share < 1.0:
-            raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {share}")
-    if block not in (1, pruning.BLOCK):
-        raise AirTouchError(f"training: blocks of 1 or {pruning.BLOCK} weights, not {block}")
-    if not (np.isfinite(df_lambda) and df_lambda >= 0):
-        raise AirTouchError(f"training: lambda must be 0 or more, not {df_lambda}")

@@ -14,7 +14,7 @@ from airtouch.detector.paper.detector import choose_decoding
 from airtouch.detector.paper.features import Features, feature_windows, flight_features
 from airtouch.detector.paper.losses import DEFAULT_LAMBDA
 from airtouch.detector.paper.network import float_layers
-from airtouch.detector.shared.pruning import BLOCK
+from airtouch.detector.paper.recipe import EPOCHS, PaperRecipe
 from airtouch.detector.shared.tensorflow import use_tensorflow
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
@@ -27,11 +27,11 @@ CONVERGED = 0.01  #: share above the lowest held-out loss that counts as converg
 
 @dataclass(frozen=True)
 class Variant:
-    """A `Detector` (see registry): the paper's, unpruned, with these choices.
+    """A `registry.Detector`: the paper's, unpruned, with these choices; the defaults are the paper's own.
 
     df_lambda: weight of the disturbance-force loss. band_window: STFT window, samples. centred: take each
     band power half a window early, as a plot would; it looks into the future and cannot fly.
-    rows: network input, samples.
+    rows: network input, samples. physical_filter: drop edges without an FR-CFAR alert.
     """
 
     df_lambda: float = DEFAULT_LAMBDA
@@ -40,7 +40,7 @@ class Variant:
     rows: int = DEFAULT.feature_window
     physical_filter: bool = True
 
-    def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = training.EPOCHS) -> "VariantModel":
+    def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = EPOCHS) -> "VariantModel":
         """Weights from the training flights, decoding and lag from those held out among them."""
         use_tensorflow(seed)
         parts = [training.windows_of(log, self._features(log), index, rows=self.rows)
@@ -48,8 +48,8 @@ class Variant:
         windows = training.join(parts)
         validation = training.held_out(len(flights), seed)
         used = ~np.isin(windows.flight, validation)
-        network, losses = training.fit_keras(windows.select(used), windows.select(~used), epochs, 0.0, BLOCK,
-                                             self.df_lambda, lambda *_: None)
+        recipe = PaperRecipe(epochs, sparsity=0.0, df_lambda=self.df_lambda)
+        network, losses = training.fit_keras(windows.select(used), windows.select(~used), recipe, lambda *_: None)
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
         unseen = [flights[i] for i in validation] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
@@ -65,7 +65,7 @@ class Variant:
         return Trace(probability, decode(probability, armed, alert if self.physical_filter else None, model.settings))
 
     def load(self, path: Path | None) -> "VariantModel":
-        """Variants are not saved."""
+        """Raises AirTouchError: the model of a variant is not saved."""
         raise AirTouchError(f"{path}: a variant's model is not saved")
 
     def lag_s(self, model: "VariantModel") -> float:
@@ -116,7 +116,7 @@ def random_windows(flights: Sequence[FlightLog], *, seed: int = 0, epochs: int =
     windows = training.training_windows(flights, lambda *_: None)
     test = np.random.default_rng(seed).uniform(size=len(windows.x)) < share
     nothing = windows.select(np.zeros(len(test), bool))  # to stop early on: the paper trains to the end
-    weights, _ = training.fit_windows(windows.select(~test), nothing, epochs, 0.0, BLOCK, DEFAULT_LAMBDA,
+    weights, _ = training.fit_windows(windows.select(~test), nothing, PaperRecipe(epochs, sparsity=0.0),
                                       lambda *_: None)
     logits = infer_float(float_layers(weights), windows.x[test])
     predicted, over = logits[:, 1] > logits[:, 0], windows.over[test] > 0.5

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.reference.networks.int8_network import Int8Layer
 
-LARGEST = 8 << 20  #: bytes of the file, and of all its arrays
+LARGEST = 8 << 20  #: bytes of the file, and of all its arrays together; chosen, far above any model
 REMEDY = "train it again with `airtouch train`"
 
 Shapes = Mapping[str, tuple[type, tuple[int, ...]]]  #: dtype and shape of each array that must be there
@@ -42,7 +42,7 @@ def read(path: Path) -> bytes:
 
 
 def parse(data: bytes, source: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and metadata of a file's content; AirTouchError for anything that is not one."""
+    """(arrays, metadata) of a file's content. Raises AirTouchError for anything that is not a model file."""
     not_one = AirTouchError(f"{source}: not a model file (.npz written by `airtouch train`); {REMEDY}")
     if not data.startswith(b"PK"):
         raise not_one
@@ -68,7 +68,7 @@ def parse(data: bytes, source: str) -> tuple[dict[str, np.ndarray], dict[str, An
 
 
 def check_kind(metadata: dict[str, Any], expected: Mapping[str, Any], source: str) -> None:
-    """Take `expected` keys out of the metadata; AirTouchError where one is another value."""
+    """Remove the `expected` keys from the metadata; raises AirTouchError where one has another value."""
     for key, value in expected.items():
         actual = metadata.pop(key, None)
         if actual != value:
@@ -76,7 +76,7 @@ def check_kind(metadata: dict[str, Any], expected: Mapping[str, Any], source: st
 
 
 def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) -> None:
-    """AirTouchError for an array that is missing, of another shape or type, or not finite."""
+    """Raise AirTouchError for an array that is missing, of another shape or type, or not finite."""
     for name, (dtype, shape) in shapes.items():
         values = arrays.get(name)
         if values is None:
@@ -91,8 +91,10 @@ def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) 
 
 
 def check_range(layers: Sequence[Int8Layer], source: str) -> None:
-    """No accumulator may leave what the kernels' rounding takes, 2^28, whatever the input; AirTouchError where one may.
-    An output whose weights pruning took is a constant; its bias may fill int32, its scale must be below one."""
+    """Raise AirTouchError where an accumulator may exceed 2^28, the limit of the kernels' rounding, for some input.
+
+    An output whose weights are all pruned is constant: its bias may fill int32, its scale must be below one.
+    """
     for layer in layers:
         if not layer.weighted:
             continue

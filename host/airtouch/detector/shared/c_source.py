@@ -34,7 +34,7 @@ def layer(name: str, of: Int8Layer) -> tuple[str, str]:
 
 
 def array(kind: str, name: str, values: np.ndarray, qualifiers: str = f"static {CONST}") -> str:
-    """An array with its values, aligned to four bytes."""
+    """The C definition of an array of this element type (`kind`), aligned to four bytes."""
     head = f"{qualifiers} {kind} {name}[{max(values.size, 1)}]"
     lines, line = [], "   "
     for value in values.tolist() or [0]:  # C has no empty array
@@ -46,7 +46,10 @@ def array(kind: str, name: str, values: np.ndarray, qualifiers: str = f"static {
 
 
 def golden_header(what: str, prefix: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
-    """Declarations of golden inputs (n, ...) and outputs (m, ...), with their hash."""
+    """A header that declares golden inputs (n, ...) and outputs (m, ...), with their hash.
+
+    what: the comment on its first line. prefix: of its constants. names: of the two arrays.
+    """
     digest = hashlib.sha256(inputs.tobytes() + outputs.tobytes()).hexdigest()
     return f"""// {what}
 #pragma once
@@ -64,7 +67,7 @@ extern const int8_t {names[1]}[{outputs.size}];
 
 
 def golden_source(header: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
-    """Their definitions."""
+    """Definitions of what `golden_header` declares; `header` is its file's name."""
     arrays = (array("int8_t", name, values.ravel(), "const")
               for name, values in zip(names, (inputs, outputs), strict=True))
     return (f'#include "{header}"\n\n' + "".join(arrays)).rstrip("\n") + "\n"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-BLOCK = 4  #: neighbouring inputs that live or die together
+BLOCK = 4  #: neighbouring inputs that are pruned together; the C kernels skip such blocks
 
 
 def polynomial_sparsity(step: float, steps: float, initial: float, final: float, power: float = 3.0) -> float:

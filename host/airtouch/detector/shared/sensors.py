@@ -15,17 +15,21 @@ SENSORS = (ACCELERATION, RATES, MOTORS)
 CHANNELS_OF = {sensor: tuple(i for i, channel in enumerate(CHANNEL_TABLE) if sensor in channel.sensors)
                for sensor in SENSORS}
 
-GRAVITY_MPS2 = 9.81  #: what a missing acceleration reads: rest
-FLYING_PWM = 40000.0  #: what missing motors read in the air; their channels are silent, so only "in the air" counts
+GRAVITY_MPS2 = 9.81  #: m/s^2, vertical acceleration in place of a missing one: that of rest
+#: PWM in the air in place of missing motors. Chosen: any value above `arm_pwm` does, because their channels are silent
+FLYING_PWM = 40000.0
 #: rad/s, rms change of the rates from sample to sample over FLYING_WINDOW samples, above which the drone flies: of
 #: 49,979 samples on the ground none reach 0.0127, of 431,415 in the air none fall below 0.0184 (the authors' flights).
 FLYING_CHANGE_RADPS = 0.015
-FLYING_WINDOW = 50  #: samples, half a second
+FLYING_WINDOW = 50  #: samples, half a second; chosen
 
 
 @dataclass(frozen=True)
 class Signals:
-    """What the kernels take: acc (n, 3) m/s^2, level axes; gyro (n, 3) rad/s; pwm (n, 4); and the missing sensors."""
+    """The kernels' inputs from a log of n samples.
+
+    acc: (n, 3) m/s^2, level axes. gyro: (n, 3) rad/s. pwm: (n, 4). missing: sensors, of SENSORS, that the log lacks.
+    """
 
     acc: np.ndarray
     gyro: np.ndarray
@@ -34,7 +38,7 @@ class Signals:
 
 
 def required_columns(log: FlightLog, sensor: str) -> tuple[str, ...]:
-    """The columns of a sensor, as this log would have them."""
+    """Names of the columns of a sensor: accelerations in world axes where the log holds those, else in body axes."""
     acceleration = ACC_WORLD if log.has(*ACC_WORLD) else ACC
     return {ACCELERATION: acceleration, RATES: GYRO, MOTORS: PWM}[sensor]
 

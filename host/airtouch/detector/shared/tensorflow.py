@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError
 
 
 def use_tensorflow(seed: int) -> None:
-    """Import TensorFlow, quietly, with every source of chance fixed."""
+    """Import TensorFlow, quietly, and fix every source of chance. Raises AirTouchError where it is not installed."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     os.environ.setdefault("TF_ENABLE_ONEDNN_OPTS", "0")  # one order of summation
     os.environ.setdefault("CUDA_VISIBLE_DEVICES", "-1")  # one machine, one result

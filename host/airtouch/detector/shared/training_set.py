@@ -7,7 +7,7 @@ from typing import Any
 
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 
-DIGITS = 16  #: of a flight's hash
+DIGITS = 16  #: hexadecimal digits of a flight's hash: 64 bits
 
 
 def of(flights: Sequence[FlightLog], start: Any = None) -> dict[str, Any]:
@@ -19,10 +19,10 @@ def of(flights: Sequence[FlightLog], start: Any = None) -> dict[str, Any]:
 
 
 def flight_hash(log: FlightLog) -> str:
-    """Hexadecimal digits that are the same for the same motion, whatever the file's name or format.
+    """Hash of a flight's motion, DIGITS hexadecimal digits: the same whatever the file's name or format.
 
-    Over rates, motors and, where neither is logged, accelerations: six digits of each, so that a log written anew still
-    counts as the same.
+    It covers rates and motors, or accelerations where neither is logged, to six digits each: a log that is written
+    anew has the same hash.
     """
     names = [name for name in (*GYRO, *PWM) if log.has(name)] or [n for n in (*ACC_WORLD, *ACC) if log.has(n)]
     total = hashlib.sha256()

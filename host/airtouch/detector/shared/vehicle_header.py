@@ -13,7 +13,7 @@ SHIPPED = ("crazyflie-2.1", "crazyflie-2.1-flow", "crazyflie-2.1-brushless")
 
 
 def render(vehicle: Vehicle) -> str:
-    """The header's text.
+    """The text of the header.
 
     Raises AirTouchError where the vehicle has no platform, or a name that cannot be a file's.
     """
@@ -50,7 +50,7 @@ static const airtouchVehicle_t airtouchVehicle = {{
 
 
 def thrust_text(vehicle: Vehicle, arm_pwm: float) -> str:
-    """What a network depends on of a vehicle: two are alike for it where these texts are equal."""
+    """The settings of a vehicle on which a network depends, as text; it flies on vehicles with the same text."""
     thrust = " ".join(float_literal(c) for c in vehicle.thrust_of_pwm_n)
     return f"thrust {thrust}, gravity {float_literal(vehicle.gravity_mps2)}, armed {float_literal(arm_pwm)}"
 

@@ -11,9 +11,11 @@ from airtouch.gap.evidence.fit import SETTLED, FittedTerms, fit, judge, strength
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.naming.judging import at_bound
 from airtouch.gap.naming.selection import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
+from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
@@ -46,6 +48,18 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
     order = [s.name for s in selection.named]
     return sorted(effects, key=lambda e: order.index(e.name) if e.name in order else len(order))
+
+
+def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
+    """A note on each fitted parameter that lies at the end of its range, where the model stretches."""
+    notes = []
+    for effect in effects:
+        term = term_of(effect)
+        ends = at_bound(term, term.among_all(term.scaled(term.values)))
+        notes += [f"{effect.name}: {name} is at the end of its range ({effect.parameters[name].value:.4g}): the true"
+                  " one lies beyond it, or something else is behind the gap"
+                  for name, end in zip(term.signature.free, ends, strict=True) if end]
+    return notes
 
 
 def _named(term: Term, x: np.ndarray, covariance: np.ndarray, readings: Mapping[str, Reading]) -> NamedEffect:

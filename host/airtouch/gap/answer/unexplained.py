@@ -10,10 +10,11 @@ from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
-from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.where import summary
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
@@ -36,7 +37,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     near = tuple(nearest(selection))
     out = []
     for cell in chosen:
-        ratios = _in_phase([(f, ratios_of_blocks(study, f, gap, cell)) for f, gap in gaps], cell.phase)
+        ratios = _in_phase([(f, ratios_of_blocks(f, gap, cell)) for f, gap in gaps], cell.phase)
         if not ratios:
             continue
         flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
@@ -49,18 +50,17 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     return out
 
 
-def ratios_of_blocks(study: Study, flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
-    """Rms of a cell's channel and band over its floor, in each block (blocks,) in the air.
+def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
+    """Rms of a cell's channel and band over the cell's floor, in each block (blocks,) in the air.
 
     gap (n, COUNT): the flight, measured minus modelled.
     """
-    begin, c = starts(flight, AIR), COLUMN[cell.channel]
+    begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
     if not len(begin):
         return np.zeros(0)
-    f = frequencies(AIR)
-    band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
-    power = (np.abs(blocks(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
-    return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), LEAST_POWER))
+    density = np.abs(blocks(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
+    gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
+    return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
 
 
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:

@@ -31,7 +31,9 @@ def _where(diagnosis: Diagnosis) -> str:
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
-    return (f"The gap lies mostly in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
+    most = summary.headline(cells) or cell  # the effects named may close another
+    share = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
+    return (f"{share} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
             f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 
@@ -78,10 +80,11 @@ def _how_far(diagnosis: Diagnosis) -> str:
 def _cells_in_words(cells: Sequence[Cell]) -> str:
     """How many cells still stand out with the effects named, and how many got worse; "" where neither."""
     open_cells, worse_cells = summary.remaining(cells), summary.worse(cells)
-    over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
+    over, still = (sum(c.regime == "all" and summary.stands_out(c) for c in some) for some in (cells, open_cells))
     out = ""
     if open_cells:
-        out = f"; {len(open_cells)} of {over} cells still stand out, mostly {_after_in_words(open_cells[0])}"
+        others = f", beside {len(open_cells) - still} that did not before" if len(open_cells) > still else ""
+        out = f"; {still} of {over} cells still stand out{others}, mostly {_after_in_words(open_cells[0])}"
     return out + (f", and {len(worse_cells)} got worse" if worse_cells else "")
 
 

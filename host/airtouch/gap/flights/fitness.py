@@ -7,14 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.checks.channel_faults import stuck_intervals
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM, RANGES, FlightLog
+from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import PLATFORM_STEP_M
 
 LEAST_AIR_S = 3.0  #: seconds in the air that a flight needs to be diagnosed; chosen
 LARGEST = 1e5  #: magnitude above which a value is none, in any column's unit; chosen, beyond what any sensor says
 PWM_RANGE = (-1.0, 66000.0)  #: of a motor command, which has 16 bits: 0 to 65535; its margins are chosen
+READ = frozenset({*ACC, *GYRO, "vbat_V"})  #: channels whose standing still is told; a motor may stand at its limit
 LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the column is left out; chosen
 
 
@@ -36,7 +39,22 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
                                 "compares what the motors were told with what the IMU felt")
     if len(log) < 2:
         raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    notes += [f"{Path(name).name}: {channel} does not change in {share:.0%} of the flight"
+              for channel, share in _stuck_shares(log).items()]
     return log, tuple(notes)
+
+
+def _stuck_shares(log: FlightLog) -> dict[str, float]:
+    """Share of the samples in the air in which a channel that the diagnosis reads is stuck, for those that are."""
+    try:
+        flying = airborne(log)
+    except AirTouchError:  # no motors, no height
+        return {}
+    out: dict[str, float] = {}
+    for channel, start, stop in stuck_intervals(log, flying):
+        if channel in READ:
+            out[channel] = out.get(channel, 0.0) + float(flying[start:stop].sum() / max(flying.sum(), 1))
+    return out
 
 
 def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
@@ -50,6 +68,11 @@ def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
         else:
             columns[key] = np.where(good, values, np.nan)
     return FlightLog(columns, log.meta), unfit
+
+
+def log_kind(log: FlightLog) -> str:
+    """Format of a log, or of the log that it was converted from, up to its first "-": the authors' have several."""
+    return str(log.meta.get("origin_format") or log.meta.get("format", "")).split("-")[0]
 
 
 def stamped_at_arrival(log: FlightLog) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.rounds import round_of
@@ -28,7 +29,7 @@ from airtouch.gap.signatures.term import Term
 FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more adds time, and the table knows the rest
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
-#: formats of logs, up to the first "-", that only a vehicle or its ground station writes, never a simulator
+#: kinds of logs that only a vehicle or its ground station writes, never a simulator
 RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
 
 
@@ -67,8 +68,8 @@ def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
 
 
 def is_recorded(flight: Flight) -> bool:
-    """Whether the format of the flight's log, or of the log that it was converted from, is one of RECORDERS."""
-    return any(str(flight.log.meta.get(key, "")).split("-")[0] in RECORDERS for key in ("format", "origin_format"))
+    """Whether the flight's log is of one of the kinds RECORDERS."""
+    return log_kind(flight.log) in RECORDERS
 
 
 def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:

@@ -9,9 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
-from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, TORQUE, residual
+from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signals.study import Study
 from airtouch.robust import deviation
@@ -19,7 +20,6 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 TRIM = slice(0, TORQUE.stop)  #: channels of force and torque, m/s^2 and rad/s^2
-LIFT = 2  #: channel of the force along the thrust
 FEWEST = 3  #: flights of which one can be unlike the others
 #: robust standard deviations off the others' median beyond which a flight's trim is odd; chosen
 ODD = 6.0
@@ -45,12 +45,19 @@ def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -
         return list(flights), []
     trim = trims(flights, vehicle)
     median = np.median(trim, axis=0)
-    unlike = (np.abs(trim - median) > np.maximum(ODD * deviation(trim), far)).any(axis=1)
+    distance = (trim - median) / np.maximum(ODD * deviation(trim), far)
+    unlike = (np.abs(distance) > 1.0).any(axis=1)
     if unlike.sum() > len(flights) // MOST_LEFT_OUT:
         return list(flights), []
-    notes = [f"{f.name}: declared nominal, yet unlike the others (lift {t[LIFT] - median[LIFT]:+.2g} m/s^2); left out"
-             for f, t, out in zip(flights, trim, unlike, strict=True) if out]
+    notes = [f"{f.name}: declared nominal, yet unlike the others ({_farthest(t - median, d)}); left out"
+             for f, t, d, out in zip(flights, trim, distance, unlike, strict=True) if out]
     return [f for f, out in zip(flights, unlike, strict=True) if not out], notes
+
+
+def _farthest(offset: np.ndarray, distance: np.ndarray) -> str:
+    """The channel of the largest distance (6,) in words, with its offset (6,), m/s^2 and rad/s^2."""
+    channel = CHANNELS[TRIM][int(np.argmax(np.abs(distance)))]
+    return f"{CHANNEL_WORDS[channel.name]} {offset[COLUMN[channel.name]]:+.2g} {channel.unit}"
 
 
 def of_one_trim(vehicle: Vehicle, flights: Sequence[Flight]) -> bool:
@@ -111,6 +118,14 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
         notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs "
                      f"by {limit} {theirs:.1f}): the floor is extrapolated; fly the baseline like the test")
     return notes
+
+
+def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list[str]:
+    """A note on each flight whose log is of another kind than every baseline log."""
+    kinds = {log_kind(f.log) for f in baseline}
+    return [f"{f.name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({', '.join(sorted(kinds))}): "
+            "what differs may be the logs; take a baseline that was logged like the test"
+            for f in flights if kinds and log_kind(f.log) not in kinds]
 
 
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:

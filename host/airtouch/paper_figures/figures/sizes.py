@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.detector import paper
 from airtouch.detector.evaluation import summary
-from airtouch.detector.paper.training import SPARSITY
+from airtouch.detector.paper.recipe import SPARSITY
 from airtouch.kernels.network import infer_float, infer_int8, parameter_bytes
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNTESTABLE

@@ -29,7 +29,7 @@ ROTOR_INERTIA = 4e-8
 #: 35 (host/docs/twin-findings.md, what tells the twin from the drone)
 ACC_LOWPASS_HZ = 30.0
 #: effects that every twin has: a log's rows are at any phase of the position controller's 10 ms, another one in each
-#: flight (host/docs/twin-findings.md, phase of the log)
+#: flight (host/docs/twin-method.md, phase of the log)
 FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
 #: error of the down range to start from where the flights do not tell it; found on folds 0 to 2
 DEFAULT_NEAR = NearRange(0.0, -0.045, 0.03, 0.035)
