@@ -16,8 +16,8 @@ from airtouch.gap.signatures.term import Term
 #: share of the gap that an effect of the loop, or one that passes, must close: as much as the loop model may be wrong
 #: by, `torque_power.TORQUE_DOUBT`; chosen
 LEAST_CLOSED = 0.25
-#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing; chosen. That of an effect
-#: that passes may be as small, since the two halves of the data seldom share its seconds
+#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing; chosen. An effect that
+#: passes may leave so small a gap, as the two halves of the data seldom share its seconds
 STANDS_OUT = 1.1
 
 
