@@ -37,11 +37,11 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     from airtouch.detector.best import quantisation, training
     from airtouch.detector.shared.tensorflow import use_tensorflow
 
-    settings = (settings or FitSettings()).changed(changes)
-    examples = Examples.drawn(flights, settings, seed)
-    use_tensorflow(seed)
-    recipe, start = examples.muted(settings.recipe or Recipe()), settings.start
+    settings, recipe = (settings or FitSettings()).resolved(changes)
+    examples, start = Examples.drawn(flights, settings, seed), settings.start
+    recipe = examples.muted(recipe)
     report = settings.progress or (lambda *_: None)
+    use_tensorflow(seed)
     training_flights = _training_flights(examples, recipe, report)
     weights = training.fit(training_flights, recipe, seed, lambda done, total, note: report("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in settings.free_air],
