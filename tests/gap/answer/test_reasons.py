@@ -7,32 +7,31 @@ import pytest
 
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
-from airtouch.gap.naming.selection import Candidate, Selection
+from airtouch.gap.naming.selection import Candidate, Contradiction, NamelessGain, NominalFlights, Selection, Step
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
 TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
 
 
-def judged(name, gain, evidence=None, **more):
-    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence, **more)
+def judged(name, gain, evidence=None):
+    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
-def selection(named=("mass",), inference=False, of_distance=False, **more):
+def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, lost=(0.0, "")):
     """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing.
 
-    Of several that are named, each adds a quarter of its gain to the others.
+    Of several that are named, each adds a quarter of its gain to the others. beside: nats that the nameless model gains
+    beside them.
     """
     singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
-        steps.append(judged(n, total, share=0.25 * EVIDENCE[n]))
+        steps.append(replace(Step.of(judged(n, total)), share=0.25 * EVIDENCE[n]))
     evidence = SimpleNamespace(evidence=EVIDENCE, against=Against(4.0, 30.0, of_distance)) if inference else None
-    settings = {"nameless_alone": 150.0, "nameless_beside": 4.0, "parts": (None, None),
-                "least": dict.fromkeys(EVIDENCE, 8.0),
-                "nominal": 5, "assumed": False, "nominal_gain": 0.0, **more}
-    return Selection(singles, tuple(steps), inference=evidence, **settings)
+    return Selection(singles, tuple(steps), NamelessGain(150.0, beside), (None, None), dict.fromkeys(EVIDENCE, 8.0),
+                     NominalFlights(5, 0.0), assumed=False, contradicted=Contradiction(*lost), inference=evidence)
 
 
 def test_the_answer_needs_no_reason():
@@ -61,7 +60,7 @@ def test_by_the_relations_of_the_signals(name, words):
 
 
 def test_a_distance_is_told_as_one():
-    far = selection(inference=True, of_distance=True, nameless_beside=70.0)
+    far = selection(inference=True, of_distance=True, beside=70.0)
     assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from "
                                                "none, up to 30 may be chance")
     near = selection(inference=True, of_distance=True)
@@ -89,11 +88,11 @@ def test_effects_are_alike_by_what_each_gains_alone():
 
 
 def test_where_nothing_is_named():
-    nothing = selection((), nameless_beside=40.0)
+    nothing = selection((), beside=40.0)
     assert not nothing.explained
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
     assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 of the 150 nats that a model without names gains"
-    related = selection((), inference=True, nameless_beside=40.0)
+    related = selection((), inference=True, beside=40.0)
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")
     assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
@@ -101,9 +100,9 @@ def test_where_nothing_is_named():
 
 def test_what_is_named_and_not_enough_is_held_against_itself():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
-    left = selection(nameless_beside=70.0)
+    left = selection(beside=70.0)
     assert why_not(left, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
-    contradicted = selection(contradicted=(60.0, "yaw torque"))
+    contradicted = selection(lost=(60.0, "yaw torque"))
     assert why_not(contradicted, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
                                                         "most in yaw torque; 18 may be chance")
 

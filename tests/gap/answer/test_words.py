@@ -30,6 +30,15 @@ def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
     assert "500 to 475 times the floor" in sentences[2].replace("  ", " ")
 
 
+@pytest.mark.parametrize(("other", "begin"), [(0.2, "The gap lies mostly in lift"),
+                                              (9.0, "A part of the gap lies in lift")])
+def test_a_cell_that_the_effect_closes_is_not_called_most_of_the_gap_where_another_has_more(other, begin):
+    cells = [cell("force_z", "hover", 1.0, after=0.1), cell("torque_x", "hover", other, after=other)]
+    sentences = words.sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
+                                          headline=summary.headline(cells, True)))
+    assert sentences[0].startswith(begin) and sentences[1].startswith("Its cause is ground effect")
+
+
 def test_rotors_are_told_apart():
     weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]

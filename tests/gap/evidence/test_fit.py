@@ -37,4 +37,4 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
     both = judging.cross_validated(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
-    assert both.gained_while_certain == pytest.approx(certain - uncertain)
+    assert both.charges.gained_while_certain == pytest.approx(certain - uncertain)

@@ -23,7 +23,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
     single = selection.singles["downwash"]
     without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
-    assert single.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.choice_cost)
+    assert single.charges.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.charges.choice_cost)
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
@@ -93,4 +93,4 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
     assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
-    assert (step.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
+    assert (step.charges.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)

@@ -27,7 +27,7 @@ def test_of_variants_with_as_many_terms_the_best_is_taken():
     by_rotor = [cross_validated(on, "weak_motor", variant, None, np.log(4.0))
                 for variant in all_candidates()["weak_motor"]]
     assert best.full and best.terms[0].values["rotor"] == 3.0
-    assert best.gain == max(j.gain for j in by_rotor) and best.choice_cost == np.log(4.0)
+    assert best.gain == max(j.gain for j in by_rotor) and best.charges.choice_cost == np.log(4.0)
     assert best.evidence == best.gain, "nothing is known of nominal flights"
 
 

@@ -10,7 +10,7 @@ from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, looks, rounds
 from airtouch.gap.naming.forward import MOST_EFFECTS
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Step
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.scatter import Scatter
@@ -31,14 +31,14 @@ def test_where_nothing_is_nothing_is_found():
     assert selection.steps == () and selection.chosen is None and selection.explained
     assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least)
     assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
-    assert selection.nameless_alone == selection.nameless_beside < 12.0
+    assert selection.nameless.alone == selection.nameless.beside < 12.0
     assert not any(j.full for j in selection.singles.values())
-    assert not selection.assumed and selection.nominal_gain == 0.0
+    assert not selection.assumed and selection.nominal.nameless_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
-    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice_cost == 0.0
-    assert motor.choice_cost == pytest.approx(np.log(4.0)), "one of four rotors"
-    assert selection.singles["wind"].choice_cost == pytest.approx(np.log(2.0))
+    assert drag.gain == pytest.approx(-judging.PRICE) and drag.charges.choice_cost == 0.0
+    assert motor.charges.choice_cost == pytest.approx(np.log(4.0)), "one of four rotors"
+    assert selection.singles["wind"].charges.choice_cost == pytest.approx(np.log(2.0))
 
 
 def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
@@ -56,7 +56,7 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert 0.5 * true < np.sqrt(bias.strength.variance[2]) < 4.0 * true
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
-    assert selection.nameless_alone > 0.9 * step.gain and selection.nameless_beside < 12.0 and selection.explained
+    assert selection.nameless.alone > 0.9 * step.gain and selection.nameless.beside < 12.0 and selection.explained
     assert selection.chosen.terms == step.terms
 
 
@@ -71,7 +71,7 @@ def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_besid
     assert {t.name for t in selection.whole.terms} == {"imu_noise", "mass"} and selection.assumed
     push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
     assert [s.named for s in push_only.steps] == [False] and push_only.chosen is None and push_only.explained
-    assert push_only.nominal_gain == pytest.approx(12.0), "of a rate of 0"
+    assert push_only.nominal.nameless_gain == pytest.approx(12.0), "of a rate of 0"
 
 
 def test_of_two_that_gain_nearly_as_much_the_rarer_in_nominal_flights_is_named():
@@ -166,10 +166,10 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
         assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
         assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
     dearer = judging.cross_validated(on, "mass", mass.terms, None, 0.5)
-    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.choice_cost == 0.5
+    assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.charges.choice_cost == 0.5
     motor = candidates_of(["weak_motor"])["weak_motor"][0]
     both = judging.cross_validated(on, "weak_motor", motor, dearer, 0.25)
-    assert both.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
+    assert both.charges.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
 
@@ -190,12 +190,14 @@ def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_our
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
-    assert recorded.nameless_alone < 12.0 and exact.nameless_alone > nominal.nameless_alone + 100.0
-    other = replace(exact, nominal=6, steps=(Candidate("mass", (), 1000.0),))
-    same_models = replace(other, same_models=True)
+    assert recorded.nameless.alone < 12.0 and exact.nameless.alone > nominal.nameless.alone + 100.0
+    flights = replace(exact.nominal, count=6)
+    other = replace(exact, nominal=flights, steps=(Step("mass", (), 1000.0),))
+    same_models = replace(other, nominal=replace(flights, same_models=True))
     assert other.allowed == pytest.approx(0.1 * 1000.0) and same_models.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)
     assert replace(same_models, assumed=True).allowed == pytest.approx(0.5 * 0.2 * 1000.0)
-    no_effects = replace(same_models, steps=(), nominal_gain=20.0)
+    restless = replace(flights, same_models=True, nameless_gain=20.0)
+    no_effects = replace(other, steps=(), nominal=restless)
     assert no_effects.allowed == pytest.approx(12.0 * 7 / 5)
-    assert replace(no_effects, simulated=False).allowed == pytest.approx(20.0)
+    assert replace(no_effects, nominal=replace(restless, simulated=False)).allowed == pytest.approx(20.0)

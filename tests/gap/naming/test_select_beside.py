@@ -78,7 +78,7 @@ def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
     selection, _ = select_from([flight], ("motor_noise",))
     (step,) = selection.steps
     assert step.terms[0].values["time"] == time_s and selection.assumed
-    assert step.choice_cost == pytest.approx(np.log(3.0)), "one of three times"
+    assert step.charges.choice_cost == pytest.approx(np.log(3.0)), "one of three times"
     # four motors of their own, each with a quarter of the weight
     assert step.terms[0].values["rms"] == pytest.approx(0.6 / VEHICLE.gravity_mps2 * 2.0, rel=0.25)
 
@@ -88,12 +88,12 @@ def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
 def test_an_effect_of_the_loop_is_chosen_by_what_it_gains_in_the_commands(flying, name, parameter, value):
     selection, data = select_from(fly(1, 2, {name: {parameter: value}}), (name, "mass"), flying)
     (step,) = selection.steps
-    assert step.name == name and step.named and selection.assumed and selection.nominal == 4
+    assert step.name == name and step.named and selection.assumed and selection.nominal.count == 4
     assert step.terms[0].values[parameter] == pytest.approx(value, rel=0.2)
     assert set(selection.least.values()) == {judging.FIRST_GAIN}
     assert step.evidence == step.gain  # nothing is known of nominal flights' scatter
     free = len(step.terms[0].free)
-    price = (free - 1) * judging.PRICE + step.choice_cost
+    price = (free - 1) * judging.PRICE + step.charges.choice_cost
     assert step.gain == pytest.approx(own_gain(data, step.terms) - price, rel=0.05)
 
 
@@ -106,7 +106,7 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
     finally:
         effects.unregister("stiff_climb")
     (step,) = selection.steps
-    assert step.name == "stiff_climb" and step.full and step.choice_cost == 0.0
+    assert step.name == "stiff_climb" and step.full and step.charges.choice_cost == 0.0
     assert step.terms[0].values["factor"] == pytest.approx(2.5, rel=0.35)
 
 
@@ -184,11 +184,11 @@ def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcome
     both = judging.cross_validated(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
-    assert sure - unsure > 5.0 and late.gained_while_certain == 0.0 and both.choice_cost == 0.5
-    assert both.gained_while_certain == pytest.approx(sure - unsure)
+    assert sure - unsure > 5.0 and late.charges.gained_while_certain == 0.0 and both.charges.choice_cost == 0.5
+    assert both.charges.gained_while_certain == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
     third = judging.cross_validated(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
-    assert third.gained_while_certain == both.gained_while_certain, "paid once"
+    assert third.charges.gained_while_certain == both.charges.gained_while_certain, "paid once"
 
 
 @pytest.mark.parametrize("simulated", [True, False])

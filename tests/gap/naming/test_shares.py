@@ -6,6 +6,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging
+from airtouch.gap.naming.selection import Step
 from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
@@ -28,8 +29,8 @@ def added(on, *effects):
     steps = []
     for name, variant in effects:
         terms = all_candidates()[name][variant]
-        steps.append(judging.cross_validated(on, name, terms, steps[-1] if steps else None,
-                                             COST.get((name, variant), 0.0)))
+        steps.append(Step.of(judging.cross_validated(on, name, terms, steps[-1] if steps else None,
+                                                     COST.get((name, variant), 0.0))))
     return steps
 
 
@@ -42,7 +43,7 @@ def gain_of_all_but(on, effects, place):
 def test_each_adds_the_gain_of_all_less_that_of_the_others(late, effects):
     """Late sensors gain more while no noise has made the commands' floor uncertain: nobody else adds that."""
     steps = added(late, *effects)
-    assert steps[-1].gained_while_certain > 400.0
+    assert steps[-1].charges.gained_while_certain > 400.0
     for place, step in enumerate(with_shares(late, steps)):
         assert step.share == pytest.approx(steps[-1].gain - gain_of_all_but(late, effects, place), abs=0.5)
 

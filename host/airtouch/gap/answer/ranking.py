@@ -42,7 +42,7 @@ def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
     outside_the_gap = chosen is not None and all(t.shows_in == CLOCK or t.gate for t in chosen.terms)
     if gap.named.before > AT_FLOOR or outside_the_gap:
         return False
-    odd_times = selection.left_of_times > selection.allowed
+    odd_times = selection.nameless.of_times > selection.allowed
     return not data.study.simulated or not (odd_times or nearer(data, selection.parts, chosen, gap))
 
 
@@ -61,7 +61,7 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
             share = shrink_of(data, selection.parts, single, gap).share
         nats = None if single is None else selection.gained(single)
         out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
-    order = {n: j.gain for n, j in selection.singles.items()}
+    order = {n: c.gain for n, c in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out
 
@@ -83,8 +83,8 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
         return ()
     groups = []
     first = selection.singles[selection.named[0].name]
-    same = [n for n, j in selection.singles.items() if (j.full or selection.inference is not None)
-            and selection.gained(first) - selection.gained(j) < CLOSE]
+    same = [n for n, c in selection.singles.items() if (c.full or selection.inference is not None)
+            and selection.gained(first) - selection.gained(c) < CLOSE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named:

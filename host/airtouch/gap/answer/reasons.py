@@ -1,7 +1,7 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
 from airtouch.gap.naming.judging import FIRST_GAIN
-from airtouch.gap.naming.selection import Candidate, Selection
+from airtouch.gap.naming.selection import Candidate, Selection, Step
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
@@ -28,9 +28,9 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
 
 def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
-    gaining = (j for j in selection.singles.values() if selection.gained(j) > 0.0)
-    most = sorted(gaining, key=lambda j: -selection.gained(j))
-    return [Rejected(j.name, shortfall(selection, j)) for j in most[:NEAREST]]
+    gaining = (c for c in selection.singles.values() if selection.gained(c) > 0.0)
+    most = sorted(gaining, key=lambda c: -selection.gained(c))
+    return [Rejected(c.name, shortfall(selection, c)) for c in most[:NEAREST]]
 
 
 def shortfall(selection: Selection, candidate: Candidate) -> str:
@@ -48,7 +48,7 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     if selection.chosen:
         return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {candidate.gain:.0f} of the {selection.nameless_alone:.0f} nats that a model without names gains"
+    return f"gains {candidate.gain:.0f} of the {selection.nameless.alone:.0f} nats that a model without names gains"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -78,14 +78,14 @@ def _left(selection: Selection, gains: str, off: str) -> str:
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
-    nats = f"{max(selection.nameless_beside, 0.0):.0f}"
+    nats = f"{max(selection.nameless.beside, 0.0):.0f}"
     if selection.inference is not None and selection.inference.against.of_distance:
         farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
         return f"the flight lies {nats} nats farther {farther}, up to {selection.allowed:.0f} may be chance"
     return f"{gains.format(nats)}, up to {selection.allowed:.0f} may be left"
 
 
-def _why_beside(selection: Selection, step: Candidate) -> str:
+def _why_beside(selection: Selection, step: Step) -> str:
     """The reason why an effect named beside the first has no more probability than the ranking says."""
     first = selection.named[0].name
     if selection.inference is not None:

@@ -31,7 +31,9 @@ def _where(diagnosis: Diagnosis) -> str:
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
-    return (f"The gap lies mostly in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
+    most = summary.headline(cells) or cell  # the effects named may close another
+    share = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
+    return (f"{share} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
             f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 

@@ -101,7 +101,7 @@ class Problem:
         """The gap (n,) with effects in the model."""
         replayed = beside_edges(active)
         replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.replay_count]
-        command_values = self.commands.moved([a for a in active if not a.gate])
+        command_values = self.commands.values_without([a for a in active if not a.gate])
         return np.where(self.known, self.joined(replay_values, command_values), 0.0)
 
     def joined(self, replay: np.ndarray, commands: np.ndarray | float = 0.0) -> np.ndarray:

@@ -27,7 +27,7 @@ FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's pow
 #: power of a block's commands over the median of its flight's blocks, above which a set-point stepped in it; chosen
 STEPPED_COMMAND = 5.0
 FEWEST = 3  #: blocks of a flight of which one can be unlike the others
-TINY = 1e-30  #: least power that is divided by, far below any measured
+VANISHING_POWER = 1e-30  #: least power, in any unit, that is divided by or has a logarithm; far below any measured
 STEPS = 12  #: iterations to the power of highest likelihood; chosen
 
 
@@ -80,7 +80,7 @@ def _without_step(power: np.ndarray) -> np.ndarray:
     if len(power) < FEWEST:
         return np.ones(len(power), bool)
     mean = np.median(power, axis=0) / np.log(2.0)  # of an exponential law, as that of a bin's power
-    return ((power / np.maximum(mean, TINY)).mean(axis=1) < STEPPED_COMMAND).all(axis=1)
+    return ((power / np.maximum(mean, VANISHING_POWER)).mean(axis=1) < STEPPED_COMMAND).all(axis=1)
 
 
 def typical(power: np.ndarray) -> np.ndarray:

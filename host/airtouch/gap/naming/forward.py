@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import TEMPERATURE, Candidate
+from airtouch.gap.naming.selection import TEMPERATURE, Candidate, Step
 from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
@@ -42,7 +42,7 @@ class State:
     effect was named; least: nats that each must gain as the first effect.
     """
 
-    steps: tuple[Candidate, ...]
+    steps: tuple[Step, ...]
     tried: Mapping[str, Candidate]
     need: Mapping[str, float]
     singles: Mapping[str, Candidate]
@@ -83,15 +83,16 @@ def _begun(search: Search, passing: Candidate | None) -> State:
     if passing is None:
         return State((), search.alone, search.least, search.alone, search.least)
     singles = {**search.alone, passing.name: passing}
-    tried, need = _beside(search, (passing,), singles)
-    return State((passing,), tried, need, singles, {**search.least, passing.name: LEAST_GAIN})
+    steps = (Step.of(passing),)
+    tried, need = _beside(search, steps, singles)
+    return State(steps, tried, need, singles, {**search.least, passing.name: LEAST_GAIN})
 
 
 def _worth_adding(state: State) -> dict[str, Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = {n: j for n, j in state.tried.items() if j.gain - state.gain >= state.need[n]}
+    enough = {n: c for n, c in state.tried.items() if c.gain - state.gain >= state.need[n]}
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
-        enough = {n: j for n, j in enough.items() if j.evidence >= FIRST_GAIN}
+        enough = {n: c for n, c in enough.items() if c.evidence >= FIRST_GAIN}
     return enough
 
 
@@ -101,8 +102,8 @@ def _best_of(judged: Mapping[str, Candidate]) -> Candidate | None:
     Likelihoods of real flights are too sure of themselves (TEMPERATURE): of two that gain nearly as much, that whose
     strength is the rarer in nominal flights.
     """
-    return max((j for j in judged.values() if j.full), default=None,
-               key=lambda j: j.gain / TEMPERATURE + min(j.evidence, CERTAIN))
+    return max((c for c in judged.values() if c.full), default=None,
+               key=lambda c: c.gain / TEMPERATURE + min(c.evidence, CERTAIN))
 
 
 def _added(search: Search, state: State, best: Candidate) -> State:
@@ -110,18 +111,18 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     singles = state.singles
     if not state.named:  # what nominal flights have as well stands beside every candidate
         there = {s.name for s in state.steps}
-        singles = {**singles, **{n: j for n, j in state.tried.items() if n not in there}}
+        singles = {**singles, **{n: c for n, c in state.tried.items() if n not in there}}
     left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
-    steps = (*state.steps, replace(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
+    steps = (*state.steps, Step.of(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    over_before = {n: replace(j, gain=j.gain - state.gain) for n, j in state.tried.items()}
+    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.tried.items()}
     tried, need = _beside(search, steps, over_before)
     return replace(after, tried=tried, need=need)
 
 
-def _beside(search: Search, steps: Sequence[Candidate], before: Mapping[str, Candidate],
+def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate],
             ) -> tuple[dict[str, Candidate], dict[str, float]]:
     """Candidates judged beside the steps so far, and the nats that each must gain.
 
@@ -130,8 +131,8 @@ def _beside(search: Search, steps: Sequence[Candidate], before: Mapping[str, Can
     any.
     """
     trial, named = search.trial, any(s.named for s in steps)
-    gained = {n for n, j in before.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
+    gained = {n for n, c in before.items() if c.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
-    sure = {n for n, j in before.items() if j.full and j.evidence >= LEAST_GAIN and not is_random(n)}
+    sure = {n for n, c in before.items() if c.full and c.evidence >= LEAST_GAIN and not is_random(n)}
     tried = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return tried, {n: least_further_gain(trial, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
+    return tried, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN for n, c in tried.items()}

@@ -1,6 +1,6 @@
-"""One hypothesis judged: fitted on one half of the blocks and judged on the other.
+"""One hypothesis judged: fitted on one half of the flights and judged on the other, and the other way round.
 
-Two halves of the flights (of the blocks, for a few flights) take turns.
+Of a few flights each half has some blocks of every flight.
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
-from airtouch.gap.naming.selection import Candidate, Strength
+from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term, Terms
 
-GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s; chosen
+GROUP = 3  #: neighbouring blocks that stay in one half, which is 5 s; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
 #: nats of held-out data that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap.md)
 LEAST_GAIN = 12.0
@@ -33,8 +33,8 @@ NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound;
 class Trial:
     """What hypotheses are judged on.
 
-    parts: the two halves of the flights; base: log likelihood (2, 2) of no effect, as sure of the commands' floor as
-    without and with random effects, on each half.
+    parts: the two halves of the flights; base (2, 2): log likelihood of no effect, a row with the commands' floor as
+    certain as without random effects, one as with them, a column for each half.
     """
 
     data: Data
@@ -50,18 +50,17 @@ def trial_of(data: Data) -> Trial:
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
-    first, second = [], []
-    numbers = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
-    for i, regime, n in numbers:
-        if not n:
-            continue
-        if len(data.flights) >= HALVED_BY_FLIGHT:
-            (second if i % 2 else first).append((i, regime, np.ones(n, bool)))
-        else:
+    by_flight = len(data.flights) >= HALVED_BY_FLIGHT
+    pieces: tuple[list, list] = ([], [])
+    counts = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
+    for i, regime, n in counts:
+        if n and by_flight:
+            pieces[i % 2].append((i, regime, np.ones(n, bool)))
+        elif n:
             even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
-            first.append((i, regime, even))
-            second.append((i, regime, ~even))
-    return BlockSet(tuple(first)), BlockSet(tuple(second))
+            pieces[0].append((i, regime, even))
+            pieces[1].append((i, regime, ~even))
+    return BlockSet(tuple(pieces[0])), BlockSet(tuple(pieces[1]))
 
 
 def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
@@ -77,16 +76,16 @@ def price_of(terms: Sequence[Term]) -> float:
 
 def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
                     brief: bool = False) -> Candidate:
-    """An effect beside those that are chosen, all of them fitted on each half and judged on the other.
+    """The hypothesis of an effect beside those that are chosen, fitted on each half and judged on the other.
 
     name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs; brief: the
-    fits are cut short, to see whether whole ones promise anything. Its gain is that of all effects over none, less what
+    fits are cut short, to see whether whole ones promise anything. The gain is that of all effects over none, less what
     their parameters and the choice of their variants cost. Effects that are seen in the commands alone gain less beside
     the first random one; it is not charged with that (`_lost_to_uncertainty`).
     """
-    before = chosen.terms if chosen else ()
-    paid = choice_cost + (chosen.choice_cost if chosen else 0.0)
-    certain = (chosen.gained_while_certain if chosen else 0.0) + _lost_to_uncertainty(trial, terms, chosen)
+    before, charged = (chosen.terms, chosen.charges) if chosen else ((), Charges())
+    charges = Charges(choice_cost + charged.choice_cost,
+                      charged.gained_while_certain + _lost_to_uncertainty(trial, terms, chosen))
     if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
@@ -94,15 +93,15 @@ def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | N
         fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
         held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP),
                        clock_gains(trial.data, before))
-        gain = held_out + (certain - price_of(fits[-1].terms) - paid)
+        gain = held_out + (charges.gained_while_certain - price_of(fits[-1].terms) - charges.choice_cost)
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, paid, certain, strength)
+    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
 
 
 def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
-    """Nats that the effects chosen lose when the first random one comes to stand beside them; 0 for another.
+    """Nats that the effects chosen lose where these terms bring the first random one; else 0.
 
     Beside a random effect the commands' floor is less certain.
     """
@@ -120,7 +119,7 @@ def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
 def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None, brief: bool) -> FittedTerms:
     """Effects fitted on a half, from where those that are chosen ended there.
 
-    It is made once: an effect of the clock beside those that are chosen changes nothing of it, nor does a second
+    The fit is cached: an effect of the clock beside those that are chosen changes nothing of it, nor does a second
     search among fewer effects.
     """
     start, part = _start(chosen, terms, half), trial.parts[half]
@@ -130,7 +129,7 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | 
 
 
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
-    """Nats that fitted effects add on a half, over no effect as sure of the commands' floor.
+    """Nats that fitted effects add on a half, over no effect with a commands' floor as certain.
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
@@ -146,21 +145,21 @@ def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms]) -> Strength:
     """The strength of one term of a hypothesis.
 
-    fitted: the hypothesis' terms; fits: those of its spectra on each half.
+    fitted: the terms of the hypothesis, with their values; fits: those of them that show in the spectra, to each half.
     """
     hypotheses = [fitted] if term.shows_in == CLOCK or not fits else [f.terms for f in fits]
-    own = term.identity, term.shows_in
-    same = [next(t for t in terms if (t.identity, t.shows_in) == own) for terms in hypotheses]
+    sought = term.identity, term.shows_in
+    in_each = [next(t for t in terms if (t.identity, t.shows_in) == sought) for terms in hypotheses]
     k = len(term.free)
-    each = np.array([t.scaled(t.values)[:k] for t in same])
-    strength = term.among_all(each.mean(axis=0))
+    scaled = np.array([t.scaled(t.values)[:k] for t in in_each])
+    mean = term.among_all(scaled.mean(axis=0))
     if term.shows_in != MEAN:
-        return Strength(strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength)))
+        return Strength(mean, np.zeros((len(mean), len(mean))), np.zeros(len(mean)))
     covariance = np.zeros((k, k))
-    for f, t in zip(fits, same, strict=True):
-        first = f.place(t).start
-        covariance += f.covariance[first:first + k, first:first + k] / len(fits) ** 2
-    return Strength(strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1])))
+    for fit_of_half, own in zip(fits, in_each, strict=True):
+        first = fit_of_half.place(own).start
+        covariance += fit_of_half.covariance[first:first + k, first:first + k] / len(fits) ** 2
+    return Strength(mean, covariance_among_all(term, covariance), term.among_all(0.5 * (scaled[0] - scaled[-1])))
 
 
 def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
@@ -176,7 +175,7 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
 
 
 def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
-    """A fit with the parameters free too that only a fit close to the truth can find."""
+    """A fit with those parameters free as well that only a fit close to the truth can find (`Term.refined`)."""
     terms = [t.refined() for t in fitted.terms]
     if all(a.free == b.free for a, b in zip(terms, fitted.terms, strict=True)):
         return fitted
@@ -184,7 +183,7 @@ def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
 
 
 def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
-    """The scaled parameters (k,) fitted to a half before, NaN for those of the new effects; None where none are."""
+    """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit."""
     if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[half].scaled

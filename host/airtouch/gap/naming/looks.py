@@ -1,5 +1,6 @@
 """First looks: every variant of every candidate beside what is chosen, at a small part of what its fit would cost."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -8,17 +9,17 @@ import numpy as np
 
 from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
 from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
-from airtouch.gap.naming.selection import Candidate, Strength
+from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term, Terms
 
-HOPELESS = 0.5  #: nats, gain below which an effect is not looked at any closer in this view; chosen
+HOPELESS = 0.5  #: nats that an effect must gain at a first look to be looked at more closely; chosen
 
 
 class PricedVariant(NamedTuple):
-    """A variant of an effect; choice_cost: nats that the choice among the effect's variants costs."""
+    """A variant of an effect, and the nats that the choice among the effect's variants costs."""
 
     name: str
     terms: Terms
@@ -26,7 +27,7 @@ class PricedVariant(NamedTuple):
 
 
 class RandomLook(NamedTuple):
-    """What a variant with a random effect gains, nats, and the scaled strength (k,) of that effect."""
+    """Nats that a variant with a random effect gains, its choice paid, and the scaled strength (k,) of that effect."""
 
     gain: float
     strength: np.ndarray
@@ -35,7 +36,7 @@ class RandomLook(NamedTuple):
 
 @dataclass(frozen=True)
 class RoundStart:
-    """What a round begins from: the hypothesis that is chosen, and what it leaves of each half."""
+    """What a round begins from: the hypothesis that is chosen, None for no effect, and what it leaves of each half."""
 
     trial: Trial
     chosen: Candidate | None
@@ -73,14 +74,19 @@ def start_of(trial: Trial, chosen: Candidate | None) -> RoundStart:
 
 
 def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
-    """A first look at every variant that may be added. progress: is told the name of every candidate."""
+    """A first look at every variant that may be added, by what such a look can say of it.
+
+    candidates: variants by name; progress: is told every name.
+    """
     looks = Looks()
     for name, variants in candidates.items():
         progress(name)
         for variant in addable(name, variants, start.terms):
             if random_of(variant.terms):
                 looks.random.append(variant)
-            elif (look := _seen(start, variant)) is None:
+                continue
+            look = _look_at_means(start, variant)
+            if look is None:
                 looks.unseen.append(variant)
             else:
                 looks.means.append(look)
@@ -90,61 +96,67 @@ def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], pr
 def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
     """The variants of an effect that may stand beside those that are chosen.
 
-    Not those of which a part is chosen already, of another rotor but for this one; none where another name for the same
-    thing is chosen. Each costs log n for the choice among the n variants with as many terms: else many would beat one.
+    None may where another name for the same thing is chosen, and a variant may not of which a term is chosen already
+    (the same effect of another rotor is another term). Each costs log n nats for the choice among the n variants with
+    as many terms: else many variants would gain more than one by chance.
     """
-    own = [t for t in chosen if not t.companion]
-    if any(t.name != name and interchangeable(name, t.name) for t in own):
+    without_companions = [t for t in chosen if not t.companion]
+    if any(t.name != name and interchangeable(name, t.name) for t in without_companions):
         return []
-    there = {t.identity for t in own}
-    return [PricedVariant(name, terms, np.log(sum(len(v) == len(terms) for v in variants))) for terms in variants
-            if not any(t.identity in there for t in terms)]
+    identities = {t.identity for t in without_companions}
+    count_of_length = Counter(len(terms) for terms in variants)
+    return [PricedVariant(name, terms, np.log(count_of_length[len(terms)])) for terms in variants
+            if identities.isdisjoint(t.identity for t in terms)]
 
 
-def _seen(start: RoundStart, variant: PricedVariant) -> Candidate | None:
+def _look_at_means(start: RoundStart, variant: PricedVariant) -> Candidate | None:
     """A first look at a variant of mean effects; None where it cannot see them, as only the commands show them."""
     if any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         return None
-    look = _mean_look(start, variant)
+    look = _judged_to_first_order(start, variant)
     hopeless = look.gain < start.gain + HOPELESS
     return None if hopeless and _only_in_commands(start.trial, variant.terms) else look
 
 
-def _mean_look(start: RoundStart, variant: PricedVariant) -> Candidate:
-    """Mean effects judged to first order; the strength of the first of them, as a mean of both halves."""
+def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
+    """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
     look = first_order(start.trial.data, start.halves, terms, start.terms)
     gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
     halves = np.array(look.fitted)[:, :k]
     strength = Strength(own.among_all(halves.mean(axis=0)),
                         covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
-    return Candidate(variant.name, (*start.terms, *terms), gain, full=False, choice_cost=variant.choice_cost,
-                     strength=strength)
+    return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
+                     charges=Charges(variant.choice_cost), strength=strength)
 
 
 def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
-    """Variance (k,) of the mean of two values (2, k), of variances (2, k or more), and no less than they differ by."""
+    """Variance (k,) of the mean of two values, and no less than half their difference squared.
+
+    halves (2, k): the values; variances (2, k or more): theirs, of which the first k count.
+    """
     return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
 
 
 def _only_in_commands(trial: Trial, terms: Terms) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
-    law = trial.data.study.controller
-    moved = [t.active(np.ones(len(t.free))) for t in terms]
-    return law is not None and not any(shows(trial.data, t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
+    loop = trial.data.study.controller
+    one_step_off = [t.active(np.ones(len(t.free))) for t in terms]
+    return loop is not None and not any(shows(trial.data, t) for t in terms) \
+        and not np.allclose(loop.ratio(one_step_off), 1.0)
 
 
 def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
                  ) -> tuple[list[Candidate], list[PricedVariant]]:
-    """Looks at variants with a random effect: candidates that promise little, and the variants to fit of the others.
+    """Looks at variants with a random effect: hypotheses that promise little, and the variants of others, to be fitted.
 
     Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that looks best is
     fitted, with the longer ones that begin with the same term. means: looks at mean effects, best first; a candidate
     that is among them says by that how little it promises.
     """
-    mean_of = {j.name: j for j in reversed(means) if len(j.terms) == len(start.terms) + 1}
+    mean_of = {c.name: c for c in reversed(means) if len(c.terms) == len(start.terms) + 1}
     unpromising, to_fit = [], []
-    for name, looks in _by_name(start, variants, mean_of).items():
+    for name, looks in _random_looks_by_name(start, variants, mean_of).items():
         best = max(looks, key=lambda look: look.gain)
         mean = mean_of.get(name)
         if thorough or best.gain > HOPELESS or mean and mean.gain - start.gain > HOPELESS:
@@ -154,11 +166,11 @@ def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Se
     return unpromising, to_fit
 
 
-def _by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
-             ) -> dict[str, list[RandomLook]]:
-    """Looks at the variants of every candidate whose random part stands alone or beside one mean term.
+def _random_looks_by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
+                          ) -> dict[str, list[RandomLook]]:
+    """Looks by name at the variants of every candidate whose random part stands alone or beside one mean term.
 
-    Where that mean effect was looked at, only beside its best variant.
+    mean_of: the best look at a mean effect, by name; where there is one, only that variant of the mean term counts.
     """
     looks: dict[str, list[RandomLook]] = {}
     for variant in variants:
@@ -178,10 +190,10 @@ def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[P
 
 
 def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
-    """A look at a random effect as a hypothesis, which at most gains nothing, as it is not fitted."""
+    """A look at a random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
     name, terms, cost = look.variant
-    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False, choice_cost=cost,
-                     strength=Strength(strength_term(terms).among_all(look.strength)))
+    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False,
+                     charges=Charges(cost), strength=Strength(strength_term(terms).among_all(look.strength)))
 
 
 def _same(one: Term, other: Term) -> bool:

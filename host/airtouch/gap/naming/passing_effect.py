@@ -1,4 +1,4 @@
-"""Whether one effect that comes and goes is tried before those that always act."""
+"""The effect that comes and goes, tried before those that always act, and its evidence."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
-from airtouch.gap.naming.selection import Candidate, Strength
+from airtouch.gap.naming.selection import Candidate, Charges, Step, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
@@ -19,15 +19,16 @@ def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least: Mappin
                    ) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
-    It must gain LEAST_GAIN more than every effect that always acts and has its evidence, and than what follows the
-    flight's own height, which needs no other vehicle; and as much more than it gains in nominal flights. Seconds in
-    which another vehicle is known to be overhead go before others, which are only likely. singles: candidates judged
-    alone; least: nats of evidence that each needs; without: names that are left out.
+    It must gain LEAST_GAIN more than every effect that always acts and has enough evidence, LEAST_GAIN more than what
+    follows the flight's own height, which needs no other vehicle, and as much more than it gains in nominal flights.
+    Seconds in which another vehicle is known to be overhead go before others, which are only likely. singles:
+    candidates judged alone; least: nats of evidence that each needs; without: names that are left out.
     """
     if trial.data.study.scatter is None:
         return None
-    data, always = trial.data, [j.gain for n, j in singles.items() if j.evidence >= least[n]]
-    steady = max([height_gain(data, trial.parts), *always])
+    data = trial.data
+    of_steady_effects = [c.gain for name, c in singles.items() if c.evidence >= least[name]]
+    steady = max([height_gain(data, trial.parts), *of_steady_effects])
     passing = [g for g in gated_effects(data, without).values()
                if g.gain >= steady + LEAST_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
@@ -41,20 +42,20 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
-    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), choice_cost=effect.cost,
+    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), charges=Charges(effect.cost),
                      strength=Strength(effect.strength), evidence=evidence, key=effect.key)
 
 
-def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Candidate]) -> bool:
+def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step]) -> bool:
     """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
     return any(s.named and s.name == passing.name
                and passing_evidence(data, passing.key, s.share, passing.strength.mean) < LEAST_GAIN for s in steps)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
-    """Evidence, nats, for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights have as much.
+    """Evidence, nats, for an effect that comes and goes: its gain, up to LEAST_GAIN and what is beyond nominal flights.
 
-    key: `GatedEffect.key`; gain: nats; strength (k,): of its parameters, in natural steps.
+    key: `GatedEffect.key`; gain: nats; strength (k,): its scaled parameters.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
     sizes = {key: size_of(gain / data.seconds, strength)}

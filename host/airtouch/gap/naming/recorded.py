@@ -41,7 +41,8 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
 
 def with_none_named(selection: Selection) -> Selection:
     """The same flights with no effect named; what the nameless model gains is that of none."""
-    return replace(selection, steps=(), nameless_beside=selection.nameless_alone, assumed=False)
+    nameless = replace(selection.nameless, beside=selection.nameless.alone)
+    return replace(selection, steps=(), nameless=nameless, assumed=False)
 
 
 def comes_and_goes(selection: Selection) -> bool:

@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import FIRST_GAIN, Trial
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, Selection
+from airtouch.gap.naming.selection import Candidate, NamelessGain, NominalFlights, Selection, Step
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.term import Terms
@@ -36,18 +36,17 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
 
     candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
     """
-    steps: list[Candidate] = []
+    steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
         own = [c for c in inference.classes if c.effect == effect]
         variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
         judged = round_of(trial, variants, steps[-1] if steps else None, progress, promising=(effect,))
         if effect in judged:
-            steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
+            steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
-        singles=alone, steps=tuple(steps), nameless_alone=inference.nameless_alone,
-        nameless_beside=inference.against.nats, parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN),
-        nominal=trial.data.study.nominal, assumed=False, nominal_gain=0.0, simulated=True, same_models=True,
-        inference=inference)
+        singles=alone, steps=tuple(steps), nameless=NamelessGain(inference.nameless_alone, inference.against.nats),
+        parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
+        nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

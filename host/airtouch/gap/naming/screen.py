@@ -1,7 +1,7 @@
 """A first look at one variant: its first-order change of the spectra, or the strength of its random effect.
 
-One replay for each free parameter, shared by both halves of the data; candidates that do
-well here are then fitted in full.
+It costs one replay for each free parameter, whose result both halves of the data share. Candidates that do well here
+are then fitted in full.
 """
 
 from collections.abc import Sequence
@@ -16,18 +16,19 @@ from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
-STEP = 0.25  #: of a parameter's natural step, at which the change is taken; chosen
-ROUNDS = 3  #: of least squares, each with the weights of what the one before left; chosen
-NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none; chosen, far above rounding
-UNBOUNDED = 1e6  #: scaled parameter up to which the effects beside may change: any
+STEP = 0.25  #: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen
+ROUNDS = 3  #: iterations of least squares, each with the weights of what the one before left; chosen
+NOTHING = 1e-9  #: unit/sqrt(Hz), up to which a change of a spectrum counts as rounding; chosen, far above rounding
+UNBOUNDED = 1e6  #: bound of the scaled parameters of effects beside, larger than any that is fitted; chosen
 
 
 @dataclass(frozen=True)
 class Remainder:
     """What a hypothesis, fitted on the other half of the flights, leaves of this one.
 
-    residual (n,): flattened values; extra_power (n,): what the hypothesis adds to their expected power; level: log
-    likelihood of the residual less offsets; cost: nats that these offsets cost.
+    problem: how likely the n flattened values of this half are; residual (n,): what is left of them, complex;
+    extra_power (n,): what the hypothesis adds to their expected power; level: log likelihood of the residual less the
+    flights' offsets; cost: nats that these offsets cost.
     """
 
     problem: Problem
@@ -39,7 +40,10 @@ class Remainder:
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """Mean effects to first order: held-out gain, nats; of each half scaled parameters (k,) and their variances."""
+    """Mean effects judged to first order.
+
+    gain: held-out nats; fitted, variances: for each half the k scaled parameters as fitted to it, and their variances.
+    """
 
     gain: float
     fitted: Sequence[np.ndarray]
@@ -60,12 +64,11 @@ def first_order(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
 
     beside: effects chosen before, free to change.
     """
-    mean, other = ([t for t in some if t.shows_in == MEAN and not t.signature.commands_only]
-                   for some in (terms, beside))
-    tables = [[column(data, half.problem, t, i) for t in (*mean, *other) for i in range(len(t.free))]
+    mean, mean_beside = _in_the_replay(terms), _in_the_replay(beside)
+    tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_beside) for i in range(len(t.free))]
               for half in halves]
-    n = sum(len(t.free) for t in mean)
-    bounds = _bounds(mean, len(tables[0]) - n)
+    k = sum(len(t.free) for t in mean)
+    bounds = _bounds(mean, len(tables[0]) - k)
     gain, fitted, variances = 0.0, [], []
     for train, test in ROUND_TRIP:
         x, variance = _least_squares(halves[train], tables[train], bounds)
@@ -73,13 +76,21 @@ def first_order(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.residual)))
         after, cost = without_offsets(held_out.problem, held_out.residual + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.level + held_out.cost
-        fitted.append(x[:n])
-        variances.append(variance[:n])
+        fitted.append(x[:k])
+        variances.append(variance[:k])
     return FirstOrder(gain, fitted, variances)
 
 
+def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
+    """The mean effects that show where the logged commands are replayed."""
+    return [t for t in terms if t.shows_in == MEAN and not t.signature.commands_only]
+
+
 def random_look(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
-    """Held-out nats of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,)."""
+    """Held-out nats of a random effect beside what is chosen, and its scaled strength (k,), the mean of both halves.
+
+    What is chosen stays as it is.
+    """
     gain, strengths = 0.0, []
     for train, test in ROUND_TRIP:
         fitted = strongest(halves[train].problem, term, halves[train].residual, halves[train].extra_power)
@@ -123,7 +134,7 @@ def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
 
 
 def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest scaled parameters of mean effects, followed by so many that are free."""
+    """Lowest and highest scaled parameters of mean effects, followed by `others` without bounds, (k + others,) each."""
     low, high = limits(mean)
     wide = np.full(others, UNBOUNDED)
     return np.concatenate([low, -wide]), np.concatenate([high, wide])
@@ -131,7 +142,10 @@ def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[np.ndarray, np.ndarray],
                    ) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled parameters (k,) whose changes (n,) of a table explain a residual best, and their variances (k,)."""
+    """Scaled parameters (k,) that explain the residual of a half best, and their variances (k,).
+
+    table: change (n,) of the spectra per scaled parameter, k of them; bounds: lowest and highest parameters (k,).
+    """
     size, constants = len(table), half.problem.unit_offsets
     columns = np.array([*table, *(-c for c, _ in constants)])
     prior = np.concatenate([np.full(size, PRIOR_UNITS), [deviation for _, deviation in constants]])

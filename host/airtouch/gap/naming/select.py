@@ -19,7 +19,7 @@ from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.related import inference_of, selection_by_relations
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, Selection
+from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, NamelessGain, NominalFlights, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
@@ -27,19 +27,19 @@ from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
 from airtouch.gap.signatures.term import Terms
 from airtouch.simulation import effects
 
-#: of the evidence for the likeliest effect, that for a wake whose shape its class does not have: three simulated wakes
-#: that fill a flight have 0.09 to 0.10, four motor noises that the replay took for one 0.01 to 0.02
-#: (host/docs/looks.md, 2026-11-25 11:53)
+#: fraction of the evidence for the likeliest effect that a wake must have for the replay to name it, as its shape may
+#: differ from that of its class; chosen: three simulated wakes that fill a flight have 0.09 to 0.10, four motor noises
+#: that the replay took for a wake 0.01 to 0.02 (host/docs/looks.md, 2026-11-25 11:53)
 WAKE_SHARE = 0.05
-NAMES = frozenset(effects.NAMES)  #: of the package's effects; the others are a user's own
+PACKAGE_EFFECTS = frozenset(effects.NAMES)  #: names of the package's effects; others are a user's own
 
 
 def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
-    """Judge every candidate, then name effects.
+    """The selection of effects among candidates: every one is judged alone, then effects are named.
 
-    The replay names them by forward selection (naming.forward), after an effect that comes and goes where there is one;
-    those of `without` are none. Where a library of the signals' relations holds for the flights, its inference names
+    The replay names them by forward selection (naming.forward), after an effect that comes and goes where there is one
+    (not among `without`). Where a library of the signals' relations holds for the flights, its inference names
     them (`_by_relations`), but for an effect of a user's own that explains the flights in the replay too: its class was
     learned from few flights. candidates: the variants of every effect by name; progress: is told every name judged.
     """
@@ -49,11 +49,11 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     least = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     search = Search(trial, candidates, alone, least, progress)
     inference = inference_of(data, list(candidates))
-    if inference is not None and NAMES.issuperset(candidates):
+    if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without)
     passing = passing_effect(trial, alone, least, without)
     answer = _by_replay(search, forward(search, passing), passing)
-    if inference is None or answer.explained and answer.named and answer.named[0].name not in NAMES:
+    if inference is None or answer.explained and answer.named and answer.named[0].name not in PACKAGE_EFFECTS:
         return answer
     return _by_relations(search, inference, without)
 
@@ -92,21 +92,21 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
 def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:
     """The selection that a forward search ended in, with what it leaves.
 
-    passing: the effect that comes and goes of its first step; it is taken back where beside the others it is no more
-    than nominal flights have.
+    passing: the effect that comes and goes, its first step; the search is done again without it where beside the other
+    effects it is no more than nominal flights have.
     """
     trial, study = search.trial, search.trial.data.study
     if passing is not None and as_in_nominal_flights(trial.data, passing, state.steps):
         state = forward(search, None)
-    before = nameless_nats(trial, None)
-    after = nameless_nats(trial, state.steps[-1]) if state.steps else before
     last = state.steps[-1].terms if state.steps else ()
+    alone = nameless_nats(trial, None)
+    beside = nameless_nats(trial, state.steps[-1]) if state.steps else alone
     selection = Selection(
-        singles=state.singles, steps=state.steps, nameless_alone=before, nameless_beside=after, parts=trial.parts,
-        least=state.least, nominal=study.nominal,
-        assumed=bool(random_of(last)) if study.simulated else assumes(trial.data, last),
-        nominal_gain=_nominal_gain(trial.data), simulated=study.simulated, same_models=study.same_models,
-        left_of_times=clock_left(trial.data, last))
+        singles=state.singles, steps=state.steps, parts=trial.parts, least=state.least,
+        nameless=NamelessGain(alone, beside, clock_left(trial.data, last)),
+        nominal=NominalFlights(study.nominal_count, _nameless_gain_of_nominal_flights(trial.data), study.simulated,
+                               study.same_models),
+        assumed=bool(random_of(last)) if study.simulated else assumes(trial.data, last))
     return replace(selection, contradicted=contradicted(trial, selection.chosen)) if study.simulated else selection
 
 
@@ -117,7 +117,7 @@ def nameless_nats(trial: Trial, chosen: Candidate | None) -> float:
     return of_spectra + clock_left(trial.data, chosen.terms if chosen else ())
 
 
-def _nominal_gain(data: Data) -> float:
-    """Nats that the nameless model gains in nominal flights as long as these."""
+def _nameless_gain_of_nominal_flights(data: Data) -> float:
+    """Nats that the nameless model gains in nominal flights as long as these; 0 where no scatter says."""
     scatter = data.study.scatter
     return scatter.allowed(data.seconds, UNKNOWN_GAIN) if scatter else 0.0

@@ -1,7 +1,8 @@
 """The result of a selection of effects: candidates judged, the steps, and what speaks against the effects named."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,14 +12,20 @@ from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Terms
 
-#: nats that the nameless model may gain over the effects named before `unknown`: where many nominal flights gave the
-#: floor, and where none did; both chosen (host/docs/gap.md, "What `unknown` means")
+#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`: UNKNOWN_GAIN
+#: where two nominal flights or more gave the floor, UNKNOWN_ALONE where one or none did; both chosen
+#: (host/docs/gap.md, "What `unknown` means")
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
-#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
-#: the loop in recorded flights, since its spectrum is assumed, not measured; both chosen
+#: share of what the effects named gain that the nameless model may gain as well, as no model is exact: UNKNOWN_ASSUMED
+#: where one of them is random or changes the loop of recorded flights, so that its spectrum is assumed, not measured;
+#: both chosen
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
-SAME_MODELS = 0.5  #: of these in flights of this project's simulator: twice what right names left there, 78 flights
-TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves; chosen
+#: factor on these shares in flights of this project's simulator and firmware, whose models are exact; chosen, after the
+#: nameless model had gained at most 0.36 of what it may beside right names in 78 such flights (2026-11-23)
+SAME_MODELS = 0.5
+#: held-out nats that count as one where candidates are compared: log likelihoods of real flights are too sure of
+#: themselves; chosen
+TEMPERATURE = 6.0
 
 
 @dataclass(frozen=True)
@@ -44,17 +51,26 @@ class Strength:
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A hypothesis with its gain over no effect, held-out nats, and its fits of both halves.
+class Charges:
+    """What the gain of a hypothesis is charged with beside its parameters, and what is given back to it, nats.
 
-    name: its newest effect; terms: all of them, with their values; full: whether it is fitted in full, not to first
-    order only. choice_cost: nats that the choice of the effects' variants has cost, which the gain is without;
-    gained_while_certain: nats of the gain that effects before the first random one gained while the commands' floor was
-    more certain. strength: of the newest effect. evidence: nats that that effect gains over the hypothesis before, and
-    no more than its strength says beyond the scatter of nominal flights. named: whether that is enough; if not, it is a
-    deviation that nominal flights have as well, and stands beside the effects that are named. key: of one that comes
-    and goes, what of `Scatter.passing` it is compared with. share: where several effects are named, nats over the
-    hypothesis of the others alone.
+    choice_cost: charged for the choice among the variants of its effects; gained_while_certain: given back, what the
+    effects before the first random one lose because beside it the commands' floor is less certain.
+    """
+
+    choice_cost: float = 0.0
+    gained_while_certain: float = 0.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis of one effect or several, with what it gains.
+
+    name: its newest effect; terms: of all its effects, with their values; gain: held-out nats over no effect, after
+    `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only looked at;
+    full: whether it was fitted to the end, not looked at or fitted briefly. Of the newest effect: strength; evidence:
+    nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
+    flights; key: where it comes and goes, the entry of `Scatter.passing` that it is compared with, else "".
     """
 
     name: str
@@ -62,13 +78,10 @@ class Candidate:
     gain: float
     fits: tuple[FittedTerms, ...] = ()
     full: bool = True
-    choice_cost: float = 0.0
-    gained_while_certain: float = 0.0
+    charges: Charges = Charges()
     strength: Strength = field(default_factory=Strength)
     evidence: float = 0.0
-    named: bool = True
     key: str = ""
-    share: float = np.inf
 
     @property
     def of_the_log(self) -> bool:
@@ -77,42 +90,85 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Selection:
-    """The result of a selection of effects; gains are in held-out nats.
+class Step(Candidate):
+    """A candidate that a selection has added to the steps before it.
 
-    singles: the best variant of every candidate; steps: effects added one after another. nameless_alone,
-    nameless_beside: gain of the nameless model over no effect and over the last step; left_of_times: of the latter,
-    what the logged times hold; contradicted: what the effects named lose in cells where they say what the flights do
-    not show, and the worst of these cells. parts: the two halves that they were fitted and judged on; least: nats that
-    each candidate must gain as the first; inference: what named the effects, where the relations of signals did.
+    named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights have
+    as well, and stands beside the effects named. share: where several effects are named, the nats that the newest
+    effect adds to all others; infinite where it is named alone.
+    """
 
-    Of the study: nominal: how many flights gave the floor; nominal_gain: what the nameless model gains in nominal
-    flights as long as these; assumed: whether a chosen effect is random, or changes the loop in recorded flights;
+    named: bool = True
+    share: float = np.inf
+
+    @classmethod
+    def of(cls, candidate: Candidate, named: bool = True) -> "Step":
+        """The step that adds a candidate."""
+        return cls(**vars(candidate), named=named)
+
+
+@dataclass(frozen=True)
+class NamelessGain:
+    """Held-out nats that the nameless model gains.
+
+    alone: over no effect; beside: over the last step of a selection; of_times: of the latter, what the logged times
+    hold.
+    """
+
+    alone: float
+    beside: float
+    of_times: float = 0.0
+
+
+@dataclass(frozen=True)
+class NominalFlights:
+    """The nominal flights that gave the floor, as far as they say how much the effects named may leave.
+
+    count: how many; nameless_gain: nats that the nameless model gains in nominal flights as long as those judged;
     simulated, same_models: as the study has them.
     """
 
-    singles: Mapping[str, Candidate]
-    steps: tuple[Candidate, ...]
-    nameless_alone: float
-    nameless_beside: float
-    parts: tuple[BlockSet, BlockSet]
-    least: Mapping[str, float]
-    nominal: int
-    assumed: bool
-    nominal_gain: float
+    count: int
+    nameless_gain: float
     simulated: bool = False
     same_models: bool = False
-    left_of_times: float = 0.0
-    contradicted: tuple[float, str] = (0.0, "")
+
+
+class Contradiction(NamedTuple):
+    """Held-out nats that effects lose in cells where they say what the flights do not show, and the worst cell."""
+
+    nats: float = 0.0
+    cell: str = ""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The result of a selection of effects; gains are in held-out nats.
+
+    singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
+    nameless model gains; parts: the two halves that effects were fitted and judged on; least: nats that each candidate
+    must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a chosen effect
+    is assumed, as it is random or changes the loop of recorded flights; contradicted: what the effects named lose where
+    they say what is not there; inference: what named the effects, where the relations of signals did.
+    """
+
+    singles: Mapping[str, Candidate]
+    steps: tuple[Step, ...]
+    nameless: NamelessGain
+    parts: tuple[BlockSet, BlockSet]
+    least: Mapping[str, float]
+    nominal: NominalFlights
+    assumed: bool
+    contradicted: Contradiction = Contradiction()
     inference: Inference | None = None
 
     @property
-    def whole(self) -> Candidate | None:
+    def whole(self) -> Step | None:
         """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
         return self.steps[-1] if self.steps else None
 
     @property
-    def named(self) -> tuple[Candidate, ...]:
+    def named(self) -> tuple[Step, ...]:
         """The steps whose effects are named, what adds most to the others first, what the log did to itself last."""
         return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
 
@@ -123,45 +179,49 @@ class Selection:
         if not names or whole is None:
             return None
         names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
-        terms, *fitted = ([t for t in some if t.name in names]
-                          for some in (whole.terms, *(f.terms for f in whole.fits)))
-        fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
-        return replace(whole, terms=tuple(terms), fits=tuple(fits))
+        fits = tuple(replace(f, terms=_of_names(f.terms, names)) for f in whole.fits)
+        return replace(whole, terms=_of_names(whole.terms, names), fits=fits)
 
-    def gained(self, one: Candidate) -> float:
+    def gained(self, candidate: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
-        return float(self.inference.evidence[one.name] if self.inference is not None else one.gain)
+        return float(self.inference.evidence[candidate.name] if self.inference is not None else candidate.gain)
 
     @property
     def allowed(self) -> float:
-        """Log likelihood that the nameless model may gain on top of the effects named where they are right.
+        """Nats that the nameless model may gain beside the effects named where they are right.
 
         The fewer nominal flights there are, the farther off may another one lie.
         """
+        nominal = self.nominal
         if self.inference is not None:
             return self.inference.against.limit
-        if self.nominal < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless_alone, self.nominal_gain)
+        if nominal.count < 2:
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.alone, nominal.nameless_gain)
         gained = self.whole.gain if self.whole else 0.0
-        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.same_models else 1.0)
-        return max(self.least_left, share * gained, 0.0 if self.simulated else self.nominal_gain)
+        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if nominal.same_models else 1.0)
+        return max(self.least_left, share * gained, 0.0 if nominal.simulated else nominal.nameless_gain)
 
     @property
     def least_left(self) -> float:
-        """Log likelihood that is no news however little the effects named gain, with two nominal flights or more."""
-        return UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1)
+        """Nats that are no news however little the effects named gain, with two nominal flights or more."""
+        return UNKNOWN_GAIN * (self.nominal.count + 1) / (self.nominal.count - 1)
 
     @property
     def unlike(self) -> float:
-        """How much speaks against the effects named, of what may: what is left, or what they lose; 1 is the limit."""
-        return max(float(np.logaddexp(self.nameless_beside, 0.0)) / self.allowed, self.loss)
+        """How much speaks against the effects named, over what may: what is left, or what they lose; 1 is the limit."""
+        return max(float(np.logaddexp(self.nameless.beside, 0.0)) / self.allowed, self.loss)
 
     @property
     def loss(self) -> float:
-        """What the effects named lose where they say what is not there, of what may be chance."""
-        return self.contradicted[0] / self.least_left if self.contradicted[0] else 0.0
+        """What the effects named lose where they say what is not there, over what may be chance."""
+        return self.contradicted.nats / self.least_left if self.contradicted.nats else 0.0
 
     @property
     def explained(self) -> bool:
         """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
         return self.unlike < 1.0
+
+
+def _of_names(terms: Terms, names: Container[str]) -> Terms:
+    """The terms whose effect is among the names."""
+    return tuple(t for t in terms if t.name in names)

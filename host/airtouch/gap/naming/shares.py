@@ -11,13 +11,13 @@ from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.selection import Step
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(trial: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
+def with_shares(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     """The steps of a selection, those that are named with their `share`, nats, where there are several."""
     if sum(s.named for s in steps) < 2:
         return list(steps)
@@ -25,7 +25,7 @@ def with_shares(trial: Trial, steps: Sequence[Candidate]) -> list[Candidate]:
             for place, s in enumerate(steps)]
 
 
-def _gain_without(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
+def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
     last, dropped = steps[-1], _own(steps, place)
     others = _without(last.terms, dropped)
@@ -34,19 +34,19 @@ def _gain_without(trial: Trial, steps: Sequence[Candidate], place: int) -> float
         return gain
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
     gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
-    cost_of_dropped = steps[place].choice_cost - (steps[place - 1].choice_cost if place else 0.0)
+    cost_of_dropped = steps[place].charges.choice_cost - (steps[place - 1].charges.choice_cost if place else 0.0)
     gain += _gained_while_certain(trial, steps, place)
-    return gain - price_of(refits[-1].terms) - (last.choice_cost - cost_of_dropped)
+    return gain - price_of(refits[-1].terms) - (last.charges.choice_cost - cost_of_dropped)
 
 
-def _gained_while_certain(trial: Trial, steps: Sequence[Candidate], place: int) -> float:
-    """`Candidate.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
+def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:
+    """`Charges.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
     first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_newest(steps, i))), 0)
     earlier = [i for i in range(first_random) if i != place]
     if not earlier:
         return 0.0
     if place > first_random:
-        return steps[-1].gained_while_certain
+        return steps[-1].charges.gained_while_certain
     later = frozenset().union(*(_own(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
     return lost_beside_random(trial, refits)
@@ -57,13 +57,13 @@ def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
 
 
-def _newest(steps: Sequence[Candidate], place: int) -> list[Term]:
+def _newest(steps: Sequence[Step], place: int) -> list[Term]:
     """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
     before = {_key(t) for t in steps[place - 1].terms} if place else set()
     return [t for t in steps[place].terms if _key(t) not in before]
 
 
-def _own(steps: Sequence[Candidate], place: int) -> frozenset[tuple]:
+def _own(steps: Sequence[Step], place: int) -> frozenset[tuple]:
     """Keys of the terms that the step at a place has added."""
     return frozenset(_key(t) for t in _newest(steps, place))
 

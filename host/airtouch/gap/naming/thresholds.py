@@ -1,4 +1,7 @@
-"""What an effect must gain beside others: no model is exact, and what one leaves another explains in part."""
+"""What a further effect must gain beside those before it.
+
+No model of an effect is exact. What one leaves of the gap, another one explains in part, though it does not act.
+"""
 
 from collections.abc import Sequence
 
@@ -13,15 +16,18 @@ from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
-#: a further effect must gain this share of what the effects before it gain: in simulated flights of what they gain
-#: where it does, in recorded ones of all, as no model of air is exact; both chosen
-LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1
-#: the same of an effect that changes the loop, beside one that changes or shakes it: with this project's firmware twice
-#: what wrong ones gained at most beside right ones in 43 simulated flights; with others as little as the loop model is
-#: trusted (`torque_power.TORQUE_DOUBT`), chosen
-ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
-#: the same of a random effect, to be named: what a model is wrong by looks random. Beside weak motors and offset masses
-#: motor noise gained 3 to 16 %: the yaw command of the logged instant is not that of the 10 ms around it
+# The shares below are fractions of the nats that the effects of a hypothesis gain. A further effect must gain as much
+# beside them, since what their models are wrong by may look like it.
+LEAST_SHARE = 0.01  #: in simulated flights, of what is gained in the cells that the further effect improves; chosen
+RECORDED_SHARE = 0.1  #: in recorded flights, of the whole gain, as no model of air is exact; chosen
+#: for an effect that changes the loop, beside one that is random or changes it too, with this project's own firmware;
+#: chosen: twice the 5 % that wrong ones gained at most beside right ones in 43 simulated flights (2026-11-23)
+ASSUMED_SHARE = 0.1
+#: the same with any other firmware; chosen, as large as the error of the loop model `torque_power.TORQUE_DOUBT`
+LOOP_SHARE = 0.25
+#: for a random effect, to be named; chosen. Beside weak motors and offset masses, motor noise that was not there gained
+#: 3 to 16 % in simulated flights (host/docs/looks.md, 2026-11-23 19:09): the yaw command of the logged instant is not
+#: that of the 10 ms around it
 RANDOM_SHARE = 0.25
 
 
@@ -44,12 +50,12 @@ def is_random_misfit(trial: Trial, base: Candidate, extended: Candidate) -> bool
 
 
 def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:
-    """Nats that a further effect may gain because the effects before it are wrong by a share of theirs.
+    """Nats that a further effect may gain because the models of those before it are wrong by a share of their gain.
 
-    base, extended: as for `least_further_gain`. What the effects on the logged times gain is no model's and does not
-    count. In simulated flights a model is wrong where it acts, so that only cells count in which the further effect
-    gains (`gain_in_improved_cells`), unless `everywhere`; nor are cells looked at where it gains more than the whole
-    share.
+    It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects on the logged times gain does
+    not count, as these are no models. In simulated flights a model is wrong where it acts, so that only its gain in
+    cells counts in which the further effect gains (`gain_in_improved_cells`), unless `everywhere`. These cells are not
+    worked out for a further effect that gains more than the share of the whole.
     """
     whole = max(LEAST_GAIN, share * (base.gain - clock_gains(trial.data, base.terms)))
     fitted = extended.full and extended.fits and base.fits
@@ -60,9 +66,9 @@ def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, eve
 
 
 def gain_in_improved_cells(base: np.ndarray, extended: np.ndarray) -> float:
-    """Nats that a hypothesis gains in those cells in which a longer one gains more than CELL_GAIN beyond it.
+    """Nats that a hypothesis gains in those cells in which a longer one gains CELL_GAIN more.
 
-    base, extended (CELLS,): nats that each of the two gains by cell. The axes of a sensor in one band count as one
+    base, extended (CELLS,): nats that each of the two gains in each cell. The axes of a sensor in one band count as one
     cell: an effect that pushes forward and one that pushes up act on one body.
     """
     sensor = sensor_cells()

@@ -51,7 +51,7 @@ CHANNEL_WORDS = {
     "command_pitch": "pitch command", "command_yaw": "yaw command",
 }
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
-COUNT = len(CHANNELS)
+COUNT = len(CHANNELS)  #: of a table with a column for each channel
 KEPT = 12  #: residuals of one flight that are cached for gates to be put together from; chosen
 
 
@@ -66,28 +66,29 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
              controller: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
-    """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
+    """Measured minus modelled, (n, COUNT), in the channels' units; NaN in channels that this flight cannot have.
 
-    `active`: effects that the model has. In the phase GROUND the model is a vehicle at rest, whether the motors run or
+    active: effects that the model has; controller: of the loop that makes the commands, without which these are NaN;
+    seed: of the noise that effects draw. In the phase GROUND the model is a vehicle at rest, whether the motors run or
     not: samples there with running motors are never usable (`contact.near_ground`). Without a gyro the angular
-    acceleration is taken as zero, which holds at low frequency (the floor says how low). workspace: has what gates put
-    together, for the next gate of the same effects in this flight.
+    acceleration is taken as zero, which holds at low frequency (the floor says how low). workspace: keeps the residuals
+    that gates are put together from, for the next gate of the same effects in this flight.
     """
     gated = [a for a in active if a.gate]
     if not gated:
         return _ungated_residual(flight, vehicle, active, controller, seed)
     always, cache = [a for a in active if not a.gate], workspace or Workspace()
 
-    def of(some: Sequence[Active]) -> np.ndarray:
-        """Residual of effects that always act; cached."""
-        return cache.cached("residual", tuple(a.key for a in some),
-                            lambda: _ungated_residual(flight, vehicle, some, controller, seed), KEPT)
+    def cached_residual(effects: Sequence[Active]) -> np.ndarray:
+        """Residual (n, COUNT) of effects that always act."""
+        return cache.cached("residual", tuple(a.key for a in effects),
+                            lambda: _ungated_residual(flight, vehicle, effects, controller, seed), KEPT)
 
-    out = of(always).copy()
+    out = cached_residual(always).copy()
     for a in gated:
         acts = inside(a.gate, flight)
         if acts.any():
-            out[acts] += of([*always, replace(a, gate=())])[acts] - of(always)[acts]
+            out[acts] += cached_residual([*always, replace(a, gate=())])[acts] - cached_residual(always)[acts]
     return out
 
 
@@ -122,7 +123,7 @@ def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]
 def angular_acceleration(flight: Flight) -> np.ndarray:
     """Differences of the gyro (n, 3), rad/s^2; zero where there is none, which holds at low frequency.
 
-    Worked out once for a flight, and not to be changed.
+    It is cached, and not to be changed.
     """
     def make() -> np.ndarray:
         """Differences to the next sample, straight lines over those that bridge lost rows."""

@@ -31,7 +31,7 @@ from airtouch.simulation.effects import Active
 
 EDGE_FREEDOM = 6.0  #: degrees of freedom of the Student-like tails of responses at edges; chosen
 KEPT = 300  #: hypotheses whose expected power is cached; chosen
-SMALL = 1e-3  #: change of a scaled parameter over which the likelihood's slope is taken; chosen
+SMALL = 1e-3  #: change of a scaled parameter, in natural steps, over which the likelihood's slope is taken; chosen
 #: channel of each number of a response at an edge: thrust by the thrust command, speed by pitch, height by thrust
 EDGE_CHANNELS = np.repeat([COMMAND.start, COMMAND.start + AXES.index("pitch"), COMMAND.start],
                           [n for _, n in edge_response.BINS])
@@ -53,14 +53,16 @@ class CommandElements(NamedTuple):
 
 
 class CommandView:
-    """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes.
+    """The commands of some flights: values with their floor, and their expected power under a hypothesis.
 
-    First the spectra of all blocks, flight by flight, then the responses at edges.
+    flights, spectra, powers: number of each flight that has blocks, their spectra (blocks, bins, AXES), and the squares
+    of these; edges: (flight, its number, edge) of each edge. values, floor, channel, frequency, flight, freedom: what
+    `CommandElements` holds of all of them, first the spectra, flight by flight, then the responses at edges.
     """
 
     def __init__(self, loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
                  pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
-        """The view of the pieces in the air. loop: of nominal flights; None for no view, which has no element.
+        """The view of the pieces in the air. loop: of nominal flights; without one the view has no element.
 
         first: of each flight by regime the first samples of the replay's blocks; pieces: number of a flight, regime,
         and which of these blocks count, bool.
@@ -69,7 +71,6 @@ class CommandView:
         in_air = [(i, first[i][AIR] + AIR_LENGTH[AIR] // 2, chosen) for i, regime, chosen in pieces
                   if loop is not None and regime == AIR and chosen.any()]
         by_flight = [(i, self._chosen_spectra(flights[i], middle, chosen)) for i, middle, chosen in in_air]
-        #: number of each flight that has blocks, and their spectra (blocks, bins, AXES)
         self.flights, self.spectra = [i for i, s in by_flight if len(s)], [s for _, s in by_flight if len(s)]
         self.powers = [np.abs(s) ** 2 for s in self.spectra]
         self.edges = [(flights[i], i, e) for i, middle, chosen in in_air for e in self._chosen_edges(
@@ -129,8 +130,8 @@ class CommandView:
         assert self.loop.edges is not None
         return self.loop.edges
 
-    def moved(self, active: Sequence[Active]) -> np.ndarray:
-        """Values (elements,) less what effects add to the responses at edges."""
+    def values_without(self, active: Sequence[Active]) -> np.ndarray:
+        """Values (elements,) less what effects add to the responses at edges; the spectra stay as they are."""
         if not self.edges or not any(signature_of(a.effect).at_edges for a in active):
             return self.values
         out = self.values.copy()
@@ -151,7 +152,7 @@ class CommandView:
         return self.workspace.cached("power", (ratio.tobytes(), wide), lambda: self._expected(ratio, wide), KEPT)
 
     def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
-        """`power` where that of the commands is a multiple (bins, AXES) of nominal flights'."""
+        """`power` where effects multiply that of the commands by a ratio (bins, AXES)."""
         powers, cost = [], 0.0
         for s in self.powers:
             correction = correction_of(s, self.loop.floor, ratio, wide)
@@ -161,15 +162,15 @@ class CommandView:
         return np.concatenate(powers), cost
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
-        """By how much the logarithm of the expected power rises (bins, axes) from one hypothesis to another."""
+        """Rise (bins, AXES) of the logarithm of the expected power from one hypothesis to another; (0, AXES) for none."""
         if not self.spectra:
             return np.zeros((0, len(AXES)))
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood for k parameters.
+        """Gradient (k,) and information (k, k) of the log likelihood for k scaled parameters.
 
-        rise (k, bins, AXES): of the logarithm of the power by each of them.
+        rise (k, bins, AXES): of the logarithm of the power per scaled parameter; active, wide: see `power`.
         """
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
@@ -181,14 +182,17 @@ class CommandView:
             gradient[i] = (up - down) / (2.0 * SMALL)
         for s in self.powers:
             correction = correction_of(s, self.loop.floor, ratio, wide)
-            for a in range(len(AXES)):  # what the shapes can take up tells nothing
-                j = rise[:, :, a]
-                cross = correction.weight * j @ smooth_shapes().T
-                information += correction.weight * j @ j.T - cross @ correction.covariance @ cross.T
+            for axis in range(len(AXES)):  # what the shapes can take up tells nothing
+                slope = rise[:, :, axis]
+                cross = correction.weight * slope @ smooth_shapes().T
+                information += correction.weight * slope @ slope.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
     def _level(self, ratio: np.ndarray, wide: bool) -> float:
-        """Log likelihood of the spectra where power is expected to be a multiple of the floor, less what that costs."""
+        """Log likelihood of the spectra, less the costs of the floor's correction.
+
+        ratio (bins, AXES): by which effects multiply the floor.
+        """
         total = 0.0
         for s in self.powers:
             correction = correction_of(s, self.loop.floor, ratio, wide)

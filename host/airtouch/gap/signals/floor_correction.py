@@ -17,20 +17,17 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
-#: nepers of power, standard deviation of the amounts of these shapes: of the level, of the others; chosen
-SPREAD = (0.10, 0.04)
+SPREAD = (0.10, 0.04)  #: nepers of power, standard deviation of the amount of the first shape, of each other; chosen
 ROUNDS = 4  #: Newton steps to the correction; chosen
-#: factor on `SPREAD` where random effects shake the loop in ways that no log holds; chosen
-WIDE = 6.0
-#: relative error of the loop model in the logarithm of a change of the commands' spectra by effects; chosen
-COMMAND_DOUBT = 0.1
+WIDE = 6.0  #: factor on SPREAD where random effects shake the loop in ways that no log holds; chosen
+COMMAND_DOUBT = 0.1  #: error of the loop model, as a share of the logarithm of `ClosedLoop.ratio`; chosen
 
 
 class Correction(NamedTuple):
     """What the floor is off by in one flight, under a hypothesis.
 
-    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together;
-    covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
+    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together,
+    OVERLAP_WEIGHT each; covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
     """
 
     log_power: np.ndarray

@@ -1,8 +1,8 @@
 """Power that straight lines across lost rows add to the spectra of the gap.
 
 A row that never reached the log takes a command with it that the motors have followed, so the replay is off until their
-thrust has settled. How far, the same flight tells: the same rows, taken out where they did arrive, change its residuals
-by so much.
+thrust has settled. The same flight says how far: where its rows did arrive, some are taken out in the same pattern, and
+its residuals change by so much.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SHIFTS = 12  #: places along the flight at which the pattern of lost rows is tried; chosen
+SHIFTS = 12  #: places along the flight to which the pattern of lost rows is shifted; chosen
 
 
 def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active], first: np.ndarray,
@@ -30,7 +30,7 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     It is zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight. quiet
     (blocks, 3), response: as `Response.with_residual` takes them; without, the torque is that of the logged commands.
     """
-    total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))
+    total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))  # of the shifts with room
     if not flight.lost.any() or not len(first):
         return total
     gap, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)

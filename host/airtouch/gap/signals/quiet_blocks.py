@@ -1,44 +1,62 @@
-"""Blocks of a flight in which no set-point stepped, told by the power of the modelled torque there."""
+"""Blocks of a flight in which no set-point stepped, told by the power of the modelled torque there.
+
+A step kicks the command, so that the torque modelled from it is stronger than the noise of the other blocks.
+"""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.loop.command_spectra import TINY
+from airtouch.gap.loop.command_spectra import VANISHING_POWER
 
-QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows; chosen
-#: power of the modelled torque over the nominal one, scaled to the flight (`are_quiet`), from which a set-point
-#: stepped; chosen
+QUIET_BINS = slice(2, 31)  #: bins of 0.8 to 12 Hz, in which a step of the set-point shows; chosen
+#: a set-point stepped where the modelled torque has more than this multiple of the power of the calm blocks of its
+#: flight, which nominal flights give (`are_quiet`); chosen
 STEPPED_TORQUE = 2.0
-CALM = 0.25  #: fraction of a flight's blocks that hold no step; chosen
+CALM = 0.25  #: fraction of a flight's blocks, the quietest ones, that are taken to hold no step; chosen
 ROUNDS = 4  #: iterations of the search for quiet blocks; the last two agree
 
 
-def of_nominal_flights(modelled: Sequence[np.ndarray], power: np.ndarray,
-                       ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`Response.nominal` (not smoothed), `Response.calm`, and the blocks without a step, bool (blocks, 3).
+class QuietPower(NamedTuple):
+    """Power of the modelled torque in those blocks of nominal flights that hold no step.
 
-    modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the nominal power
-    is that of blocks without a step, and a step is what is stronger.
+    mean (bins, 3): its mean, (rad/s^2)^2/Hz; calm (3,): power in QUIET_BINS, as a multiple of that mean, that the
+    quietest quarter (CALM) of a flight's blocks does not exceed: the median of the flights.
+    """
+
+    mean: np.ndarray
+    calm: np.ndarray
+
+
+def of_nominal_flights(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[QuietPower, np.ndarray]:
+    """The power of quiet blocks in nominal flights, and which of all their blocks are quiet, bool (blocks, 3).
+
+    modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the power is
+    measured on quiet blocks, and blocks are quiet that are not much stronger.
     """
     quiet = np.ones((len(power), 3), bool)
     for _ in range(ROUNDS):
-        nominal = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0) / np.log(2.0)  # mean of an exponential
-        calm = np.median([np.quantile(_powers(m, nominal), CALM, axis=0) for m in modelled if len(m)], axis=0)
-        quiet = np.concatenate([are_quiet(m, nominal, calm) for m in modelled])
-    return nominal, calm, quiet
+        median = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0)
+        mean = median / np.log(2.0)  # of an exponential law
+        calm = np.median([np.quantile(_over(mean, m), CALM, axis=0) for m in modelled if len(m)], axis=0)
+        nominal = QuietPower(mean, calm)
+        quiet = np.concatenate([are_quiet(m, nominal) for m in modelled])
+    return nominal, quiet
 
 
-def are_quiet(modelled: np.ndarray, nominal: np.ndarray, calm: np.ndarray) -> np.ndarray:
-    """Blocks without a step, bool (blocks, 3): their modelled torque is about as strong as in the quietest quarter.
+def are_quiet(modelled: np.ndarray, nominal: QuietPower) -> np.ndarray:
+    """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3) of a flight.
 
-    In nominal flights that quarter of a flight's blocks has a share calm (3,) of the nominal power. A lower gain makes
-    both the noise and the steps weaker, so that a limit fixed by nominal flights would take steps for noise.
+    The limit goes with the flight's own calm blocks: a lower gain makes both the noise and the steps weaker, so that a
+    limit fixed by nominal flights would take steps for noise.
     """
-    power = _powers(modelled, nominal)
-    return power < STEPPED_TORQUE * np.quantile(power, CALM, axis=0) / calm if len(power) else np.zeros((0, 3), bool)
+    if not len(modelled):
+        return np.zeros((0, 3), bool)
+    power = _over(nominal.mean, modelled)
+    return power < STEPPED_TORQUE * np.quantile(power, CALM, axis=0) / nominal.calm
 
 
-def _powers(modelled: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the nominal one, where a step shows."""
-    return (np.abs(modelled) ** 2 / np.maximum(nominal, TINY))[:, QUIET_BINS].mean(axis=1)
+def _over(mean: np.ndarray, modelled: np.ndarray) -> np.ndarray:
+    """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the mean one (bins, 3), in QUIET_BINS."""
+    return (np.abs(modelled) ** 2 / np.maximum(mean, VANISHING_POWER))[:, QUIET_BINS].mean(axis=1)

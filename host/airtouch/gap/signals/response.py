@@ -1,7 +1,7 @@
 """The torque view: measured angular acceleration y held against w, what the model makes of the logged commands.
 
-Both are spectra (blocks, bins, 3) about three axes. Nominal flights give a law E[y | w] for each of two kinds of
-blocks, quiet ones and those in which a set-point stepped (`Law`, (bins, 3) each). Of a flight under a hypothesis the
+Both are spectra (blocks, bins, 3) about three axes, rad/s^2/sqrt(Hz). Nominal flights give a law E[y | w] for each of
+two kinds of blocks, quiet ones and those in which a set-point stepped (`Law`). Of a flight under a hypothesis the
 residual (blocks, bins, 3) is y minus that, plus what effects add to it, weighted to the floor of quiet blocks
 (`Response.with_residual`). In the spectra of the gap it takes the place of measured minus modelled torque.
 
@@ -10,7 +10,7 @@ and the kicks of the outer loop's steps, which did, are mostly not in it. So of 
 frequency and axis (linear regression with errors in w: Fuller, Measurement Error Models, 1987, chapter 1):
 
     E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal (`Law`)
-    residual = y - q c w + what effects add                      c: change of q by effects, `Law.ratio`
+    residual = y - q c w + what effects add                      c: ratio of q with effects to q without, `Law.ratio`
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q is seen too, or as a torque from outside, which acts past the loop that
@@ -20,29 +20,31 @@ are not) and leave another floor, to which their residual is weighted.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.loop.command_spectra import TINY
+from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
 from airtouch.gap.signals import quiet_blocks
 from airtouch.gap.signals.channels import TORQUE
+from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
-FIRST_BIN = 2  #: below it lie the means, which the Hann window spreads over two bins: there q is 1
+FIRST_BIN = 2  #: bins below it hold the means, which the Hann window spreads over two bins: there q is 1
 FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
-#: Relative error of the loop model in that change of the transfer function which the command's limits make. It is the
-#: error in pairs of simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each.
+#: relative error of the loop model in that change of the transfer function which the command's limits make: that in
+#: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
-#: Relative error of the loop model in the commands that answer a torque. It is the error in eight pairs of simulated
-#: flights with and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz).
+#: relative error of the loop model in the commands that answer a torque: that in eight pairs of simulated flights with
+#: and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz)
 ANSWER_DOUBT = 0.2
-#: Difference of `transfer` and the loop model in simulated flights of its own loop, by twelve pairs of flights
-#: (looks.md, 2026-11-24).
+#: difference of q from that of the loop model, taken as a standard deviation: that in twelve pairs of simulated flights
+#: of its own loop (host/docs/looks.md, 2026-11-24 03:20)
 SHARE_DOUBT = 0.2
-NOISE = 0.2  #: coherence up to which a transfer is the gyro's noise in both, and not believed; chosen
+NOISE = 0.2  #: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; chosen
 
 
 @dataclass(frozen=True)
@@ -66,35 +68,47 @@ class TorqueSpectra:
                              None if self.disturbance is None else self.disturbance[index])
 
 
+class OutsideTorque(NamedTuple):
+    """What the residual of a law, before its weight, has of a torque from outside; (bins, 3) each, without unit.
+
+    transfer: complex, residual over a known torque; power: power of the residual over that of a random torque.
+    """
+
+    transfer: np.ndarray
+    power: np.ndarray
+
+
 @dataclass(frozen=True)
 class Law:
     """How the measured torque follows the modelled one in blocks of one kind, quiet or stepped; (bins, 3) each.
 
-    transfer: q, complex; coherent: q as far as it is no noise of the gyro in both: 0 up to a coherence of NOISE, q from
-    twice that on; bounded: that for what a hypothesis changes of the model, never above 1 in size; disturbance: what
-    remains of a torque from outside, complex; random: power that remains of a random one; weight: floor of quiet blocks
-    over that of these, rms; power: S_ww.
+    transfer: q, complex, without unit; coherent: q as far as it is no noise of the gyro in both: 0 up to a coherence of
+    NOISE, q from twice that on; outside: what the residual has of a torque from outside; weight: rms floor of quiet
+    blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz.
     """
 
     transfer: np.ndarray
     coherent: np.ndarray
-    bounded: np.ndarray
-    disturbance: np.ndarray
-    random: np.ndarray
+    outside: OutsideTorque
     weight: np.ndarray
     power: np.ndarray
+
+    @property
+    def bounded(self) -> np.ndarray:
+        """`coherent`, of a size of 1 at most (bins, 3): the part that is seen of what effects add by the commands."""
+        return self.coherent / np.maximum(np.abs(self.coherent), 1.0)
 
     def ratio(self, change: Change, kind: int) -> np.ndarray:
         """Ratio (bins, 3) of `coherent` with effects that change the loop to that without. kind: QUIET or STEPPED.
 
-        Of the commands a share a follows the loop model, the rest turn the vehicle as they say: q = a before + 1 - a,
-        with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, or 1 where model
-        and commands hardly differ. In yaw, mostly noise of the gyro, motors count where it is none.
+        A share a of the commands follows the loop model, the others turn the vehicle as they say: q = a before + 1 - a,
+        with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, with a prior at 1
+        of a spread SHARE_DOUBT in q. In yaw, mostly noise of the gyro, the motors count as far as q is no noise.
         """
         before, after = change.before[kind], change.motors * change.share[kind] * change.before[kind]
-        away = before - 1.0
-        along = ((self.transfer * change.logged - 1.0) * away.conj()).real
-        a = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(away) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
+        off_one = before - 1.0
+        along = ((self.transfer * change.logged - 1.0) * off_one.conj()).real
+        a = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(off_one) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
         out = (a * after + (1.0 - a) * change.motors) / (a * before + 1.0 - a)
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.coherent[:, 2]), 1.0) ** 2
         return out
@@ -104,32 +118,32 @@ class Law:
         c = 1.0 if change is None else self.ratio(change, kind)
         modelled = torque.measured - torque.residual
         residual = torque.measured - self.coherent * c * modelled
-        for share, added in ((self.bounded, torque.by_command), (self.disturbance, torque.disturbance)):
-            if added is not None:
-                residual = residual + share * added
+        if torque.by_command is not None:
+            residual = residual + self.bounded * torque.by_command
+        if torque.disturbance is not None:
+            residual = residual + self.outside.transfer * torque.disturbance
         return self.weight * residual
 
 
 @dataclass(frozen=True)
 class Response:
-    """The laws of quiet and of stepped blocks, the latter None where nominal flights have too few of them.
+    """How the gyro follows the logged commands of nominal flights.
 
-    nominal (bins, 3): power of the modelled torque in nominal flights, whose quietest quarter of blocks has no more
-    than a share calm (3,) of it.
+    quiet_power: of the modelled torque in their quiet blocks, smooth over frequency, by which blocks are told quiet or
+    stepped. quiet_law, stepped_law: of blocks of either kind, the latter None where nominal flights have too few.
     """
 
-    nominal: np.ndarray
-    calm: np.ndarray
+    quiet_power: QuietPower
     quiet_law: Law
     stepped_law: Law | None
 
     def quiet(self, modelled: np.ndarray) -> np.ndarray:
         """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3)."""
-        return quiet_blocks.are_quiet(modelled, self.nominal, self.calm)
+        return quiet_blocks.are_quiet(modelled, self.quiet_power)
 
     def with_residual(self, spectra: np.ndarray, quiet: np.ndarray, torque: TorqueSpectra,
                       change: Change | None = None) -> np.ndarray:
-        """Spectra (blocks, bins, COUNT) of the gap, their torque above the means by the laws; NaN where none is known.
+        """Spectra (blocks, bins, COUNT) of the gap, the torque above the means by the laws; NaN where there is no law.
 
         spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
         change: by effects that change the loop.
@@ -165,9 +179,10 @@ class Response:
 
         sensed: on the gyro alone.
         """
-        by_kind = [np.ones(self.nominal.shape) if law is None else
-                   law.weight ** 2 * (1.0 if sensed else law.random) for law in (self.quiet_law, self.stepped_law)]
-        out = np.nan_to_num(np.where(quiet[:, None], *by_kind), nan=1.0)  # no law: such blocks do not count
+        in_quiet, in_stepped = (np.ones(self.quiet_power.mean.shape) if law is None else
+                                law.weight ** 2 * (1.0 if sensed else law.outside.power)
+                                for law in (self.quiet_law, self.stepped_law))
+        out = np.nan_to_num(np.where(quiet[:, None], in_quiet, in_stepped), nan=1.0)  # without a law none is counted
         out[:, :FIRST_BIN] = 1.0
         return out
 
@@ -175,19 +190,20 @@ class Response:
 def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray], loop: Disturbed) -> Response | None:
     """The response of nominal flights from their spectra (blocks, bins, 3); None for too few blocks.
 
-    residuals: measured minus modelled. loop: what it makes of a torque from outside.
+    measured, residuals: angular acceleration, and measured minus modelled one, of each flight. loop: what it makes of a
+    torque from outside.
     """
     y = np.concatenate(measured)
     w = y - np.concatenate(residuals)
     if len(y) < FEWEST:
         return None
     modelled = [m - r for m, r in zip(measured, residuals, strict=True)]
-    nominal, calm, quiet = quiet_blocks.of_nominal_flights(modelled, np.abs(w) ** 2)
-    steady, floor = _law(y, w, quiet, loop, None)
-    stepped = None
+    power, quiet = quiet_blocks.of_nominal_flights(modelled, np.abs(w) ** 2)
+    quiet_law, floor = _law(y, w, quiet, loop, None)
+    stepped_law = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
-        stepped, _ = _law(y, w, ~quiet, loop, floor)
-    return Response(nominal=_smooth(nominal), calm=calm, quiet_law=steady, stepped_law=stepped)
+        stepped_law, _ = _law(y, w, ~quiet, loop, floor)
+    return Response(QuietPower(_smooth(power.mean), power.calm), quiet_law, stepped_law)
 
 
 def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
@@ -203,18 +219,17 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floo
         return (values * mask).sum(axis=0) / count
 
     power = mean(np.abs(w) ** 2)
-    q = mean(y * w.conj()) / np.maximum(power, TINY)
-    coherence = _smooth(np.abs(q) ** 2 * power / np.maximum(mean(np.abs(y) ** 2), TINY))
+    q = mean(y * w.conj()) / np.maximum(power, VANISHING_POWER)
+    coherence = _smooth(np.abs(q) ** 2 * power / np.maximum(mean(np.abs(y) ** 2), VANISHING_POWER))
     transfer = _smooth(q.real) + 1j * _smooth(q.imag)
     coherent = transfer * np.clip((coherence - NOISE) / NOISE, 0.0, 1.0)
-    own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), TINY))))
+    own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER))))
     enough = chosen.sum(axis=0) >= FEWEST
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
-    disturbance = loop.measured - answer
-    return Law(transfer=transfer, coherent=coherent, bounded=coherent / np.maximum(np.abs(coherent), 1.0),
-               disturbance=disturbance, random=np.abs(disturbance) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2,
-               weight=weight, power=_smooth(power)), own_floor
+    remains = loop.measured - answer
+    outside = OutsideTorque(remains, np.abs(remains) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2)
+    return Law(transfer, coherent, outside, weight, _smooth(power)), own_floor
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

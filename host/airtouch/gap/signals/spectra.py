@@ -1,8 +1,8 @@
 """Short-time spectra of the gap, and the floor that they are held against.
 
 Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping (Welch 1967). A bin's value over the
-square root of the floor's power is a complex normal number of power 1 when nothing is wrong. The file reads: blocks of
-a flight, their spectra, which bins count, the floor of nominal flights.
+square root of the floor's power is a complex normal number of power 1 in a nominal flight. The file reads: blocks of a
+flight, their spectra, which bins count, the floor of nominal flights.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,19 @@ from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
 
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
-OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
-MOST_LOST = 0.1  #: share of bridged samples that a block may have; chosen
-HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
-LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted; chosen
-#: Hz, below which, in the lowest band, torque and rate hold the trim of a flight, which does not go with how hard it is
-#: flown
+OVERLAP_WEIGHT = 0.5  #: of a block in a sum of log likelihoods, as half overlapping blocks hold every sample twice
+MOST_LOST = 0.1  #: share of a block's samples that may be bridged; chosen
+HANN_POWER = 1.5  #: bins, noise bandwidth of a Hann window
+LEAST_LEFT = 0.1  #: share of a block's power that is left at least when the power of lost rows is taken off; chosen
+#: Hz, upper end of the band in which torque and rate hold the trim of a flight, which does not go with how hard it is
+#: flown: that of the lowest band
 TRIM_HZ = BANDS_HZ[1]
-FEWEST_BLOCKS = 4  #: blocks of nominal flights for a floor of their own; chosen
-LEAKED = 0.5  #: bins, at which a spectrum that falls to 0 is taken in the lowest one, as its window leaks; chosen
-UNKNOWN_FLOOR = 2.0  #: power of the floor over that of the sensors' noise where there are fewer; chosen
-LEAST_FLOOR = 0.5  #: least power of a floor over that of the sensors' noise; chosen
-LEAST_POWER = 1e-300  #: power that is divided by, or has a logarithm, at least; below any measured
+FEWEST_BLOCKS = 4  #: blocks of nominal flights that a floor is measured on; chosen
+UNKNOWN_FLOOR = 2.0  #: power of a floor for which there are fewer, over that of the sensors' noise; chosen
+LEAST_FLOOR = 0.5  #: least power of a measured floor over that of the sensors' noise; chosen
+#: bins, frequency at which a spectrum that falls to 0 is taken in its lowest bin, as the window leaks into it; chosen
+LEAKED = 0.5
+LEAST_POWER = 1e-300  #: least power that is divided by or has a logarithm; below any measured
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 
 
@@ -48,9 +49,9 @@ def frequencies(regime: str) -> np.ndarray:
 
 
 def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
-    """Spectra (blocks, bins, channels) of values (n, channels), unit/sqrt(Hz).
+    """Spectra (blocks, bins, channels) of values (n, channels) in blocks from samples `first`, unit/sqrt(Hz).
 
-    |.|^2 has the mean of the one-sided PSD; a constant x gives x * sqrt(duration / 1.5).
+    The mean of |.|^2 is the one-sided PSD; a constant x gives x * sqrt(duration / 1.5) in the lowest bin.
     """
     length = LENGTH[regime]
     if not len(first):
@@ -72,7 +73,7 @@ def squared(values: np.ndarray) -> np.ndarray:
 
 
 def judged_bins(regime: str) -> np.ndarray:
-    """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
+    """Which bins of each channel count, bool (bins, COUNT): those in its band; on the ground of force and rate alone.
 
     In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
     """
@@ -89,11 +90,11 @@ def judged_bins(regime: str) -> np.ndarray:
 class Floor:
     """Power of the residuals of nominal flights, against which a gap is held.
 
-    power: by regime (bins, COUNT), unit^2/Hz, from `blocks` blocks of it; offset (COUNT,): standard deviation between
-    flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,): that of it which the power in the
-    lowest bin does not give; clock_s: rms of the logged times around regular ones, s; lost: share of lost samples;
-    slopes: of the power in the air with how hard the vehicle is flown, None for too few flights; least (bins, COUNT):
-    power in the air of the sensors alone.
+    power: by regime (bins, COUNT), unit^2/Hz; blocks: by regime, how many it is measured on; offset (COUNT,): standard
+    deviation between flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,): that part of it which
+    the power in the lowest bin does not give; clock_s: rms of the logged times around regular ones, s; lost: share of
+    lost samples; slopes: of the power in the air with how hard the vehicle is flown, None for too few flights; least
+    (bins, COUNT): power in the air that stays however calmly it is flown.
     """
 
     power: dict[str, np.ndarray]
@@ -132,16 +133,16 @@ class NominalBlocks:
 def floor_of(nominal: Sequence[NominalBlocks], least: np.ndarray) -> Floor:
     """The floor of flights declared nominal, one or more, from what the calibrated model leaves of them.
 
-    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
-    its difference), below which the floor never goes. What lost rows add is taken off, as each flight has its own, but
-    for what is left by chance.
+    least (COUNT,): white noise that the sensors are declared to have, rms at 100 Hz (of the gyro for torque, rad/s);
+    the floor never falls below LEAST_FLOOR of its power. The power that lost rows add is taken off, as each flight
+    loses other rows, to LEAST_LEFT of what is measured.
     """
     flights = [n.flight for n in nominal]
     powers = {r: np.abs(np.concatenate([n.spectra[r] for n in nominal])) ** 2 for r in (AIR, REST)}
     in_air, slopes = _power_in_air(nominal, powers[AIR])
     power = {AIR: _floor_power(in_air, sensor_power(least, AIR)),
              REST: _floor_power(powers[REST], sensor_power(least, REST))}
-    offset, beyond = _between(nominal, power[AIR][0])
+    offset, beyond = _offsets(nominal, power[AIR][0])
     return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
                  clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
                  lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
@@ -151,8 +152,8 @@ def floor_of(nominal: Sequence[NominalBlocks], least: np.ndarray) -> Floor:
 def _power_in_air(nominal: Sequence[NominalBlocks], power: np.ndarray) -> tuple[np.ndarray, Slopes | None]:
     """Power (blocks, bins, COUNT) as if all blocks were flown alike, and its slopes with how hard they are flown.
 
-    power: of all blocks in the air, from which what lost rows add is taken off. As it is, without slopes, for too few
-    blocks.
+    power (blocks, bins, COUNT): of all blocks in the air, from which what lost rows add is taken off. Too few blocks
+    stay as they are, and have no slopes.
     """
     if len(power) < FEWEST_BLOCKS:
         return power, None
@@ -170,10 +171,10 @@ def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0))), LEAST_FLOOR * sensor)
 
 
-def _between(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviation (COUNT,) of flights' means in the air, as measured and beyond chance.
+def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`Floor.offset` and `Floor.offset_beyond`, (COUNT,) each: 0 for one flight.
 
-    Chance is what the floor's power in the lowest bin, lowest (COUNT,), gives the means.
+    lowest (COUNT,): the floor's power in the lowest bin, which gives the means of flights a scatter by chance.
     """
     if len(nominal) < 2:
         return np.zeros(COUNT), np.zeros(COUNT)
@@ -185,7 +186,10 @@ def _between(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.n
 
 
 def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
-    """PSD (bins, COUNT) of the sensors' white noise; differences of the gyro rise with frequency."""
+    """PSD (bins, COUNT) of the sensors' white noise; that of the gyro's differences rises with frequency.
+
+    least (COUNT,): as for `floor_of`.
+    """
     f = frequencies(regime)
     white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
     differences = difference_power(np.maximum(f, LEAKED * f[1]))
@@ -194,7 +198,7 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
 
 
 def difference_power(f: np.ndarray) -> np.ndarray:
-    """PSD (bins,) at frequencies f (Hz) of the differences of two samples of what is white, over its own PSD."""
+    """PSD (bins,) of the differences between samples of white noise over its own, at frequencies f (bins,), Hz."""
     return 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2
 
 

@@ -25,12 +25,12 @@ if TYPE_CHECKING:  # folders below this one
 class Study:
     """What flights are compared with.
 
-    vehicle, calibration: the model without effects; controller: the nominal loops, None without them; floor: power of
-    the gap of nominal flights; response: how the gyro follows their commands, None where nobody knows; nameless_floor:
-    scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`); nominal: how many nominal
-    flights there are; scatter: how strong effects seem to be in them, None without any; relations: what was learned of
-    such flights (`relations.library.Library`), if anything; overhead: when another vehicle is known to be overhead,
-    none where nobody knows.
+    vehicle, calibration: the model without effects; controller: the control loop as nominal flights show it, None
+    without them; floor: power of the gap of nominal flights; response: how the gyro follows their commands, None where
+    nobody knows; nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`);
+    nominal_count: number of nominal flights; scatter: how strong effects seem to be in them, None without any;
+    relations: what was learned of such flights (`relations.library.Library`), if anything; overhead: when another
+    vehicle is known to be overhead, none where nobody knows.
     """
 
     vehicle: Vehicle
@@ -39,7 +39,7 @@ class Study:
     floor: Floor
     response: Response | None = None
     nameless_floor: "NamelessFloor | None" = None
-    nominal: int = 0
+    nominal_count: int = 0
     scatter: Scatter | None = None
     relations: "Library | None" = None
     overhead: Gate = ()
