@@ -200,7 +200,7 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
                       ) -> tuple[Selection, Gap]:
     """What is chosen among the candidates, and the gap that it closes.
 
-    In recorded flights some effects must close a part of the gap to be named, those of the loop also beside others: see
+    In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
     `naming.recorded`. Where they do not, the others are judged without them.
     """
     variants = candidates.all_candidates(without)
@@ -213,8 +213,8 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
         if gap.named.share.value - gap_of_rest.named.share.value < recorded.LEAST_CLOSED:
             selection = replace(rest, singles={**selection.singles, **rest.singles}, least=selection.least)
             gap = gap_of_rest
-    if recorded.must_close_the_gap(data, selection) and recorded.closes_too_little(
-            data, selection, gap.named.before, gap.named.share.value):
-        selection = recorded.with_none_named(selection)
+    closed = gap.named.share.value
+    if recorded.closes_too_little(data, selection, gap.named.before, closed):
+        selection = recorded.with_none_named(selection, closed)
         gap = gap_of(data, selection.parts, None)
     return selection, gap

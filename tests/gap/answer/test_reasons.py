@@ -7,7 +7,15 @@ import pytest
 
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
-from airtouch.gap.naming.selection import Candidate, Contradiction, NamelessGain, NominalFlights, Selection, Step
+from airtouch.gap.naming.selection import (
+    Candidate,
+    Contradiction,
+    NamelessGain,
+    NominalFlights,
+    Selection,
+    Step,
+    TakenBack,
+)
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
@@ -91,7 +99,9 @@ def test_where_nothing_is_named():
     nothing = selection((), beside=40.0)
     assert not nothing.explained
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
-    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 of the 150 nats that a model without names gains"
+    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, a model without names 150"
+    back = replace(nothing, taken_back=TakenBack("mass", -0.2))
+    assert shortfall(back, judged("mass", 990.0)) == "closes 0% of the gap, too little to be its cause"
     related = selection((), inference=True, beside=40.0)
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")

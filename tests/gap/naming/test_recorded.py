@@ -9,7 +9,7 @@ from airtouch.gap.naming.recorded import (
     LEAST_CLOSED,
     STANDS_OUT,
     closes_too_little,
-    must_close_the_gap,
+    least_closed,
     named_beside_the_loop,
 )
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -28,21 +28,24 @@ def flights(recorded):
     return SimpleNamespace(study=SimpleNamespace(recorded=recorded, controller=law))
 
 
-@pytest.mark.parametrize(("selection", "must"), [
-    (named("actuator_delay"), True), (named("mass"), False), (named("wind", gate=((0, 1),)), True),
-    (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), False), (SimpleNamespace(chosen=None, named=()), False)])
-def test_recorded_flights_hold_effects_of_the_loop_and_passing_ones_against_the_gap(selection, must):
-    assert must_close_the_gap(flights(recorded=True), selection) == must
-    assert not must_close_the_gap(flights(recorded=False), selection)
+OVER = STANDS_OUT + 0.1
 
 
-def test_what_passes_must_close_a_gap_only_where_one_stands_out():
-    passing, loop, data = named("wind", gate=((0, 1),)), named("actuator_delay"), flights(recorded=True)
-    little, enough = LEAST_CLOSED - 0.01, LEAST_CLOSED
-    assert closes_too_little(data, passing, STANDS_OUT + 0.1, little)
-    assert not closes_too_little(data, passing, STANDS_OUT, little)
-    assert closes_too_little(data, loop, 1.0, little)
-    assert not closes_too_little(data, loop, 2.0, enough)
+@pytest.mark.parametrize(("selection", "gap", "least"), [
+    (named("actuator_delay"), 1.0, LEAST_CLOSED), (named("mass"), OVER, 0.0), (named("mass"), STANDS_OUT, None),
+    (named("wind", gate=((0, 1),)), OVER, LEAST_CLOSED), (named("wind", gate=((0, 1),)), STANDS_OUT, None),
+    (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), OVER, None), (named("packet_loss"), OVER, None),
+    (SimpleNamespace(chosen=None, named=()), OVER, None)])
+def test_recorded_flights_hold_names_against_the_gap(selection, gap, least):
+    assert least_closed(flights(recorded=True), selection, gap) == least
+    assert least_closed(flights(recorded=False), selection, gap) is None
+
+
+@pytest.mark.parametrize(("name", "closed", "too_little"), [
+    ("actuator_delay", LEAST_CLOSED - 0.01, True), ("actuator_delay", LEAST_CLOSED, False),
+    ("mass", 0.04, False), ("mass", 0.0, True), ("mass", -0.8, True)])
+def test_an_effect_that_takes_nothing_away_is_no_cause(name, closed, too_little):
+    assert closes_too_little(flights(recorded=True), named(name), OVER, closed) == too_little
 
 
 def test_beside_others_effects_of_the_loop_are_held_against_the_gap():

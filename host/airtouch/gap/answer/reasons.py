@@ -45,10 +45,12 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     if candidate.evidence < FIRST_GAIN:
         return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
                 f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {FIRST_GAIN:.0f} are needed")
+    if candidate.name == selection.taken_back.name:
+        return f"closes {max(selection.taken_back.closed, 0.0):.0%} of the gap, too little to be its cause"
     if selection.chosen:
         return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {candidate.gain:.0f} of the {selection.nameless.alone:.0f} nats that a model without names gains"
+    return f"gains {candidate.gain:.0f} nats, a model without names {selection.nameless.alone:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:

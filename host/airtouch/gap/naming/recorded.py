@@ -1,48 +1,61 @@
-"""When recorded flights may name an effect: it must close a part of their gap where they differ by it anyway.
+"""When recorded flights may name an effect: it must close a part of their gap, a large one where they differ anyway.
 
 Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither is what a gap comes from.
+Against a baseline of another drone a bias or a wind may gain held-out likelihood and yet make the gap larger.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming.selection import Selection
+from airtouch.gap.naming.selection import Selection, TakenBack
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
 
-#: share of the gap that the effect named must close: as much as the loop model may be wrong by,
-#: `torque_power.TORQUE_DOUBT`; chosen
+#: share of the gap that an effect of the loop, or one that passes, must close: as much as the loop model may be wrong
+#: by, `torque_power.TORQUE_DOUBT`; chosen
 LEAST_CLOSED = 0.25
 #: gap, in units of the floor, from which what comes and goes must close it: the two halves of the data seldom share its
 #: seconds; chosen
 STANDS_OUT = 1.1
 
 
-def must_close_the_gap(data: Data, selection: Selection) -> bool:
-    """Whether these are recorded flights whose named effect lies between any two days: a loop's, or one that passes.
+def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
+    """Share of the gap that the effects named must close, to be named; None where they need not.
 
-    An effect whose seconds are known from another vehicle's log is no gust.
+    gap: before they are in the model, in units of the floor. In recorded flights one of the loop, and one that passes
+    where a gap stands out, must close LEAST_CLOSED. Others, where a gap stands out, must close some: a name that leaves
+    all of it is not its cause. That holds neither for the log's own times nor for an effect whose seconds are known
+    from another vehicle's log.
     """
-    if not data.study.recorded:
-        return False
-    return changes_the_loop(data, selection) or (comes_and_goes(selection) and selection.named[0].key != KNOWN_OVERHEAD)
+    chosen = selection.chosen
+    if not data.study.recorded or chosen is None or any(s.key == KNOWN_OVERHEAD for s in selection.named):
+        return None
+    if changes_the_loop(data, selection):
+        return LEAST_CLOSED
+    if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in chosen.terms):
+        return None
+    return LEAST_CLOSED if comes_and_goes(selection) else 0.0
 
 
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
-    """Whether such an effect closes too little of the gap to be named.
+    """Whether the effects named take away less of the gap than they must, or nothing.
 
-    gap: before it is in the model, in units of the floor; closed: share of it that the effect takes away. What comes
-    and goes is held to that only where a gap stands out that it could take away.
+    gap: as for `least_closed`; closed: share of it that they take away.
     """
-    return closed < LEAST_CLOSED and (changes_the_loop(data, selection) or gap > STANDS_OUT)
+    least = least_closed(data, selection, gap)
+    return least is not None and (closed < least or closed <= 0.0)
 
 
-def with_none_named(selection: Selection) -> Selection:
-    """The same flights with no effect named; what the nameless model gains is that of none."""
+def with_none_named(selection: Selection, closed: float) -> Selection:
+    """The same flights with no effect named, as those that were close too little of the gap.
+
+    closed: share of the gap that they close. What the nameless model gains is that of none.
+    """
     nameless = replace(selection.nameless, beside=selection.nameless.alone)
-    return replace(selection, steps=(), nameless=nameless, assumed=False)
+    first = selection.named[0].name
+    return replace(selection, steps=(), nameless=nameless, assumed=False, taken_back=TakenBack(first, closed))
 
 
 def comes_and_goes(selection: Selection) -> bool:

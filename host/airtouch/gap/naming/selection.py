@@ -141,6 +141,13 @@ class Contradiction(NamedTuple):
     cell: str = ""
 
 
+class TakenBack(NamedTuple):
+    """An effect that was named and is no more, as it closes too little of recorded flights' gap, and the share."""
+
+    name: str = ""
+    closed: float = 0.0
+
+
 @dataclass(frozen=True)
 class Selection:
     """The result of a selection of effects; gains are in held-out nats.
@@ -149,7 +156,8 @@ class Selection:
     nameless model gains; parts: the two halves that effects were fitted and judged on; least: nats that each candidate
     must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a chosen effect
     is assumed, as it is random or changes the loop of recorded flights; contradicted: what the effects named lose where
-    they say what is not there; inference: what named the effects, where the relations of signals did.
+    they say what is not there; inference: what named the effects, where the relations of signals did; taken_back: what
+    recorded flights name no more.
     """
 
     singles: Mapping[str, Candidate]
@@ -161,6 +169,7 @@ class Selection:
     assumed: bool
     contradicted: Contradiction = Contradiction()
     inference: Inference | None = None
+    taken_back: TakenBack = TakenBack()
 
     @property
     def whole(self) -> Step | None:

@@ -162,7 +162,7 @@ class CommandView:
         return np.concatenate(powers), cost
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
-        """Rise (bins, AXES) of the logarithm of the expected power from one hypothesis to another; (0, AXES) for none."""
+        """Rise (bins, AXES) of the log of the expected power from one hypothesis to another; (0, AXES) for none."""
         if not self.spectra:
             return np.zeros((0, len(AXES)))
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
