@@ -111,7 +111,7 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
         """Print a line about the row to standard error."""
         click.echo(f"{row.name}: {line}", err=True)
 
-    scores, folds, _ = crossval.crossval(row.detector, files, out, crossval.Study(options=row.options), tell=tell)
+    scores, folds, _ = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
     models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
     cache = out / f"float_{Path(folds[0]['model']).stem}.json"
     if not cache.exists():

@@ -33,7 +33,7 @@ from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
-from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.score import FlightScore, WindowCounts
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
@@ -134,7 +134,7 @@ def together(runs: Sequence[Sequence[FlightScore]]) -> list[FlightScore]:
     """Scores of several trainings on the same flights as one a flight, so that a flight is drawn whole."""
     return [replace(same[0], edges=sum((s.edges for s in same), ()), false=sum((s.false for s in same), ()),
                     detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),
-                    windows=tuple(np.sum([s.windows for s in same], axis=0).tolist()),
+                    windows=WindowCounts(*np.sum([s.windows for s in same], axis=0).tolist()),
                     bins=np.sum([s.bins for s in same], axis=0)) for same in zip(*runs, strict=True)]
 
 

@@ -26,7 +26,7 @@ from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.data.dataset import FlightFile
-from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.score import FlightScore, WindowCounts
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.detector.shared import sensors, training_set
 from airtouch.errors import AirTouchError, in_one_line
@@ -65,10 +65,10 @@ def merge(scores: Iterable[FlightScore]) -> list[FlightScore]:
 
 def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
     """The scores of several draws of one flight as one."""
-    true_positives, positives, true_negatives, negatives = (sum(s.windows[i] for s in scores) for i in range(4))
+    windows = WindowCounts(*(sum(counts) for counts in zip(*(s.windows for s in scores), strict=True)))
     return FlightScore(name, scores[0].condition, tuple(e for s in scores for e in s.edges),
                        tuple(e for s in scores for e in s.false or ()), sum(s.detections for s in scores),
-                       sum(s.airborne_s for s in scores), (true_positives, positives, true_negatives, negatives),
+                       sum(s.airborne_s for s in scores), windows,
                        np.sum([s.bins for s in scores], axis=0))
 
 

@@ -81,7 +81,7 @@ def test_folds_are_needed(generated, tmp_path, old, new, message):
 
 def test_baseline_has_no_filter(generated, tmp_path):
     with pytest.raises(AirTouchError, match="no physical filter"):
-        crossval.crossval("baseline", dataset.collect([generated]), tmp_path, crossval.Study(physical_filter=False))
+        crossval.crossval("baseline", dataset.collect([generated]), tmp_path, crossval.Settings(physical_filter=False))
 
 
 def test_a_bad_flight_is_left_out(generated, tmp_path):

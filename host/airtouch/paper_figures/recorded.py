@@ -44,8 +44,8 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
     held_out = folds.by_fold(flights)
     if job.quick:
         held_out = {QUICK_FOLD: held_out[QUICK_FOLD]} if QUICK_FOLD in held_out else dict(list(held_out.items())[:1])
-    study = crossval.Study(options=options, free_air=air)
-    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", study, folds=held_out,
+    settings = crossval.Settings(options=options, free_air=air)
+    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", settings, folds=held_out,
                                            tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries
 
@@ -58,7 +58,7 @@ def variant_scores(job: Job, name: str, detector: Detector | None, options: dict
     numbers = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
     held_out = {k: by_fold[k] for k in numbers if k in by_fold} or dict(list(by_fold.items())[:1])
     label = name if detector is None else f"variant-{name}"
-    result, entries, _ = crossval.crossval(label, flights, job.work / "folds", crossval.Study(options=options),
+    result, entries, _ = crossval.crossval(label, flights, job.work / "folds", crossval.Settings(options=options),
                                            folds=held_out, detector=detector,
                                            tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries

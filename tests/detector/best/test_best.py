@@ -28,7 +28,7 @@ from made_flight import SMALL, made_flight
 
 def test_the_same_arguments_give_the_same_bits(small):
     best.fit([made_flight(2)], seed=4, recipe=SMALL)  # what was compiled is used again and must remember nothing
-    repeat = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
+    repeat = best.fit([made_flight(0), made_flight(1)], 3, best.FitSettings(recipe=SMALL))
     assert repeat.to_bytes() == small.to_bytes()
 
 

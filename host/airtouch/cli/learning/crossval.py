@@ -69,8 +69,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
     options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
     air = _free_air(free_air)
-    study = crossval.Study(seed, options, air, physical_filter, silenced=silence, silent_training=silence_training)
-    scores, folds, left_out = crossval.crossval(detector, files, out, study, folds=split,
+    settings = crossval.Settings(seed, options, air, physical_filter, silence, silence_training)
+    scores, folds, left_out = crossval.crossval(detector, files, out, settings, folds=split,
                                                 tell=lambda line: click.echo(line, err=True))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)

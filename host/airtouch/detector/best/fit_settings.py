@@ -60,9 +60,10 @@ class FitSettings:
     command: str = "airtouch.detector.best.fit"
     work: Path | None = None
 
-    def changed(self, changes: dict[str, Any]) -> "FitSettings":
-        """These settings with a definite recipe, and with changes: fields of this record, or of its recipe, by name.
+    def resolved(self, changes: dict[str, Any]) -> tuple["FitSettings", Recipe]:
+        """(these settings with the changes, the recipe to train by).
 
+        changes: fields of this record, or of its recipe, by name.
         Raises AirTouchError for an unknown name, and for a recipe of another shape than that of `start`.
         """
         own = {field.name for field in fields(self)}
@@ -73,12 +74,13 @@ class FitSettings:
         of_recipe = {name: value for name, value in changes.items() if name not in own}
         absent = of_recipe.keys() - asdict(recipe).keys()
         if absent:
-            raise AirTouchError(f"training: no setting {min(absent)!r}; known: {', '.join([*asdict(recipe), *own])}")
+            known = ", ".join([*asdict(recipe), *sorted(own)])
+            raise AirTouchError(f"training: no setting {min(absent)!r}; known: {known}")
         recipe = replace(recipe, **of_recipe)
         if start is not None and start.recipe.graph != recipe.graph:
             raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
                                 "alone")
-        return replace(settings, recipe=recipe)
+        return settings, recipe
 
 
 @dataclass(frozen=True)

@@ -31,17 +31,19 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     has is silent in the model for good.
     seed: of the first weights, the crops and the draw of `settings.most_flights`.
     settings: `FitSettings()` for None. changes: fields of it, or of its recipe, by name: `fit(flights, steps=300)`.
-    The model's lag is the median over the training flights; its metadata hold the flights' names and hashes.
-    Raises AirTouchError without TensorFlow, without flights with edges and for unknown changes.
+    The model's lag is the median over the training flights, or over `settings.lag_of`; its metadata hold the flights'
+    names and hashes.
+    Raises AirTouchError without TensorFlow, without flights with edges, for unknown changes, and for a recipe of
+    another shape than that of `settings.start`.
     """
     from airtouch.detector.best import quantisation, training
     from airtouch.detector.shared.tensorflow import use_tensorflow
 
-    settings = (settings or FitSettings()).changed(changes)
-    examples = Examples.drawn(flights, settings, seed)
-    use_tensorflow(seed)
-    recipe, start = examples.muted(settings.recipe or Recipe()), settings.start
+    settings, recipe = (settings or FitSettings()).resolved(changes)
+    examples, start = Examples.drawn(flights, settings, seed), settings.start
+    recipe = examples.muted(recipe)
     report = settings.progress or (lambda *_: None)
+    use_tensorflow(seed)
     training_flights = _training_flights(examples, recipe, report)
     weights = training.fit(training_flights, recipe, seed, lambda done, total, note: report("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in settings.free_air],

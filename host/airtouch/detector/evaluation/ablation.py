@@ -90,7 +90,7 @@ def ablate(
         shared = best_options if ablation.variant is None and ablation.name == "best" else paper_options
         scores, folds, left_out = crossval.crossval(
             name if ablation.variant else ablation.name, files, out,
-            crossval.Study(seed, {**(shared or {}), **ablation.options}), detector=detector, tell=tell)
+            crossval.Settings(seed, {**(shared or {}), **ablation.options}), detector=detector, tell=tell)
         results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(scores),
                          "by_height": summary.by_height(scores), "folds": folds,
                          "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}

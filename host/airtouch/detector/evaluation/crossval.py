@@ -24,7 +24,7 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Study:
+class Settings:
     """What is trained and scored in every fold; the defaults are a detector as it is, on flights as they are.
 
     seed: of every training. options: arguments of the detector's `fit`, by name. free_air: flights without edges to
@@ -58,18 +58,18 @@ class Study:
         return "".join(("" if self.physical_filter else "-unfiltered", *(f"-no-{s}" for s in self.silenced)))
 
 
-def crossval(name: str, files: Sequence[FlightFile], out: Path, study: Study | None = None, *,
+def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settings | None = None, *,
              folds: Folds | None = None, detector: Detector | None = None, tell: Tell = lambda _: None,
              ) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
     """(scores of all flights, one entry a fold, flights left out with the reason).
 
-    Finished folds are kept in `out` and not done again for the same flights, study and version.
-    study: `Study()` for None. folds: which flights are held out together (`data.folds`); those of the manifest for
-    None. detector: one that is not registered, under `name`. tell: called with a line a fold.
+    Finished folds are kept in `out` and not done again for the same flights, settings and version.
+    settings: `Settings()` for None. folds: which flights are held out together (`data.folds`); those of the manifest
+    for None. detector: one that is not registered, under `name`. tell: called with a line a fold.
     Raises AirTouchError for an unknown detector, for a filter that it does not have, and for fewer than two folds.
     """
-    detector, study = detector or get(name), study or Study()
-    if not study.physical_filter and not isinstance(detector, Filtered):
+    detector, settings = detector or get(name), settings or Settings()
+    if not settings.physical_filter and not isinstance(detector, Filtered):
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = by_fold(files) if folds is None else folds
     make_folder(out)
@@ -77,16 +77,16 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, study: Study | N
     scores: list[FlightScore] = []
     entries: list[dict[str, Any]] = []
     for fold, members in folds.items():
-        key = cache_key(name, files, members, study.seed, study.hashed())
-        cache = out / f"{name}{study.variant()}_fold{fold}_{key}.json"
+        key = cache_key(name, files, members, settings.seed, settings.hashed())
+        cache = out / f"{name}{settings.variant()}_fold{fold}_{key}.json"
         entry = read_fold(cache)
         if entry is None:
             test_paths = {f.path for f in members}
             train = [readable[f.path] for f in files if f.path in readable and f.path not in test_paths]
-            test = [f for f in members if f.path in readable]
+            test = [(f, readable[f.path]) for f in members if f.path in readable]
             tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
             model = out / f"{name}_fold{fold}_{key}.npz"
-            entry = {"fold": fold, **_score_fold(study, detector, train, [(f, readable[f.path]) for f in test], model)}
+            entry = {"fold": fold, **_score_fold(settings, detector, train, test, model)}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
         else:
             tell(f"fold {fold}: done before, {cache.name}")
@@ -95,16 +95,16 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, study: Study | N
     return scores, entries, left_out
 
 
-def _score_fold(study: Study, detector: Detector, train: Sequence[FlightLog],
+def _score_fold(settings: Settings, detector: Detector, train: Sequence[FlightLog],
                 test: Sequence[tuple[FlightFile, FlightLog]], path: Path) -> dict[str, Any]:
     """A fold's entry: the model of the training flights, kept in `path`, its settings, and its scores of the test."""
     started, cpu_before = time.monotonic(), time.process_time()
-    silent = study.silenced if study.silent_training else ()
+    silent = settings.silenced if settings.silent_training else ()
     train = [sensors.without(log, silent) for log in train]
-    model = model_of_fold(detector, train, path, study.seed, study.fit_options())
-    if not study.physical_filter and isinstance(detector, Filtered):
+    model = model_of_fold(detector, train, path, settings.seed, settings.fit_options())
+    if not settings.physical_filter and isinstance(detector, Filtered):
         model = detector.retune(model, train, False)
-    results = [evaluate.evaluate_flight(f, sensors.without(log, study.silenced), detector, model).score
+    results = [evaluate.evaluate_flight(f, sensors.without(log, settings.silenced), detector, model).score
                for f, log in test]
     return {"model": path.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
             "seconds": round(time.monotonic() - started, 1),

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -43,13 +43,21 @@ class EdgeScore:
     error_m: float | None = None
 
 
+class WindowCounts(NamedTuple):
+    """Counts of samples; positive are those over a platform, true those that the detector classifies correctly."""
+
+    true_positives: int = 0
+    positives: int = 0
+    true_negatives: int = 0
+    negatives: int = 0
+
+
 @dataclass(frozen=True)
 class FlightScore:
     """The score of one flight; everything in it is additive over flights.
 
     false: samples of unmatched detections, None where the true edges are unknown.
-    windows: counts of airborne samples (true positives, positives, true negatives, negatives), positive being
-    over a platform.
+    windows: counts of airborne samples.
     bins: reliability table, (10, 3). airborne_s: seconds in the air. note: what limits the result, one line.
     in_training: whether the model was trained on this flight.
     """
@@ -60,7 +68,7 @@ class FlightScore:
     false: tuple[int, ...] | None
     detections: int
     airborne_s: float
-    windows: tuple[int, int, int, int] = (0, 0, 0, 0)
+    windows: WindowCounts = WindowCounts()
     bins: np.ndarray = field(default_factory=lambda: np.zeros((BINS, 3)))
     note: str = ""
     in_training: bool = False
@@ -95,7 +103,7 @@ class FlightScore:
         return cls(
             entry["file"], Condition(**entry["condition"]), tuple(EdgeScore(**e) for e in entry["edges"]),
             None if false is None else tuple(false), entry["detections"], entry["airborne_s"],
-            tuple(entry["windows"]), np.array(entry["reliability"], float), entry["note"],
+            WindowCounts(*entry["windows"]), np.array(entry["reliability"], float), entry["note"],
             entry.get("in_training", False))
 
 
@@ -177,8 +185,7 @@ def score_flight(
     predicted = probability >= 0.5
     if not np.isfinite(probability).any():
         known, predicted = airborne, over_platform(detections, len(airborne))
-    true_positives, positives, true_negatives, negatives = (
-        int(np.count_nonzero(known & mask)) for mask in (over & predicted, over, ~over & ~predicted, ~over))
+    windows = WindowCounts(*(int(np.count_nonzero(known & mask))
+                             for mask in (over & predicted, over, ~over & ~predicted, ~over)))
     bins = reliability(np.where(airborne, probability, np.nan), over)
-    return FlightScore(file, condition, edges, false, len(detections), airborne_s,
-                       (true_positives, positives, true_negatives, negatives), bins)
+    return FlightScore(file, condition, edges, false, len(detections), airborne_s, windows, bins)

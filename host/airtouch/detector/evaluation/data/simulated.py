@@ -57,6 +57,7 @@ def training_flights(
 
 
 def _usable(flight: FlightLog | Diverged) -> bool:
+    """Whether a flight ended well, crosses an edge and can be run through a detector."""
     if isinstance(flight, Diverged) or not logs.true_edges(flight):
         return False
     try:
