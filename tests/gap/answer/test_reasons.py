@@ -29,17 +29,16 @@ def judged(name, gain, evidence=None):
 def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, lost=(0.0, "")):
     """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing.
 
-    Of several that are named, each adds a quarter of its gain to the others. beside: nats that the nameless model gains
-    beside them.
+    Of several that are named, each adds a quarter of its gain to the others. beside: nats that speak against them.
     """
     singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
         steps.append(replace(Step.of(judged(n, total)), share=0.25 * EVIDENCE[n]))
-    evidence = SimpleNamespace(evidence=EVIDENCE, against=Against(4.0, 30.0, of_distance)) if inference else None
+    related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
     return Selection(singles, tuple(steps), NamelessGain(150.0, beside), (None, None), dict.fromkeys(EVIDENCE, 8.0),
-                     NominalFlights(5, 0.0), assumed=False, contradicted=Contradiction(*lost), inference=evidence)
+                     NominalFlights(5, 0.0), assumed=False, contradicted=Contradiction(*lost), inference=related)
 
 
 def test_the_answer_needs_no_reason():

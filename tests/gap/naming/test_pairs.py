@@ -27,7 +27,7 @@ def test_both_effects_are_named_and_nothing_else(study, effects):
     """Each was missed beside the other once: by the fit, by the first look, by what the first must leave."""
     chosen = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
     assert {s.name for s in chosen.named} == set(effects)
-    assert chosen.nameless.beside < chosen.allowed
+    assert chosen.against.nats < chosen.against.limit
 
 
 @pytest.fixture(scope="module")

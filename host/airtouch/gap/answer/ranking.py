@@ -42,7 +42,7 @@ def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
     outside_the_gap = chosen is not None and all(t.shows_in == CLOCK or t.gate for t in chosen.terms)
     if gap.named.before > AT_FLOOR or outside_the_gap:
         return False
-    odd_times = selection.nameless.of_times > selection.allowed
+    odd_times = selection.nameless.of_times > selection.against.limit
     return not data.study.simulated or not (odd_times or nearer(data, selection.parts, chosen, gap))
 
 

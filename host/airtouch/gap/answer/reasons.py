@@ -80,11 +80,12 @@ def _left(selection: Selection, gains: str, off: str) -> str:
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
-    nats = f"{max(selection.nameless.beside, 0.0):.0f}"
-    if selection.inference is not None and selection.inference.against.of_distance:
+    against = selection.against
+    nats = f"{max(against.nats, 0.0):.0f}"
+    if against.of_distance:
         farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
-        return f"the flight lies {nats} nats farther {farther}, up to {selection.allowed:.0f} may be chance"
-    return f"{gains.format(nats)}, up to {selection.allowed:.0f} may be left"
+        return f"the flight lies {nats} nats farther {farther}, up to {against.limit:.0f} may be chance"
+    return f"{gains.format(nats)}, up to {against.limit:.0f} may be left"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:

@@ -44,8 +44,8 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
-        singles=alone, steps=tuple(steps), nameless=NamelessGain(inference.nameless_alone, inference.against.nats),
-        parts=trial.parts, least=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
+        singles=alone, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
+        least=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
         nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
 
 

@@ -38,10 +38,13 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
     """The selection of effects among candidates: every one is judged alone, then effects are named.
 
-    The replay names them by forward selection (naming.forward), after an effect that comes and goes where there is one
-    (not among `without`). Where a library of the signals' relations holds for the flights, its inference names
-    them (`_by_relations`), but for an effect of a user's own that explains the flights in the replay too: its class was
-    learned from few flights. candidates: the variants of every effect by name; progress: is told every name judged.
+    1. Where no library of the signals' relations holds for the flights, the replay names the effects (`_by_replay`).
+    2. Where one holds, its inference names them (`_by_relations`).
+    3. Where one holds and a user's own effect is a candidate, the replay's answer stands if it names that effect first
+       and leaves nothing unexplained: the effect's class was learned from few flights. Else as in 2.
+
+    candidates: the variants of every effect by name; progress: called with the name of every candidate that is judged;
+    without: effects that are not searched for as ones that come and go.
     """
     trial = trial_of(data)
     alone = round_of(trial, candidates, None, progress)
@@ -53,16 +56,17 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
         return _by_relations(search, inference, without)
     passing = passing_effect(trial, alone, least, without)
     answer = _by_replay(search, forward(search, passing), passing)
-    if inference is None or answer.explained and answer.named and answer.named[0].name not in PACKAGE_EFFECTS:
+    own_effect_explains = answer.explained and bool(answer.named) and answer.named[0].name not in PACKAGE_EFFECTS
+    if inference is None or own_effect_explains:
         return answer
     return _by_relations(search, inference, without)
 
 
 def _by_relations(search: Search, inference: Inference, without: Sequence[str]) -> Selection:
-    """What the relations of signals name; the replay's answer where these leave something that it may name.
+    """What the relations of signals name; where these leave something unexplained, what the replay may name instead.
 
-    It may name a wake of some seconds, what else comes and goes if the relations find it likeliest as well, and what
-    has more shapes than its class.
+    The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake or
+    another effect of ALWAYS_RANDOM, or the likeliest by the relations.
     """
     answer = selection_by_relations(search.trial, search.candidates, search.alone, inference, search.progress)
     if answer.explained:
@@ -78,10 +82,13 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
 
 
 def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
-    """Whether the replay may name what comes and goes, or shakes, where the relations leave something unexplained.
+    """Whether the replay is asked where the relations leave something unexplained. passing: what comes and goes.
 
-    A wake of some seconds it may; the relations of a whole flight dilute these. Else the relations must find the
-    effect likeliest, or a wake that fills the flight a WAKE_SHARE as likely.
+    It is asked in three cases:
+
+    1. what comes and goes is a wake: the relations of a whole flight dilute its seconds;
+    2. what comes and goes is the effect for which the relations have most evidence;
+    3. for a wake that fills the flight (ALWAYS_RANDOM) they have more than WAKE_SHARE of that evidence, nats.
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import BlockSet
-from airtouch.gap.relations.inference import Inference
+from airtouch.gap.relations.inference import Against, Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Terms
 
@@ -109,14 +109,14 @@ class Step(Candidate):
 
 @dataclass(frozen=True)
 class NamelessGain:
-    """Held-out nats that the nameless model gains.
+    """Held-out nats that the nameless model gains; 0 where the relations of signals decide, which do not use it.
 
     alone: over no effect; beside: over the last step of a selection; of_times: of the latter, what the logged times
     hold.
     """
 
-    alone: float
-    beside: float
+    alone: float = 0.0
+    beside: float = 0.0
     of_times: float = 0.0
 
 
@@ -196,14 +196,22 @@ class Selection:
         return float(self.inference.evidence[candidate.name] if self.inference is not None else candidate.gain)
 
     @property
-    def allowed(self) -> float:
+    def against(self) -> Against:
+        """Nats that speak against the effects named, with those that may where they are right.
+
+        By the relations of signals where these decide, else the gain of the nameless model beside the effects.
+        """
+        if self.inference is not None:
+            return self.inference.against
+        return Against(self.nameless.beside, self._most_nameless_gain, of_distance=False)
+
+    @property
+    def _most_nameless_gain(self) -> float:
         """Nats that the nameless model may gain beside the effects named where they are right.
 
         The fewer nominal flights there are, the farther off may another one lie.
         """
         nominal = self.nominal
-        if self.inference is not None:
-            return self.inference.against.limit
         if nominal.count < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.alone, nominal.nameless_gain)
         gained = self.whole.gain if self.whole else 0.0
@@ -218,7 +226,9 @@ class Selection:
     @property
     def unlike(self) -> float:
         """How much speaks against the effects named, over what may: what is left, or what they lose; 1 is the limit."""
-        return max(float(np.logaddexp(self.nameless.beside, 0.0)) / self.allowed, self.loss)
+        against = self.against
+        never_negative = float(np.logaddexp(against.nats, 0.0))  # softplus: the nats where these are many, else above 0
+        return max(never_negative / against.limit, self.loss)
 
     @property
     def loss(self) -> float:

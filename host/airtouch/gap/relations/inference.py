@@ -57,16 +57,14 @@ class Against(NamedTuple):
 class Inference:
     """What the relations of a flight's signals show.
 
-    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; nameless_alone:
-    nats that a nameless disturbance gains over none; against: what speaks against the likeliest effects, the gain of a
-    nameless disturbance beside them or the flight's distance from them, whichever is nearer its limit; readings:
-    parameters of the likeliest effects, of those that the library is calibrated for; without_sign: those of these
-    effects whose sign does not show.
+    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; against: what
+    speaks against the likeliest effects, the gain of a nameless disturbance beside them or the flight's distance from
+    them, whichever is the larger part of its limit; readings: parameters of the likeliest effects, of those that the
+    library is calibrated for; without_sign: those of these effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
-    nameless_alone: float
     against: Against
     readings: Mapping[str, Reading] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
@@ -94,7 +92,7 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
                   key=lambda a: a.nats / a.limit)
     return Inference(
         classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles),
-        nameless_alone=flight.nameless_evidence(flight.none), against=against, readings=_readings(best),
+        against=against, readings=_readings(best),
         without_sign=tuple(f.of.effect for f in best.fits
                            if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
 
