@@ -8,7 +8,7 @@ from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop.controller import firmware_of
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
-from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
@@ -31,11 +31,11 @@ def spectra():
         calm, rough = ready_flights(pair, VEHICLE, [])
         n = min(len(calm), len(rough))
         first = starts(rough, AIR)
-        first = first[first + 2 * blocks(np.zeros((n, 1)), first[:1], AIR).shape[1] <= n]
+        first = first[first + 2 * short_time_spectra(np.zeros((n, 1)), first[:1], AIR).shape[1] <= n]
         measured, unmodelled = ([f(flight)[:n] for flight in (rough, calm)]
                                 for f in (angular_acceleration, unmodelled_torque))
-        turns.append(blocks(measured[0] - measured[1], first, AIR))
-        commanded.append(turns[-1] - blocks(unmodelled[0] - unmodelled[1], first, AIR))
+        turns.append(short_time_spectra(measured[0] - measured[1], first, AIR))
+        commanded.append(turns[-1] - short_time_spectra(unmodelled[0] - unmodelled[1], first, AIR))
     return np.concatenate(turns), np.concatenate(commanded)
 
 

@@ -15,7 +15,7 @@ from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
-from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare
@@ -61,8 +61,9 @@ def spectra(name):
     turning, count = np.zeros_like(power), np.zeros((2, 1))
     for flight in fly(active_effects(name) if name else [], PAIRED):
         first = starts(flight, AIR)
-        turns = blocks(angular_acceleration(flight), first, AIR)
-        modelled = turns - blocks(np.nan_to_num(residual(flight, nominal().vehicle)), first, AIR)[:, :, TORQUE]
+        turns = short_time_spectra(angular_acceleration(flight), first, AIR)
+        gap = np.nan_to_num(residual(flight, nominal().vehicle))
+        modelled = turns - short_time_spectra(gap, first, AIR)[:, :, TORQUE]
         steady_blocks = nominal().response.quiet(modelled)[:, 1]
         for k, chosen in enumerate((steady_blocks, ~steady_blocks)):
             y, w = turns[chosen, :, 1], modelled[chosen, :, 1]

@@ -10,7 +10,7 @@ from airtouch.gap.signals.quiet_blocks import (
     STEPPED_TORQUE,
     QuietPower,
     are_quiet,
-    of_nominal_flights,
+    estimate_quiet_power,
 )
 
 BINS, FLIGHTS, BLOCKS, KICKED_EVERY = 129, 12, 200, 5
@@ -33,7 +33,7 @@ def found():
     kicked[::KICKED_EVERY, [0, 2]] = True
     for torque in flights:
         torque += 10.0 * np.sqrt(SPECTRUM) * kicked[:, None]
-    nominal, quiet = of_nominal_flights(flights, np.abs(np.concatenate(flights)) ** 2)
+    nominal, quiet = estimate_quiet_power(flights, np.abs(np.concatenate(flights)) ** 2)
     return nominal, quiet, np.tile(kicked, (FLIGHTS, 1))
 
 
@@ -77,5 +77,5 @@ def test_a_flight_without_blocks_has_none_and_changes_nothing():
     assert are_quiet(np.zeros((0, BINS, 3)), EVEN).shape == (0, 3)
     torque = noise(np.random.default_rng(7), 50)
     power = np.abs(torque) ** 2
-    alone, beside_none = (of_nominal_flights(flights, power)[0] for flights in ([torque], [torque[:0], torque]))
+    alone, beside_none = (estimate_quiet_power(flights, power)[0] for flights in ([torque], [torque[:0], torque]))
     np.testing.assert_array_equal(alone.calm, beside_none.calm)

@@ -11,7 +11,7 @@ from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.loop.set_point_steps import NO_STEP
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
-from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
@@ -126,8 +126,8 @@ def empirical(active: list[Active]) -> np.ndarray:
     logs = [log for log in outcomes if isinstance(log, FlightLog)]
     for flight in ready_flights(logs, vehicle, []):
         first = starts(flight, AIR)
-        turns = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
-        modelled = turns - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
+        turns = short_time_spectra(angular_acceleration(flight), first, AIR)[:, :, 0]
+        modelled = turns - short_time_spectra(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
         cross, power = cross + (turns * modelled.conj()).sum(axis=0), power + (np.abs(modelled) ** 2).sum(axis=0)
     return np.asarray(cross / power)
 

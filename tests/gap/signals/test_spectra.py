@@ -5,7 +5,7 @@ import pytest
 
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signals.spectra import AIR, LENGTH, REST, NominalBlocks, blocks, floor_of, starts
+from airtouch.gap.signals.spectra import AIR, LENGTH, REST, NominalBlocks, floor_of, short_time_spectra, starts
 from gap_flights import flight
 
 
@@ -18,7 +18,7 @@ def test_means_of_flights_differ_beyond_chance_only_by_what_their_trims_do():
 
     def offset(trim):
         residuals = [np.tile(t + rng.normal(0.0, rms, (len(f), 1)), COUNT) for t, f in zip(trim, flights, strict=True)]
-        spectra = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(residuals, first, strict=True)]
+        spectra = [{r: short_time_spectra(x, s[r], r) for r in s} for x, s in zip(residuals, first, strict=True)]
         nominal = [NominalBlocks(f, x, s, of_blocks, np.zeros((len(s[AIR]), LENGTH[AIR] // 2 + 1, COUNT)))
                    for f, x, s, of_blocks in zip(flights, residuals, first, spectra, strict=True)]
         return floor_of(nominal, np.zeros(COUNT)).offset_beyond[0]

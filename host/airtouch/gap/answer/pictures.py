@@ -12,7 +12,7 @@ from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, angular_acceleration
-from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
+from airtouch.gap.signals.spectra import AIR, frequencies, sensor_power, short_time_spectra, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
@@ -137,7 +137,7 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
-    floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > FEWEST_BLOCKS else
+    floor = np.maximum(study.floor.power[AIR] if study.floor.block_counts.get(AIR, 0) > FEWEST_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
     after = _power_after(study, flown, effects, floor) if effects else None
@@ -148,7 +148,7 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
 def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
     """Mean power (bins, COUNT) of a gap (n, COUNT) over all blocks in the air of a flight."""
     bridged = interpolate_over(gap, ~flight.bridged)
-    return (np.abs(blocks(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
+    return (np.abs(short_time_spectra(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
 
 
 def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.where import summary
@@ -58,7 +58,7 @@ def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
     begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
     if not len(begin):
         return np.zeros(0)
-    density = np.abs(blocks(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
+    density = np.abs(short_time_spectra(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
     gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
     return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
 

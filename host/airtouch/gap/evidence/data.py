@@ -9,7 +9,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
-from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
@@ -50,7 +50,7 @@ class Data:
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
-        self.measured_torque = [blocks(angular_acceleration(f), b[AIR], AIR)
+        self.measured_torque = [short_time_spectra(angular_acceleration(f), b[AIR], AIR)
                                 for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
             self.quiet = [self.study.response.quiet(w) for w in command_torque(self)]
@@ -58,10 +58,10 @@ class Data:
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
                          for f, b, q in zip(self.flights, self.first, quiet, strict=True)]
-        self.base = spectra(self, ())
+        self.base = gap_spectra(self, ())
 
 
-def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+def gap_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of the gap with effects in the model, by flight and regime; commands are the command view's.
 
     Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
@@ -115,7 +115,7 @@ def command_torque(data: Data) -> list[np.ndarray]:
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
-    """Power by flight and regime, as `spectra`, that the gap may have because effects change what is cut of a step.
+    """Power by flight and regime, as `gap_spectra`, that the gap may have because effects change what is cut of a step.
 
     None where they change nothing of it.
     """
@@ -157,7 +157,7 @@ def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np
                                data.workspace.cached("residuals", i, Workspace))
     out = {}
     for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
-        replayed = blocks(bridged[:, :COMMAND.start], begin, r)
+        replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, r)
         out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[r][:, :, :COMMAND.start] = replayed
     return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
-from airtouch.gap.evidence.data import Data, spectra
+from airtouch.gap.evidence.data import Data, gap_spectra
 from airtouch.gap.evidence.layout import Layout, Piece
 from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
 from airtouch.gap.evidence.torque_power import TorquePower, beside_edges
@@ -17,7 +17,7 @@ from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
-from airtouch.gap.signals.spectra import AIR, REST, blocks, frequencies, judged_bins
+from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, short_time_spectra
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
@@ -100,7 +100,9 @@ class Problem:
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """The gap (n,) with effects in the model."""
         replayed = beside_edges(active)
-        replay_values = self.layout.gather(spectra(self.data, replayed)) if replayed else self.base[:self.replay_count]
+        replay_values = self.base[:self.replay_count]
+        if replayed:
+            replay_values = self.layout.gather(gap_spectra(self.data, replayed))
         command_values = self.commands.values_without([a for a in active if not a.gate])
         return np.where(self.known, self.joined(replay_values, command_values), 0.0)
 
@@ -147,7 +149,7 @@ class Problem:
         """Spectra by flight and regime of 1 in one channel of one flight, in the air."""
         ones = np.zeros((len(self.data.flights[flight]), COUNT))
         ones[~self.data.flights[flight].on_ground, channel] = 1.0
-        return [{r: blocks(ones, begin, r) if j == flight else np.zeros_like(self.data.base[j][r])
+        return [{r: short_time_spectra(ones, begin, r) if j == flight else np.zeros_like(self.data.base[j][r])
                  for r, begin in first.items()} for j, first in enumerate(self.data.first)]
 
     @functools.cached_property
@@ -169,7 +171,7 @@ def _counted(means_only: bool) -> dict[str, np.ndarray]:
 
 def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
     """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
-    base, counts = layout.gather(data.base), data.study.floor.blocks
+    base, counts = layout.gather(data.base), data.study.floor.block_counts
     known = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
                                    for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real

@@ -17,7 +17,15 @@ from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
-from airtouch.gap.signals.spectra import AIR, LEAKED, LEAST_POWER, LENGTH, blocks, difference_power, frequencies
+from airtouch.gap.signals.spectra import (
+    AIR,
+    LEAKED,
+    LEAST_POWER,
+    LENGTH,
+    difference_power,
+    frequencies,
+    short_time_spectra,
+)
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term, neutral_of, parameter_of
@@ -84,7 +92,7 @@ def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     mean, out = np.mean(runs, axis=0), _no_power(data, i)
     for r, first in data.first[i].items():
         changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
-        total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
+        total = np.sum([np.abs(short_time_spectra(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
         if not len(total):
             continue
         if r == AIR:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, spectra, step_doubt
+from airtouch.gap.evidence.data import Data, gap_spectra, step_doubt
 from airtouch.gap.evidence.layout import Layout
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COUNT, TORQUE
@@ -44,7 +44,7 @@ class TorquePower:
         if of_loop is None:
             return np.zeros(len(self.base))
         gather = self.layout.gather
-        change = np.where(self.known, gather(spectra(self.data, loop)) - self.base, 0.0)
+        change = np.where(self.known, gather(gap_spectra(self.data, loop)) - self.base, 0.0)
         steps = step_doubt(self.data, loop)
         doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(of_loop)

@@ -18,7 +18,7 @@ from airtouch.gap.features.flight_signals import (
     FlightSignals,
 )
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
 
 #: edges of the bands; chosen; the last one lies beyond half the log's rate, 50 Hz, which it so includes
 BANDS_HZ = (0.2, 0.6, 1.2, 2.2, 3.5, 5.0, 7.0, 9.5, 13.0, 18.0, 25.0, 35.0, 50.1)
@@ -58,7 +58,7 @@ def coherence(signals: FlightSignals) -> np.ndarray:
     logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple
     coherence: Bendat and Piersol, Random Data, 4th ed., section 7.3).
     """
-    spectra = blocks(signals.table, _whole(signals.flight, starts(signals.flight, AIR)), AIR)
+    spectra = short_time_spectra(signals.table, _whole(signals.flight, starts(signals.flight, AIR)), AIR)
     columns_of_groups = [list(columns.values()) for columns in GROUPS.values()]
     return np.concatenate([part for columns in columns_of_groups for part in _of_group(spectra[:, :, columns])])
 

@@ -17,7 +17,7 @@ from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.nameless.basis import BASIS, basis
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
-from airtouch.gap.signals.spectra import AIR, blocks, frequencies
+from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
@@ -97,7 +97,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
         out = []
         for flight, first in zip(data.flights, data.first, strict=True):
             signals = basis(flight, data.study.vehicle)
-            out.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
+            out.append([{r: short_time_spectra(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
         return out
 
     return data.workspace.cached("basis", (), make)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, spectra
+from airtouch.gap.evidence.data import Data, gap_spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, left_over, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem
@@ -124,8 +124,8 @@ def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
         x = np.zeros(len(term.free))
         x[i] = STEP if STEP <= high[i] else -STEP
         neutral = [term.active(np.zeros(len(term.free)))]
-        before = spectra(data, neutral) if term.acts_when_neutral else data.base
-        after = spectra(data, [term.active(x)])
+        before = gap_spectra(data, neutral) if term.acts_when_neutral else data.base
+        after = gap_spectra(data, [term.active(x)])
         return [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
                 for a, b in zip(after, before, strict=True)]
 

@@ -20,10 +20,10 @@ from airtouch.gap.signals.spectra import (
     REST,
     Floor,
     NominalBlocks,
-    blocks,
     floor_of,
     frequencies,
     sensor_power,
+    short_time_spectra,
     starts,
 )
 from airtouch.gap.signals.study import Study
@@ -81,13 +81,13 @@ def _replayed_blocks(flight: Flight, vehicle: Vehicle, calibration: tuple[Active
     """A flight's blocks as the replay leaves them, without what lost rows add."""
     first = {r: starts(flight, r) for r in (AIR, REST)}
     gap = np.nan_to_num(residual(flight, vehicle, calibration))
-    spectra = {r: blocks(gap, begin, r) for r, begin in first.items()}
+    spectra = {r: short_time_spectra(gap, begin, r) for r, begin in first.items()}
     return NominalBlocks(flight, gap, first, spectra, bridging=np.zeros(spectra[AIR].shape))
 
 
 def _torque(nominal: NominalBlocks) -> TorqueSpectra:
     """Torque of a flight's blocks in the air, measured and as the replay leaves it."""
-    measured = blocks(angular_acceleration(nominal.flight), nominal.first[AIR], AIR)
+    measured = short_time_spectra(angular_acceleration(nominal.flight), nominal.first[AIR], AIR)
     return TorqueSpectra(measured, nominal.spectra[AIR][:, :, TORQUE])
 
 

@@ -1,8 +1,8 @@
 """The gap's channels: what was measured minus what the model says, sample by sample.
 
 Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3), judged below 0.3 Hz. Command view:
-the controller's command (4), filtered to have the spectrum of nominal flights where the effects in the model are all
-that changed it.
+the controller's command (4), divided by the change of its spectrum that the effects in the model predict, so that a
+right model leaves the spectrum of nominal flights.
 """
 
 from collections.abc import Sequence
@@ -104,6 +104,7 @@ def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]
     signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
     model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
     force, turning = model.specific_force, model.angular_acceleration
+    # measured is a difference between two samples, which is the mean acceleration between them: so is the modelled one
     turning = 0.5 * (turning + np.concatenate([turning[1:], turning[-1:]]))
     rest = flight.phase == GROUND
     if rest.any():
@@ -113,7 +114,7 @@ def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]
     out[:, FORCE] = flight.acceleration - force
     out[:, TORQUE] = angular_acceleration(flight) - turning
     if flight.rates is not None:
-        out[-1, TORQUE] = 0.0
+        out[-1, TORQUE] = 0.0  # no sample follows the last one, so that it has no measured acceleration
         out[:, RATE] = flight.rates - row["gyro_bias"]
     if controller is not None:
         out[:, COMMAND] = controller.commands_without(flight, active)

@@ -15,7 +15,7 @@ from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import Response, TorqueSpectra
-from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, blocks, squared
+from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, short_time_spectra, squared
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
@@ -40,9 +40,9 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
         change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - gap)
         begin = (first + offset) % len(flight)
         room = _in_flight(flight, begin)
-        spectrum = blocks(change, begin[room], AIR)
+        spectrum = short_time_spectra(change, begin[room], AIR)
         if response is not None and quiet is not None and flight.rates is not None and room.any():
-            turned = blocks(angular_acceleration(poorer) - turning, begin[room], AIR)
+            turned = short_time_spectra(angular_acceleration(poorer) - turning, begin[room], AIR)
             spectrum = response.with_residual(spectrum, quiet[room], TorqueSpectra(turned, spectrum[:, :, TORQUE]))
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1

@@ -29,7 +29,7 @@ class QuietPower(NamedTuple):
     calm: np.ndarray
 
 
-def of_nominal_flights(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[QuietPower, np.ndarray]:
+def estimate_quiet_power(modelled: Sequence[np.ndarray], power: np.ndarray) -> tuple[QuietPower, np.ndarray]:
     """The power of quiet blocks in nominal flights, and which of all their blocks are quiet, bool (blocks, 3).
 
     modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the power is

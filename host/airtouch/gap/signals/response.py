@@ -7,13 +7,15 @@ residual (blocks, bins, 3) is y minus that, plus what effects add to it, weighte
 
 A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the vehicle,
 and the kicks of the outer loop's steps, which did, are mostly not in it. So of w only a part is to be expected in y, by
-frequency and axis (linear regression with errors in w: Fuller, Measurement Error Models, 1987, chapter 1):
+frequency and axis: q is the H1 estimate, lowered by the noise in w and deliberately not corrected for it (regression
+dilution: Fuller, Measurement Error Models, 1987, chapter 1).
 
-    E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal (`Law`)
-    residual = y - q c w + what effects add                      c: ratio of q with effects to q without, `Law.ratio`
+    E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal: `Law.transfer`
+    q~ = q clip((coherence - NOISE) / NOISE, 0, 1)               0 where gyro noise in both makes q: `Law.coherent`
+    residual = y - q~ c w + what effects add                     c: ratio of q with effects to q without, `Law.ratio`
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
-comes through the commands, of which a part q is seen too, or as a torque from outside, which acts past the loop that
+comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
 fights it (`loop.disturbed`). Blocks in which a set-point stepped follow another law (the kick is coherent, the aliases
 are not) and leave another floor, to which their residual is weighted.
 """
@@ -82,9 +84,9 @@ class OutsideTorque(NamedTuple):
 class Law:
     """How the measured torque follows the modelled one in blocks of one kind, quiet or stepped; (bins, 3) each.
 
-    transfer: q, complex, without unit; coherent: q as far as it is no noise of the gyro in both: 0 up to a coherence of
-    NOISE, q from twice that on; outside: what the residual has of a torque from outside; weight: rms floor of quiet
-    blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz.
+    transfer: q, coherent: q~ (both in the module's equations), complex, without unit; outside: what the residual has of
+    a torque from outside; weight: rms floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww,
+    (rad/s^2)^2/Hz.
     """
 
     transfer: np.ndarray
@@ -99,11 +101,12 @@ class Law:
         return self.coherent / np.maximum(np.abs(self.coherent), 1.0)
 
     def ratio(self, change: Change, kind: int) -> np.ndarray:
-        """Ratio (bins, 3) of `coherent` with effects that change the loop to that without. kind: QUIET or STEPPED.
+        """Ratio c (bins, 3) of q with effects that change the loop to q without. kind: QUIET or STEPPED.
 
         A share a of the commands follows the loop model, the others turn the vehicle as they say: q = a before + 1 - a,
         with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, with a prior at 1
-        of a spread SHARE_DOUBT in q. In yaw, mostly noise of the gyro, the motors count as far as q is no noise.
+        of a spread SHARE_DOUBT in q. In yaw c becomes 1 + (c - 1) / max(|q~|, 1)^2: where |q~| exceeds 1 it is mostly
+        noise of the gyro, which effects do not change.
         """
         before, after = change.before[kind], change.motors * change.share[kind] * change.before[kind]
         off_one = before - 1.0
@@ -123,6 +126,10 @@ class Law:
         if torque.disturbance is not None:
             residual = residual + self.outside.transfer * torque.disturbance
         return self.weight * residual
+
+    def random_power(self, sensed: bool) -> np.ndarray:
+        """Power (bins, 3) that the residual has of a random torque of unit power. sensed: on the gyro alone."""
+        return self.weight ** 2 * (1.0 if sensed else self.outside.power)
 
 
 @dataclass(frozen=True)
@@ -151,7 +158,7 @@ class Response:
         residual = self.quiet_law.residual(torque, change, QUIET)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
         if len(with_step):
-            stepped = np.array(np.nan) if self.stepped_law is None else \
+            stepped = np.full(residual[with_step].shape, np.nan) if self.stepped_law is None else \
                 self.stepped_law.residual(torque.of_blocks(with_step), change, STEPPED)
             residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
         out = spectra.copy()
@@ -179,9 +186,8 @@ class Response:
 
         sensed: on the gyro alone.
         """
-        in_quiet, in_stepped = (np.ones(self.quiet_power.mean.shape) if law is None else
-                                law.weight ** 2 * (1.0 if sensed else law.outside.power)
-                                for law in (self.quiet_law, self.stepped_law))
+        in_quiet = self.quiet_law.random_power(sensed)
+        in_stepped = np.ones(in_quiet.shape) if self.stepped_law is None else self.stepped_law.random_power(sensed)
         out = np.nan_to_num(np.where(quiet[:, None], in_quiet, in_stepped), nan=1.0)  # without a law none is counted
         out[:, :FIRST_BIN] = 1.0
         return out
@@ -198,7 +204,7 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
     if len(y) < FEWEST:
         return None
     modelled = [m - r for m, r in zip(measured, residuals, strict=True)]
-    power, quiet = quiet_blocks.of_nominal_flights(modelled, np.abs(w) ** 2)
+    power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
     quiet_law, floor = _law(y, w, quiet, loop, None)
     stepped_law = None
     if (~quiet).any(axis=1).sum() >= FEWEST:

@@ -26,7 +26,8 @@ LEAST_LEFT = 0.1  #: share of a block's power that is left at least when the pow
 #: flown: that of the lowest band
 TRIM_HZ = BANDS_HZ[1]
 FEWEST_BLOCKS = 4  #: blocks of nominal flights that a floor is measured on; chosen
-UNKNOWN_FLOOR = 2.0  #: power of a floor for which there are fewer, over that of the sensors' noise; chosen
+#: power of the floor where nominal flights have fewer than FEWEST_BLOCKS, over that of the sensors' noise; chosen
+UNKNOWN_FLOOR = 2.0
 LEAST_FLOOR = 0.5  #: least power of a measured floor over that of the sensors' noise; chosen
 #: bins, frequency at which a spectrum that falls to 0 is taken in its lowest bin, as the window leaks into it; chosen
 LEAKED = 0.5
@@ -48,7 +49,7 @@ def frequencies(regime: str) -> np.ndarray:
     return np.fft.rfftfreq(LENGTH[regime], PERIOD_S)
 
 
-def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
+def short_time_spectra(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     """Spectra (blocks, bins, channels) of values (n, channels) in blocks from samples `first`, unit/sqrt(Hz).
 
     The mean of |.|^2 is the one-sided PSD; a constant x gives x * sqrt(duration / 1.5) in the lowest bin.
@@ -90,20 +91,20 @@ def judged_bins(regime: str) -> np.ndarray:
 class Floor:
     """Power of the residuals of nominal flights, against which a gap is held.
 
-    power: by regime (bins, COUNT), unit^2/Hz; blocks: by regime, how many it is measured on; offset (COUNT,): standard
-    deviation between flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,): that part of it which
-    the power in the lowest bin does not give; clock_s: rms of the logged times around regular ones, s; lost: share of
-    lost samples; slopes: of the power in the air with how hard the vehicle is flown, None for too few flights; least
-    (bins, COUNT): power in the air that stays however calmly it is flown.
+    power: by regime (bins, COUNT), unit^2/Hz; block_counts: by regime, how many blocks it is measured on; offset
+    (COUNT,): standard deviation between flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,):
+    that part of it which the power in the lowest bin does not give; clock_s: rms of the logged times around regular
+    ones, s; lost: share of lost samples; slopes: of the power in the air with how hard the vehicle is flown, None for
+    too few flights; least_power (bins, COUNT): power in the air that stays however calmly it is flown.
     """
 
     power: dict[str, np.ndarray]
-    blocks: dict[str, int]
+    block_counts: dict[str, int]
     offset: np.ndarray
     clock_s: float
     lost: float
     slopes: Slopes | None = None
-    least: np.ndarray | float = 0.0
+    least_power: np.ndarray | float = 0.0
     offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
 
     def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
@@ -111,7 +112,7 @@ class Floor:
         power = self.power[regime]
         if self.slopes is None or regime != AIR:
             return np.broadcast_to(power, (len(first), *power.shape))
-        return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least)
+        return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least_power)
 
 
 @dataclass(frozen=True)
@@ -130,23 +131,23 @@ class NominalBlocks:
     bridging: np.ndarray
 
 
-def floor_of(nominal: Sequence[NominalBlocks], least: np.ndarray) -> Floor:
+def floor_of(nominal: Sequence[NominalBlocks], sensor_rms: np.ndarray) -> Floor:
     """The floor of flights declared nominal, one or more, from what the calibrated model leaves of them.
 
-    least (COUNT,): white noise that the sensors are declared to have, rms at 100 Hz (of the gyro for torque, rad/s);
-    the floor never falls below LEAST_FLOOR of its power. The power that lost rows add is taken off, as each flight
-    loses other rows, to LEAST_LEFT of what is measured.
+    sensor_rms (COUNT,): white noise that the sensors are declared to have, rms at 100 Hz (of the gyro for torque,
+    rad/s); the floor never falls below LEAST_FLOOR of its power. The power that lost rows add is taken off, as each
+    flight loses other rows, to LEAST_LEFT of what is measured.
     """
     flights = [n.flight for n in nominal]
     powers = {r: np.abs(np.concatenate([n.spectra[r] for n in nominal])) ** 2 for r in (AIR, REST)}
     in_air, slopes = _power_in_air(nominal, powers[AIR])
-    power = {AIR: _floor_power(in_air, sensor_power(least, AIR)),
-             REST: _floor_power(powers[REST], sensor_power(least, REST))}
+    sensors = {r: sensor_power(sensor_rms, r) for r in (AIR, REST)}
+    power = {AIR: _floor_power(in_air, sensors[AIR]), REST: _floor_power(powers[REST], sensors[REST])}
     offset, beyond = _offsets(nominal, power[AIR][0])
-    return Floor(power=power, blocks={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
+    return Floor(power=power, block_counts={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
                  clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
                  lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
-                 slopes=slopes, least=LEAST_FLOOR * sensor_power(least, AIR))
+                 slopes=slopes, least_power=LEAST_FLOOR * sensors[AIR])
 
 
 def _power_in_air(nominal: Sequence[NominalBlocks], power: np.ndarray) -> tuple[np.ndarray, Slopes | None]:
@@ -185,15 +186,15 @@ def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.n
     return np.sqrt(variance), np.sqrt(np.maximum(variance - chance, 0.0))
 
 
-def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
+def sensor_power(sensor_rms: np.ndarray, regime: str) -> np.ndarray:
     """PSD (bins, COUNT) of the sensors' white noise; that of the gyro's differences rises with frequency.
 
-    least (COUNT,): as for `floor_of`.
+    sensor_rms (COUNT,): as for `floor_of`.
     """
     f = frequencies(regime)
-    white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
+    white = np.broadcast_to(2.0 * PERIOD_S * sensor_rms ** 2, (len(f), COUNT)).copy()
     differences = difference_power(np.maximum(f, LEAKED * f[1]))
-    white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (least[TORQUE] / PERIOD_S) ** 2
+    white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (sensor_rms[TORQUE] / PERIOD_S) ** 2
     return white
 
 
