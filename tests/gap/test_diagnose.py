@@ -50,4 +50,4 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
     data = SimpleNamespace(study=SimpleNamespace(recorded=True, controller=law))
     selection, _ = diagnosis.selection_and_gap(data, ())
     assert [s.name for s in selection.named] == names
-    assert "motor_lag" in set(selection.singles) & set(selection.least), "the ranking lists every candidate tried"
+    assert "motor_lag" in set(selection.singles) & set(selection.least_gain), "the ranking lists every candidate tried"

@@ -17,9 +17,9 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
-from airtouch.gap.naming import recorded
+from airtouch.gap.naming import gap_closure
+from airtouch.gap.naming.by_relations import signs_not_shown
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.related import signs_not_shown
 from airtouch.gap.naming.select import select
 from airtouch.gap.naming.selection import Selection
 from airtouch.gap.nominal import calibrate
@@ -201,20 +201,20 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     """What is chosen among the candidates, and the gap that it closes.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
-    `naming.recorded`. Where they do not, the others are judged without them.
+    `naming.gap_closure`. Where they do not, the others are judged without them.
     """
     variants = candidates.all_candidates(without)
     selection = select(data, variants, say, without)
     gap = gap_of(data, selection.parts, selection.chosen)
-    others = recorded.named_beside_the_loop(data, selection)
+    others = gap_closure.named_beside_the_loop(data, selection)
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
         gap_of_rest = gap_of(data, rest.parts, rest.chosen)
-        if gap.named.share.value - gap_of_rest.named.share.value < recorded.LEAST_CLOSED:
-            selection = replace(rest, singles={**selection.singles, **rest.singles}, least=selection.least)
+        if gap.named.share.value - gap_of_rest.named.share.value < gap_closure.LEAST_CLOSED:
+            selection = replace(rest, singles={**selection.singles, **rest.singles}, least_gain=selection.least_gain)
             gap = gap_of_rest
     closed = gap.named.share.value
-    if recorded.closes_too_little(data, selection, gap.named.before, closed):
-        selection = recorded.with_none_named(selection, closed)
+    if gap_closure.closes_too_little(data, selection, gap.named.before, closed):
+        selection = gap_closure.with_none_named(selection, closed)
         gap = gap_of(data, selection.parts, None)
     return selection, gap

@@ -31,10 +31,11 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     data = Data(study, fly(1, 54, {"controller_gain": {"height": 0.5}}))
     on = judging.trial_of(data)
     gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
-    chosen = judging.cross_validated(on, "controller_gain", (gain,), None, 0.0)
+    chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
                               for train, test in problem.ROUND_TRIP) for wide in (False, True))
     assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
-    both = judging.cross_validated(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
+    vibration = judging.PricedVariant("vibration", (candidates.terms("vibration")[0],), 0.0)
+    both = judging.cross_validated(on, vibration, chosen)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
     assert both.charges.gained_while_certain == pytest.approx(certain - uncertain)

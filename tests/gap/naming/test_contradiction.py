@@ -39,8 +39,8 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     weaker = replace(step, gain=100.0)
     exact = replace(
         selection, nominal=replace(selection.nominal, simulated=True, count=6), steps=(weaker,),
-        nameless=replace(selection.nameless, beside=1.0), contradicted=Contradiction(loss, worst))
-    assert exact.unlike == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
+        nameless=replace(selection.nameless, over_last_step=1.0), contradicted=Contradiction(loss, worst))
+    assert exact.against_over_limit == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
     assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
         and worst in shortfall(exact, selection.singles["imu_bias"])

@@ -14,10 +14,10 @@ def select(monkeypatch):
 
     Returns the state, and the names that were judged in each round.
     """
-    def run(candidates, passing=None, looked_at=(), left=()):
+    def run(candidates, passing=None, screened=(), left=()):
         def judged(name, so_far=0.0):
             gain, evidence = candidates[name]
-            return Candidate(name, (), so_far + gain, full=name not in looked_at, evidence=evidence)
+            return Candidate(name, (), so_far + gain, full=name not in screened, evidence=evidence)
 
         def round_of(on, worth, chosen, progress, promising):
             names = [n for n in worth if n not in added]
@@ -55,7 +55,7 @@ def test_effects_are_added_from_the_one_that_gains_most_on_and_no_more_than_may_
 
 
 def test_what_gains_too_little_or_was_only_looked_at_is_not_added(select):
-    state, _ = select({"a": (FIRST_GAIN - 0.1, 20.0), "b": (100.0, 20.0)}, looked_at=("b",))
+    state, _ = select({"a": (FIRST_GAIN - 0.1, 20.0), "b": (100.0, 20.0)}, screened=("b",))
     assert state.steps == () and state.gain == 0.0
     state, _ = select({"a": (50.0, 20.0), "b": (LEAST_GAIN - 0.1, 20.0)})
     assert names(state) == [("a", True)], "beside another it needs more"
@@ -93,4 +93,4 @@ def test_an_effect_that_comes_and_goes_is_the_first_step(select):
     passing = Candidate("wake", (), 60.0, evidence=30.0)
     state, _ = select({"a": (100.0, 20.0)}, passing)
     assert names(state) == [("wake", True), ("a", True)]
-    assert state.singles["wake"] is passing and state.least["wake"] == LEAST_GAIN
+    assert state.singles["wake"] is passing and state.least_gain["wake"] == LEAST_GAIN

@@ -24,7 +24,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     single = selection.singles["downwash"]
     without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
     assert single.charges.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.charges.choice_cost)
-    assert selection.least["downwash"] == judging.LEAST_GAIN
+    assert selection.least_gain["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
         assert "downwash" not in other.singles

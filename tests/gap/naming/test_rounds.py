@@ -8,9 +8,9 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds, select
-from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, cross_validated
-from airtouch.gap.naming.looks import HOPELESS
+from airtouch.gap.naming.judging import LEAST_GAIN, PricedVariant, covariance_among_all, cross_validated
 from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.screening import HOPELESS
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE
@@ -24,7 +24,7 @@ def trial(*flights):
 def test_of_variants_with_as_many_terms_the_best_is_taken():
     on = trial(weak(r3=0.005))
     best = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
-    by_rotor = [cross_validated(on, "weak_motor", variant, None, np.log(4.0))
+    by_rotor = [cross_validated(on, PricedVariant("weak_motor", variant, np.log(4.0)), None)
                 for variant in all_candidates()["weak_motor"]]
     assert best.full and best.terms[0].values["rotor"] == 3.0
     assert best.gain == max(j.gain for j in by_rotor) and best.charges.choice_cost == np.log(4.0)
@@ -37,8 +37,8 @@ def test_a_companion_must_earn_its_place_beside_the_effect(drag, names):
     on = trial(swaying(drag, 0.02))
     best = round_of(on, candidates_of(["gust"]), None)["gust"]
     length = best.terms[0].values["length"]
-    alone, both = (cross_validated(on, "gust", variant, None, np.log(3.0)) for variant in all_candidates()["gust"]
-                   if variant[0].values["length"] == length)
+    alone, both = (cross_validated(on, PricedVariant("gust", variant, np.log(3.0)), None)
+                   for variant in all_candidates()["gust"] if variant[0].values["length"] == length)
     assert both.gain > alone.gain and (both.gain - alone.gain > LEAST_GAIN) == (len(names) == 2)
     assert [t.name for t in best.terms] == names and best.gain == (both if len(names) == 2 else alone).gain
 
@@ -87,7 +87,7 @@ def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are(
 def test_each_half_is_looked_at_as_the_hypothesis_fitted_on_the_other_leaves_it():
     """Of a push in one half of the flights the other half's fit leaves something in both, and its own nothing."""
     on = trial(*(hover(20 + k, (0.0, 0.0, 0.0 if k % 2 else -DOWN), length_s=10.0) for k in range(4)))
-    mass = cross_validated(on, "mass", terms("mass"), None, 0.0)
+    mass = cross_validated(on, PricedVariant("mass", terms("mass"), 0.0), None)
     with_own_fits = replace(mass, fits=mass.fits[::-1])
     crosswise, own = (round_of(on, candidates_of(["imu_bias"]), before)["imu_bias"] for before in (mass, with_own_fits))
     assert crosswise.gain < mass.gain - 100.0 < mass.gain - 20.0 < own.gain

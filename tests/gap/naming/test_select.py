@@ -29,9 +29,9 @@ def test_where_nothing_is_nothing_is_found():
     names = ("mass", "imu_bias", "rotor_drag", "wind", "imu_noise", "weak_motor")
     selection, _ = select_from([hover(1)], names, progress=names_reported.append)
     assert selection.steps == () and selection.chosen is None and selection.explained
-    assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least)
-    assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
-    assert selection.nameless.alone == selection.nameless.beside < 12.0
+    assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least_gain)
+    assert set(selection.least_gain.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
+    assert selection.nameless.over_none == selection.nameless.over_last_step < 12.0
     assert not any(j.full for j in selection.singles.values())
     assert not selection.assumed and selection.nominal.nameless_gain == 0.0
     drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
@@ -56,7 +56,8 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert 0.5 * true < np.sqrt(bias.strength.variance[2]) < 4.0 * true
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
-    assert selection.nameless.alone > 0.9 * step.gain and selection.nameless.beside < 12.0 and selection.explained
+    nameless = selection.nameless
+    assert nameless.over_none > 0.9 * step.gain and nameless.over_last_step < 12.0 and selection.explained
     assert selection.chosen.terms == step.terms
 
 
@@ -68,7 +69,7 @@ def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_besid
     # four times a floor of twice the declared power; the declared one itself is no part of what is added
     assert selection.chosen.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
     assert [t.name for t in selection.chosen.terms] == ["imu_noise"]
-    assert {t.name for t in selection.whole.terms} == {"imu_noise", "mass"} and selection.assumed
+    assert {t.name for t in selection.last_step.terms} == {"imu_noise", "mass"} and selection.assumed
     push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
     assert [s.named for s in push_only.steps] == [False] and push_only.chosen is None and push_only.explained
     assert push_only.nominal.nameless_gain == pytest.approx(12.0), "of a rate of 0"
@@ -106,7 +107,7 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
     names = ("mass", "imu_noise", "packet_loss")
     selection, data = select_from([flight], names)
     assert {s.name for s in selection.named} == set(names) and selection.named[-1].name == "packet_loss"
-    share = next(t for t in selection.whole.terms if t.name == "packet_loss").values["share"]
+    share = next(t for t in selection.last_step.terms if t.name == "packet_loss").values["share"]
     assert share == pytest.approx(lost.mean(), rel=0.1)
     by_name = {s.name: s.share for s in selection.named}
     lost_alone = clock_gain(data, candidates_of(["packet_loss"])["packet_loss"][0][0])[1]
@@ -114,7 +115,7 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
     gains = [s.gain for s in selection.steps]
     assert gains == sorted(gains)
     assert by_name["mass"] > 100.0 and by_name["imu_noise"] > 500.0
-    noise_only = own_gain(data, [t for t in selection.whole.terms if t.name == "imu_noise"])
+    noise_only = own_gain(data, [t for t in selection.last_step.terms if t.name == "imu_noise"])
     of_clock = by_name["packet_loss"]
     assert by_name["mass"] == pytest.approx(gains[-1] - of_clock - noise_only, rel=0.02)
 
@@ -165,10 +166,10 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
     for candidate in beside.values():
         assert candidate.terms[0].name == "mass" and candidate.gain < mass.gain + 12.0
         assert candidate.evidence == pytest.approx(candidate.gain - mass.gain)
-    dearer = judging.cross_validated(on, "mass", mass.terms, None, 0.5)
+    dearer = judging.cross_validated(on, judging.PricedVariant("mass", mass.terms, 0.5), None)
     assert dearer.gain == pytest.approx(mass.gain - 0.5) and dearer.charges.choice_cost == 0.5
     motor = candidates_of(["weak_motor"])["weak_motor"][0]
-    both = judging.cross_validated(on, "weak_motor", motor, dearer, 0.25)
+    both = judging.cross_validated(on, judging.PricedVariant("weak_motor", motor, 0.25), dearer)
     assert both.charges.choice_cost == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*dearer.terms, *motor], [np.append(f.scaled, 0.0) for f in dearer.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
@@ -190,7 +191,7 @@ def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_our
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
-    assert recorded.nameless.alone < 12.0 and exact.nameless.alone > nominal.nameless.alone + 100.0
+    assert recorded.nameless.over_none < 12.0 and exact.nameless.over_none > nominal.nameless.over_none + 100.0
     flights = replace(exact.nominal, count=6)
     other = replace(exact, nominal=flights, steps=(Step("mass", (), 1000.0),))
     same_models = replace(other, nominal=replace(flights, same_models=True))

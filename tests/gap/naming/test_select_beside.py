@@ -90,7 +90,7 @@ def test_an_effect_of_the_loop_is_chosen_by_what_it_gains_in_the_commands(flying
     (step,) = selection.steps
     assert step.name == name and step.named and selection.assumed and selection.nominal.count == 4
     assert step.terms[0].values[parameter] == pytest.approx(value, rel=0.2)
-    assert set(selection.least.values()) == {judging.FIRST_GAIN}
+    assert set(selection.least_gain.values()) == {judging.FIRST_GAIN}
     assert step.evidence == step.gain  # nothing is known of nominal flights' scatter
     free = len(step.terms[0].free)
     price = (free - 1) * judging.PRICE + step.charges.choice_cost
@@ -118,7 +118,8 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     _, *variants = all_candidates()["controller_gain"]
     assert together.mean.shape == together.variance.shape == (len(variants),) == (4,)
     for i, terms in enumerate(variants):
-        single = judging.cross_validated(on, "controller_gain", terms, None, np.log(len(variants))).strength
+        variant = judging.PricedVariant("controller_gain", terms, np.log(len(variants)))
+        single = judging.cross_validated(on, variant, None).strength
         assert together.mean[i] == single.mean[i] and together.variance[i] == single.variance[i]
         assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.mean, i).any()
     assert looked.gain < judging.FIRST_GAIN, "a nominal flight"
@@ -135,7 +136,7 @@ def test_the_rotor_that_is_weak_is_the_one_whose_side_sinks(rotor):
 def test_two_weak_rotors_have_a_strength_each():
     selection, _ = select_from([weak(r1=0.002, r2=0.005)], ("weak_motor",))
     first, second = selection.steps
-    losses = {t.values["rotor"]: t.values["thrust_loss"] for t in selection.whole.terms}
+    losses = {t.values["rotor"]: t.values["thrust_loss"] for t in selection.last_step.terms}
     assert losses == {2.0: pytest.approx(0.005, rel=0.1), 1.0: pytest.approx(0.002, rel=0.1)}
     assert first.terms[0].values["rotor"] == 2.0
     unit = losses[1.0] / second.terms[1].scaled(second.terms[1].values)[0]
@@ -163,7 +164,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
     data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)])
     on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
-    packet_loss = judging.cross_validated(on, "packet_loss", (term,), None, 0.0)
+    packet_loss = judging.cross_validated(on, judging.PricedVariant("packet_loss", (term,), 0.0), None)
     assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
     assert nameless_nats(on, None) - nameless_nats(on, packet_loss) == pytest.approx(packet_loss.gain)
 
@@ -171,23 +172,24 @@ def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named(
 def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():
     selection, data = select_from([hover(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
     shares = {s.name: s.share for s in selection.named}
-    (bias,) = (t for t in selection.whole.terms if t.name == "imu_bias")
+    (bias,) = (t for t in selection.last_step.terms if t.name == "imu_bias")
     bias_gain = own_gain(data, [bias]) - 5 * judging.PRICE
-    assert shares["imu_noise"] == pytest.approx(selection.whole.gain - bias_gain, abs=0.3)
+    assert shares["imu_noise"] == pytest.approx(selection.last_step.gain - bias_gain, abs=0.3)
 
 
 def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcomer_does_not_pay_for_that(flying):
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
-    late = judging.cross_validated(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
-    both = judging.cross_validated(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
+    latency = judging.PricedVariant("sensor_latency", all_candidates()["sensor_latency"][0], 0.0)
+    late = judging.cross_validated(on, latency, None)
+    both = judging.cross_validated(on, judging.PricedVariant("imu_noise", all_candidates()["imu_noise"][0], 0.5), late)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
     assert sure - unsure > 5.0 and late.charges.gained_while_certain == 0.0 and both.charges.choice_cost == 0.5
     assert both.charges.gained_while_certain == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
-    third = judging.cross_validated(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
+    third = judging.cross_validated(on, judging.PricedVariant("vibration", all_candidates()["vibration"][0], 0.0), both)
     assert third.charges.gained_while_certain == both.charges.gained_while_certain, "paid once"
 
 
@@ -217,11 +219,11 @@ def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, los
     assert selection.steps[0].name == first
     shares = {s.name: s.share for s in selection.named}
     assert set(shares) == {"weak_motor", "imu_noise"}
-    of = {t.name: t for t in selection.whole.terms}
-    assert selection.whole.gain == pytest.approx(own_gain(data, selection.whole.terms) - np.log(4.0), abs=0.3)
-    assert shares["weak_motor"] == pytest.approx(selection.whole.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
+    of = {t.name: t for t in selection.last_step.terms}
+    assert selection.last_step.gain == pytest.approx(own_gain(data, selection.last_step.terms) - np.log(4.0), abs=0.3)
+    assert shares["weak_motor"] == pytest.approx(selection.last_step.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
     rotor_alone = own_gain(data, [of["weak_motor"]]) - np.log(4.0)
-    assert shares["imu_noise"] == pytest.approx(selection.whole.gain - rotor_alone, abs=0.3)
+    assert shares["imu_noise"] == pytest.approx(selection.last_step.gain - rotor_alone, abs=0.3)
 
 
 def test_what_an_effect_adds_includes_its_companion():
@@ -229,11 +231,11 @@ def test_what_an_effect_adds_includes_its_companion():
     flight = swaying(drag=0.02, gust_mps2=0.1)
     pushed = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN])
     selection, data = select_from([pushed], ("gust", "mass"), scattered(exact=True))
-    shares, (gust, drag, mass) = {s.name: s.share for s in selection.named}, selection.whole.terms
+    shares, (gust, drag, mass) = {s.name: s.share for s in selection.named}, selection.last_step.terms
     assert (gust.name, drag.name, mass.name) == ("gust", "rotor_drag", "mass") and drag.companion
-    assert shares["gust"] == pytest.approx(selection.whole.gain - own_gain(data, [mass]), abs=0.3)
+    assert shares["gust"] == pytest.approx(selection.last_step.gain - own_gain(data, [mass]), abs=0.3)
     of_gust = own_gain(data, [gust, drag]) - judging.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
-    assert shares["mass"] == pytest.approx(selection.whole.gain - of_gust, abs=0.3)
+    assert shares["mass"] == pytest.approx(selection.last_step.gain - of_gust, abs=0.3)
 
 
 def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
@@ -242,10 +244,10 @@ def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
     data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)])
     selection = select(data, {**candidates_of(["rotor_drag"]), "gust": without_companion}, without=ALWAYS)
     shares = {s.name: s.share for s in selection.named}
-    assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.whole.terms)
-    drag = [t for t in selection.whole.terms if t.name == "rotor_drag"]
+    assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.last_step.terms)
+    drag = [t for t in selection.last_step.terms if t.name == "rotor_drag"]
     of_drag = own_gain(data, drag) - judging.PRICE  # a second axis of drag
-    assert shares["gust"] == pytest.approx(selection.whole.gain - of_drag, abs=0.5), "a fit that began elsewhere"
+    assert shares["gust"] == pytest.approx(selection.last_step.gain - of_drag, abs=0.5), "a fit that began elsewhere"
 
 
 def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
@@ -254,7 +256,7 @@ def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
     selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
                                   scattered(exact=True))
     shares = {s.name: s.share for s in selection.named}
-    mass = [t for t in selection.whole.terms if t.name == "mass"]
+    mass = [t for t in selection.last_step.terms if t.name == "mass"]
     assert shares == {"mass": pytest.approx(own_gain(data, mass)), "packet_loss": pytest.approx(loss(data)[1])}
 
 

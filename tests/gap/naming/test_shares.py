@@ -29,8 +29,8 @@ def added(on, *effects):
     steps = []
     for name, variant in effects:
         terms = all_candidates()[name][variant]
-        steps.append(Step.of(judging.cross_validated(on, name, terms, steps[-1] if steps else None,
-                                                     COST.get((name, variant), 0.0))))
+        priced = judging.PricedVariant(name, terms, COST.get((name, variant), 0.0))
+        steps.append(Step.of(judging.cross_validated(on, priced, steps[-1] if steps else None)))
     return steps
 
 

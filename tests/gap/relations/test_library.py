@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import declared_features, features
-from airtouch.gap.naming.related import inference_of
+from airtouch.gap.naming.by_relations import inference_of
 from airtouch.gap.naming.select import select
 from airtouch.gap.relations import library
 from airtouch.gap.relations.learning import drawings

@@ -33,7 +33,7 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
 
     Their order is that of the selection, so that the first is the first of the ranking.
     """
-    hypothesis, chosen = selection.whole, selection.chosen
+    hypothesis, chosen = selection.last_step, selection.chosen
     if hypothesis is None or chosen is None:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}

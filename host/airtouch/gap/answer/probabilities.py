@@ -22,7 +22,7 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     names = list(selection.singles)
     weight = _weights(selection, names)
     total = weight.sum()
-    odds = selection.unlike ** 2
+    odds = selection.against_over_limit ** 2
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:
         unknown = _limited(unknown, weight[names.index(selection.named[0].name)] / total)
@@ -52,7 +52,7 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
     The first effect named leads them by LEAD at least.
     """
     singles = selection.singles
-    out = [_against_none(singles[n].evidence, selection.least[n], len(names)) for n in names]
+    out = [_against_none(singles[n].evidence, selection.least_gain[n], len(names)) for n in names]
     if not selection.named or selection.named[0].name not in names:
         return out
     first = names.index(selection.named[0].name)

@@ -37,7 +37,7 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, candidate.name)
-    least = selection.least[candidate.name]
+    least = selection.least_gain[candidate.name]
     if candidate.name in {s.name for s in selection.named}:  # the best there is, and not enough
         return against(selection)
     if candidate.gain < least:
@@ -50,7 +50,7 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     if selection.chosen:
         return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
-    return f"gains {candidate.gain:.0f} nats, a model without names {selection.nameless.alone:.0f}"
+    return f"gains {candidate.gain:.0f} nats, a model without names {selection.nameless.over_none:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -69,7 +69,7 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 def against(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
     lost, worst = selection.contradicted
-    if selection.loss == selection.unlike:
+    if selection.loss_over_chance == selection.against_over_limit:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.least_left:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")

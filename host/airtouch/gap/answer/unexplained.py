@@ -30,7 +30,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
 
     cells: the headline, then the others, largest first. The stretch of time lies in the phase of the cell.
     """
-    terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
+    terms = selection.last_step.fits[0].terms if selection.last_step and selection.last_step.fits else ()
     active = [t.active() for t in mean_of(terms)]
     chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
     gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []

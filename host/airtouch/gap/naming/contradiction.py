@@ -1,4 +1,4 @@
-"""Where the effects that are named say what the flights do not show."""
+"""Over-prediction: where the effects named predict what the flights do not show."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ CHANCE_LOSS = 1.0
 
 
 def contradicted(trial: Trial, chosen: Candidate | None) -> Contradiction:
-    """What effects lose where they say what the flights do not show; 0 nats and no cell where they lose nothing."""
+    """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing."""
     if chosen is None or not chosen.fits:
         return Contradiction()
     gains = held_out_cell_gains(trial, chosen)

@@ -22,14 +22,14 @@ WORTH_AGAIN = 0.25
 class Search:
     """The flights, and the candidates among which effects are searched.
 
-    candidates: variants of each effect by name; alone: every candidate judged alone; least: nats that each must gain as
-    the first effect; progress: is told the name of every candidate that is judged.
+    candidates: variants of each effect by name; alone: every candidate judged alone; least_gain: nats that each must
+    gain as the first effect; progress: called with each name that is judged.
     """
 
     trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
     alone: Mapping[str, Candidate]
-    least: Mapping[str, float]
+    least_gain: Mapping[str, float]
     progress: Callable[[str], None]
 
 
@@ -39,14 +39,14 @@ class State:
 
     steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last
     step, by name; need: nats that each of these must gain over it; singles: the best variant of every candidate, as
-    judged before an effect was named; least: nats that each must gain as the first effect.
+    judged before an effect was named; least_gain: nats that each must gain as the first effect.
     """
 
     steps: tuple[Step, ...]
     tried: Mapping[str, Candidate]
     need: Mapping[str, float]
     singles: Mapping[str, Candidate]
-    least: Mapping[str, float]
+    least_gain: Mapping[str, float]
 
     @property
     def gain(self) -> float:
@@ -81,11 +81,11 @@ def forward(search: Search, passing: Candidate | None) -> State:
 def _begun(search: Search, passing: Candidate | None) -> State:
     """The state before the first effect is added, with an effect that comes and goes as a step already."""
     if passing is None:
-        return State((), search.alone, search.least, search.alone, search.least)
+        return State((), search.alone, search.least_gain, search.alone, search.least_gain)
     singles = {**search.alone, passing.name: passing}
     steps = (Step.of(passing),)
     tried, need = _beside(search, steps, singles)
-    return State(steps, tried, need, singles, {**search.least, passing.name: LEAST_GAIN})
+    return State(steps, tried, need, singles, {**search.least_gain, passing.name: LEAST_GAIN})
 
 
 def _worth_adding(state: State) -> dict[str, Candidate]:

@@ -5,6 +5,7 @@ Of a few flights each half has some blocks of every flight.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,14 @@ LEAST_GAIN = 12.0
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
 NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound; chosen: fits end just short of one
+
+
+class PricedVariant(NamedTuple):
+    """A variant of an effect, and the nats that the choice among the effect's variants costs."""
+
+    name: str
+    terms: Terms
+    choice_cost: float
 
 
 @dataclass(frozen=True)
@@ -74,30 +83,36 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def cross_validated(trial: Trial, name: str, terms: Terms, chosen: Candidate | None, choice_cost: float,
-                    brief: bool = False) -> Candidate:
-    """The hypothesis of an effect beside those that are chosen, fitted on each half and judged on the other.
+def cross_validated(trial: Trial, variant: PricedVariant, chosen: Candidate | None, brief: bool = False) -> Candidate:
+    """The hypothesis of a variant beside the effects that are chosen, fitted on each half and judged on the other.
 
-    name, terms: the effect, and its variant; choice_cost: nats that the choice among its variants costs; brief: the
-    fits are cut short, to see whether whole ones promise anything. The gain is that of all effects over none, less what
-    their parameters and the choice of their variants cost. Effects that are seen in the commands alone gain less beside
-    the first random one; it is not charged with that (`_lost_to_uncertainty`).
+    brief: the fits are cut short, to see whether whole ones promise anything. The gain is that of all effects over
+    none, less what their parameters and the choice of their variants cost. Effects that are seen in the commands alone
+    gain less beside the first random one; it is not charged with that (`_lost_to_uncertainty`).
     """
-    before, charged = (chosen.terms, chosen.charges) if chosen else ((), Charges())
-    charges = Charges(choice_cost + charged.choice_cost,
+    terms, before, charged = variant.terms, chosen.terms if chosen else (), chosen.charges if chosen else Charges()
+    charges = Charges(variant.choice_cost + charged.choice_cost,
                       charged.gained_while_certain + _lost_to_uncertainty(trial, terms, chosen))
     if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
         gain, fits = chosen.gain, chosen.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
-        held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP),
-                       clock_gains(trial.data, before))
-        gain = held_out + (charges.gained_while_certain - price_of(fits[-1].terms) - charges.choice_cost)
+        gain = _gain_in_spectra(trial, fits, charges, clock_gains(trial.data, before))
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
+    # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
+    return Candidate(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
+
+
+def _gain_in_spectra(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
+    """Held-out nats of effects that were fitted to each half, with those of effects on the clock before them.
+
+    charges: of all effects; of_clock: nats of those on the clock.
+    """
+    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP), of_clock)
+    return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
 
 
 def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:

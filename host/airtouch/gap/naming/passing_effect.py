@@ -15,19 +15,19 @@ from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least: Mapping[str, float], without: Sequence[str],
-                   ) -> Candidate | None:
+def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least_gain: Mapping[str, float],
+                   without: Sequence[str]) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
     It must gain LEAST_GAIN more than every effect that always acts and has enough evidence, LEAST_GAIN more than what
     follows the flight's own height, which needs no other vehicle, and as much more than it gains in nominal flights.
     Seconds in which another vehicle is known to be overhead go before others, which are only likely. singles:
-    candidates judged alone; least: nats of evidence that each needs; without: names that are left out.
+    candidates judged alone; least_gain: nats of evidence that each needs; without: names that are left out.
     """
     if trial.data.study.scatter is None:
         return None
     data = trial.data
-    of_steady_effects = [c.gain for name, c in singles.items() if c.evidence >= least[name]]
+    of_steady_effects = [c.gain for name, c in singles.items() if c.evidence >= least_gain[name]]
     steady = max([height_gain(data, trial.parts), *of_steady_effects])
     passing = [g for g in gated_effects(data, without).values()
                if g.gain >= steady + LEAST_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= LEAST_GAIN]

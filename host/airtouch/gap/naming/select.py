@@ -13,11 +13,11 @@ import numpy as np
 from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import held_out_gains
+from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
 from airtouch.gap.naming.contradiction import contradicted
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
-from airtouch.gap.naming.related import inference_of, selection_by_relations
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, NamelessGain, NominalFlights, Selection
 from airtouch.gap.naming.thresholds import assumes
@@ -71,7 +71,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     answer = selection_by_relations(search.trial, search.candidates, search.alone, inference, search.progress)
     if answer.explained:
         return answer
-    passing = passing_effect(search.trial, search.alone, search.least, without)
+    passing = passing_effect(search.trial, search.alone, search.least_gain, without)
     if not replay_may_name(passing, inference):
         return answer
     state = forward(search, passing)
@@ -109,7 +109,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     alone = nameless_nats(trial, None)
     beside = nameless_nats(trial, state.steps[-1]) if state.steps else alone
     selection = Selection(
-        singles=state.singles, steps=state.steps, parts=trial.parts, least=state.least,
+        singles=state.singles, steps=state.steps, parts=trial.parts, least_gain=state.least_gain,
         nameless=NamelessGain(alone, beside, clock_left(trial.data, last)),
         nominal=NominalFlights(study.nominal_count, _nameless_gain_of_nominal_flights(trial.data), study.simulated,
                                study.same_models),

@@ -32,14 +32,14 @@ TEMPERATURE = 6.0
 class Strength:
     """Scaled parameters of one term, as both halves of the flights have them.
 
-    mean (k,): of both halves; covariance (k, k): by chance, 0 but for mean effects, (0, 0) where nobody asks for it;
-    apart (k,): half of what the halves differ by. k: of all parameters that the effect may have free; those that its
-    variant leaves alone are 0, and nobody knows how far they lie from it.
+    mean (k,): of both halves, 0 for parameters that the variant does not free; covariance (k, k): of estimation, 0 but
+    for mean effects, infinite for parameters that are not free, empty if not requested; half_difference (k,): half the
+    difference of the halves. k: all parameters that the effect may have free.
     """
 
     mean: np.ndarray = field(default_factory=lambda: np.zeros(0))
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    apart: np.ndarray | float = 0.0
+    half_difference: np.ndarray | float = 0.0
 
     @property
     def variance(self) -> np.ndarray:
@@ -47,7 +47,7 @@ class Strength:
 
         Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
         """
-        return np.maximum(np.diag(self.covariance), np.square(self.apart))
+        return np.maximum(np.diag(self.covariance), np.square(self.half_difference))
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Candidate:
     """A hypothesis of one effect or several, with what it gains.
 
     name: its newest effect; terms: of all its effects, with their values; gain: held-out nats over no effect, after
-    `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only looked at;
-    full: whether it was fitted to the end, not looked at or fitted briefly. Of the newest effect: strength; evidence:
+    `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only screened;
+    full: whether it was fitted to the end, not screened or fitted briefly. Of the newest effect: strength; evidence:
     nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
     flights; key: where it comes and goes, the entry of `Scatter.passing` that it is compared with, else "".
     """
@@ -85,7 +85,7 @@ class Candidate:
 
     @property
     def of_the_log(self) -> bool:
-        """Whether the newest effect is one that the log has done to itself."""
+        """Whether the newest effect is a fault of the log's own times."""
         return any(t.name == self.name and t.shows_in == CLOCK for t in self.terms)
 
 
@@ -94,8 +94,8 @@ class Step(Candidate):
     """A candidate that a selection has added to the steps before it.
 
     named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights have
-    as well, and stands beside the effects named. share: where several effects are named, the nats that the newest
-    effect adds to all others; infinite where it is named alone.
+    as well, and stands beside the effects named. share: where several effects are named, the leave-one-out gain of the
+    newest, nats; infinite where it is named alone.
     """
 
     named: bool = True
@@ -111,12 +111,12 @@ class Step(Candidate):
 class NamelessGain:
     """Held-out nats that the nameless model gains; 0 where the relations of signals decide, which do not use it.
 
-    alone: over no effect; beside: over the last step of a selection; of_times: of the latter, what the logged times
-    hold.
+    over_none: over no effect; over_last_step: over the last step of the selection; of_times: of the latter, what the
+    logged times hold.
     """
 
-    alone: float = 0.0
-    beside: float = 0.0
+    over_none: float = 0.0
+    over_last_step: float = 0.0
     of_times: float = 0.0
 
 
@@ -135,7 +135,7 @@ class NominalFlights:
 
 
 class Contradiction(NamedTuple):
-    """Held-out nats that effects lose in cells where they say what the flights do not show, and the worst cell."""
+    """Over-prediction: held-out nats lost in cells where effects predict what flights do not show; the worst cell."""
 
     nats: float = 0.0
     cell: str = ""
@@ -153,18 +153,18 @@ class Selection:
     """The result of a selection of effects; gains are in held-out nats.
 
     singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
-    nameless model gains; parts: the two halves that effects were fitted and judged on; least: nats that each candidate
-    must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a chosen effect
-    is assumed, as it is random or changes the loop of recorded flights; contradicted: what the effects named lose where
-    they say what is not there; inference: what named the effects, where the relations of signals did; taken_back: what
-    recorded flights name no more.
+    nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
+    candidate must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a
+    chosen effect is assumed, as it is random or changes the loop of recorded flights; contradicted: over-prediction of
+    the effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
+    flights name no more.
     """
 
     singles: Mapping[str, Candidate]
     steps: tuple[Step, ...]
     nameless: NamelessGain
     parts: tuple[BlockSet, BlockSet]
-    least: Mapping[str, float]
+    least_gain: Mapping[str, float]
     nominal: NominalFlights
     assumed: bool
     contradicted: Contradiction = Contradiction()
@@ -172,24 +172,24 @@ class Selection:
     taken_back: TakenBack = TakenBack()
 
     @property
-    def whole(self) -> Step | None:
+    def last_step(self) -> Step | None:
         """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
         return self.steps[-1] if self.steps else None
 
     @property
     def named(self) -> tuple[Step, ...]:
-        """The steps whose effects are named, what adds most to the others first, what the log did to itself last."""
+        """The steps whose effects are named, the largest share first, faults of the log's own times last."""
         return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
 
     @property
     def chosen(self) -> Candidate | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
-        names, whole = {s.name for s in self.named}, self.whole
-        if not names or whole is None:
+        names, last = {s.name for s in self.named}, self.last_step
+        if not names or last is None:
             return None
         names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
-        fits = tuple(replace(f, terms=_of_names(f.terms, names)) for f in whole.fits)
-        return replace(whole, terms=_of_names(whole.terms, names), fits=fits)
+        fits = tuple(replace(f, terms=_of_names(f.terms, names)) for f in last.fits)
+        return replace(last, terms=_of_names(last.terms, names), fits=fits)
 
     def gained(self, candidate: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
@@ -203,7 +203,7 @@ class Selection:
         """
         if self.inference is not None:
             return self.inference.against
-        return Against(self.nameless.beside, self._most_nameless_gain, of_distance=False)
+        return Against(self.nameless.over_last_step, self._most_nameless_gain, of_distance=False)
 
     @property
     def _most_nameless_gain(self) -> float:
@@ -213,8 +213,8 @@ class Selection:
         """
         nominal = self.nominal
         if nominal.count < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.alone, nominal.nameless_gain)
-        gained = self.whole.gain if self.whole else 0.0
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.over_none, nominal.nameless_gain)
+        gained = self.last_step.gain if self.last_step else 0.0
         share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if nominal.same_models else 1.0)
         return max(self.least_left, share * gained, 0.0 if nominal.simulated else nominal.nameless_gain)
 
@@ -224,21 +224,21 @@ class Selection:
         return UNKNOWN_GAIN * (self.nominal.count + 1) / (self.nominal.count - 1)
 
     @property
-    def unlike(self) -> float:
-        """How much speaks against the effects named, over what may: what is left, or what they lose; 1 is the limit."""
+    def against_over_limit(self) -> float:
+        """How much speaks against the effects named over its limit: by `against`, or by over-prediction."""
         against = self.against
         never_negative = float(np.logaddexp(against.nats, 0.0))  # softplus: the nats where these are many, else above 0
-        return max(never_negative / against.limit, self.loss)
+        return max(never_negative / against.limit, self.loss_over_chance)
 
     @property
-    def loss(self) -> float:
-        """What the effects named lose where they say what is not there, over what may be chance."""
+    def loss_over_chance(self) -> float:
+        """Nats of over-prediction over those that may be chance."""
         return self.contradicted.nats / self.least_left if self.contradicted.nats else 0.0
 
     @property
     def explained(self) -> bool:
-        """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
-        return self.unlike < 1.0
+        """Whether what is left is the floor, or close to it, and the effects named do not over-predict."""
+        return self.against_over_limit < 1.0
 
 
 def _of_names(terms: Terms, names: Container[str]) -> Terms:

@@ -1,7 +1,7 @@
-"""The share of each of several effects: what it adds to the others, the gain of all less that of all but one.
+"""The share of each of several effects: its leave-one-out gain.
 
-Both are gains as `judging.cross_validated` has them: effects before the first random one are not charged with what they
-gain less once the commands' floor is less certain.
+The gains of all effects and of all but one are those of `judging.cross_validated`: effects before the first random one
+are not charged with what they gain less once the commands' floor is less certain.
 """
 
 from collections.abc import Sequence

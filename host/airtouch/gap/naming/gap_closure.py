@@ -1,4 +1,4 @@
-"""Which share of their gap recorded flights' effects must close to be named: a large one where flights differ anyway.
+"""Least fraction of the gap that named effects must close in recorded flights.
 
 Between two days the gains of a loop differ a little, and nominal flights meet gusts. Neither makes a gap. Against a
 baseline of another drone a bias or a wind may gain held-out likelihood and yet make the gap larger.
@@ -53,7 +53,7 @@ def with_none_named(selection: Selection, closed: float) -> Selection:
 
     closed: share of the gap that they close. Beside none the nameless model gains what it gains over none.
     """
-    nameless = replace(selection.nameless, beside=selection.nameless.alone)
+    nameless = replace(selection.nameless, over_last_step=selection.nameless.over_none)
     first = selection.named[0].name
     return replace(selection, steps=(), nameless=nameless, assumed=False, taken_back=TakenBack(first, closed))
 

@@ -1,4 +1,4 @@
-"""First looks: every variant of every candidate beside what is chosen, at a small part of what its fit would cost."""
+"""Screening: every variant of every candidate beside what is chosen, at a small part of what its fit would cost."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -7,26 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.naming.judging import Trial, covariance_among_all, price_of
-from airtouch.gap.naming.screen import Remainder, first_order, random_look, remainder_of, shows
+from airtouch.gap.naming.first_order import Remainder, judge_means, judge_random, remainder_of, shows
+from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term, Terms
 
-HOPELESS = 0.5  #: nats that an effect must gain at a first look to be looked at more closely; chosen
+HOPELESS = 0.5  #: nats that an effect must gain in screening to be fitted; chosen
 
 
-class PricedVariant(NamedTuple):
-    """A variant of an effect, and the nats that the choice among the effect's variants costs."""
-
-    name: str
-    terms: Terms
-    choice_cost: float
-
-
-class RandomLook(NamedTuple):
+class ScreenedRandom(NamedTuple):
     """Nats that a variant with a random effect gains, its choice paid, and the scaled strength (k,) of that effect."""
 
     gain: float
@@ -54,11 +46,11 @@ class RoundStart:
 
 
 @dataclass
-class Looks:
-    """Variants by what a first look can say of them.
+class Screened:
+    """Variants by how they are screened.
 
-    means: hypotheses of mean effects, judged to first order; random: variants with a random effect, at which
-    `random_looks` looks; unseen: those that only a fit can judge.
+    means: hypotheses of mean effects, judged to first order; random: variants with a random effect, for
+    `screen_random`; unseen: those that only a fit can judge.
     """
 
     means: list[Candidate] = field(default_factory=list)
@@ -73,24 +65,25 @@ def start_of(trial: Trial, chosen: Candidate | None) -> RoundStart:
     return RoundStart(trial, chosen, halves)
 
 
-def first_looks(start: RoundStart, candidates: Mapping[str, Sequence[Terms]], progress: Callable[[str], None]) -> Looks:
-    """A first look at every variant that may be added, by what such a look can say of it.
+def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
+                    progress: Callable[[str], None]) -> Screened:
+    """Every variant that may be added, those of mean effects judged to first order.
 
-    candidates: variants by name; progress: is told every name.
+    candidates: variants by name; progress: called with every name.
     """
-    looks = Looks()
+    screened = Screened()
     for name, variants in candidates.items():
         progress(name)
         for variant in addable(name, variants, start.terms):
             if random_of(variant.terms):
-                looks.random.append(variant)
+                screened.random.append(variant)
                 continue
-            look = _look_at_means(start, variant)
-            if look is None:
-                looks.unseen.append(variant)
+            judged = _screened_means(start, variant)
+            if judged is None:
+                screened.unseen.append(variant)
             else:
-                looks.means.append(look)
-    return looks
+                screened.means.append(judged)
+    return screened
 
 
 def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
@@ -109,23 +102,23 @@ def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedV
             if identities.isdisjoint(t.identity for t in terms)]
 
 
-def _look_at_means(start: RoundStart, variant: PricedVariant) -> Candidate | None:
-    """A first look at a variant of mean effects; None where it cannot see them, as only the commands show them."""
+def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | None:
+    """A variant of mean effects judged to first order; None where only the commands show them, which a fit judges."""
     if any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         return None
-    look = _judged_to_first_order(start, variant)
-    hopeless = look.gain < start.gain + HOPELESS
-    return None if hopeless and _only_in_commands(start.trial, variant.terms) else look
+    judged = _judged_to_first_order(start, variant)
+    hopeless = judged.gain < start.gain + HOPELESS
+    return None if hopeless and _only_in_commands(start.trial, variant.terms) else judged
 
 
 def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
     """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    look = first_order(start.trial.data, start.halves, terms, start.terms)
-    gain = look.gain + (start.gain - price_of(terms) - variant.choice_cost)
-    halves = np.array(look.fitted)[:, :k]
+    judged = judge_means(start.trial.data, start.halves, terms, start.terms)
+    gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
+    halves = np.array(judged.fitted)[:, :k]
     strength = Strength(own.among_all(halves.mean(axis=0)),
-                        covariance_among_all(own, np.diag(_variance_of_mean(halves, look.variances, k))))
+                        covariance_among_all(own, np.diag(_variance_of_mean(halves, judged.variances, k))))
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
                      charges=Charges(variant.choice_cost), strength=strength)
 
@@ -146,41 +139,44 @@ def _only_in_commands(trial: Trial, terms: Terms) -> bool:
         and not np.allclose(loop.ratio(one_step_off), 1.0)
 
 
-def random_looks(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
+def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
                  ) -> tuple[list[Candidate], list[PricedVariant]]:
-    """Looks at variants with a random effect: hypotheses that promise little, and the variants of others, to be fitted.
+    """Variants with a random effect: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that looks best is
-    fitted, with the longer ones that begin with the same term. means: looks at mean effects, best first; a candidate
-    that is among them says by that how little it promises.
+    Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that gains most in
+    screening is fitted, with the longer ones that begin with the same term. means: mean effects judged to first order,
+    best first; a candidate that is among them says by that how little it promises.
     """
-    mean_of = {c.name: c for c in reversed(means) if len(c.terms) == len(start.terms) + 1}
+    mean_of: dict[str, Candidate] = {}
+    for mean in means:
+        if len(mean.terms) == len(start.terms) + 1:
+            mean_of.setdefault(mean.name, mean)
     unpromising, to_fit = [], []
-    for name, looks in _random_looks_by_name(start, variants, mean_of).items():
-        best = max(looks, key=lambda look: look.gain)
-        mean = mean_of.get(name)
-        if thorough or best.gain > HOPELESS or mean and mean.gain - start.gain > HOPELESS:
+    for name, screened in _screened_random_by_name(start, variants, mean_of).items():
+        best = max(screened, key=lambda s: s.gain)
+        mean_promises = name in mean_of and mean_of[name].gain - start.gain > HOPELESS
+        if thorough or best.gain > HOPELESS or mean_promises:
             to_fit += [best.variant, *_longer(best.variant, variants)]
-        elif mean is None:
+        elif name not in mean_of:
             unpromising.append(_as_judged(start, best))
     return unpromising, to_fit
 
 
-def _random_looks_by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
-                          ) -> dict[str, list[RandomLook]]:
-    """Looks by name at the variants of every candidate whose random part stands alone or beside one mean term.
+def _screened_random_by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
+                          ) -> dict[str, list[ScreenedRandom]]:
+    """By name, the variants of every candidate whose random part stands alone or beside one mean term.
 
-    mean_of: the best look at a mean effect, by name; where there is one, only that variant of the mean term counts.
+    mean_of: the best variant of a mean effect, by name; where there is one, only that variant of the mean term counts.
     """
-    looks: dict[str, list[RandomLook]] = {}
+    screened: dict[str, list[ScreenedRandom]] = {}
     for variant in variants:
         name, terms, cost = variant
         if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
             continue
         if len(terms) == 1 or terms[0].shows_in == MEAN:
-            gain, strength = random_look(start.halves, random_of(terms)[0])
-            looks.setdefault(name, []).append(RandomLook(gain - cost, strength, variant))
-    return looks
+            gain, strength = judge_random(start.halves, random_of(terms)[0])
+            screened.setdefault(name, []).append(ScreenedRandom(gain - cost, strength, variant))
+    return screened
 
 
 def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[PricedVariant]:
@@ -189,11 +185,11 @@ def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[P
             and _same(v.terms[0], variant.terms[0])]
 
 
-def _as_judged(start: RoundStart, look: RandomLook) -> Candidate:
-    """A look at a random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
-    name, terms, cost = look.variant
-    return Candidate(name, (*start.terms, *terms), start.gain + min(look.gain, 0.0), full=False,
-                     charges=Charges(cost), strength=Strength(strength_term(terms).among_all(look.strength)))
+def _as_judged(start: RoundStart, screened: ScreenedRandom) -> Candidate:
+    """A screened random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
+    name, terms, cost = screened.variant
+    return Candidate(name, (*start.terms, *terms), start.gain + min(screened.gain, 0.0), full=False,
+                     charges=Charges(cost), strength=Strength(strength_term(terms).among_all(screened.strength)))
 
 
 def _same(one: Term, other: Term) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.naming.looks import addable
+from airtouch.gap.naming.screening import addable
 from airtouch.gap.signatures.candidates import all_candidates
 
 CANDIDATES = all_candidates()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.naming.recorded import (
+from airtouch.gap.naming.gap_closure import (
     LEAST_CLOSED,
     STANDS_OUT,
     closes_too_little,

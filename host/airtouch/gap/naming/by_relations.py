@@ -34,7 +34,7 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
                            inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
-    candidates: variants by name; alone: every candidate judged alone; progress: is told every name.
+    candidates: variants by name; alone: every candidate judged alone; progress: called with every name.
     """
     steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
@@ -45,7 +45,7 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
         singles=alone, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
-        least=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
+        least_gain=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
         nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
 
 

@@ -1,4 +1,4 @@
-"""A first look at one variant: its first-order change of the spectra, or the strength of its random effect.
+"""One variant screened: by its first-order change of the spectra, or by the strength of its random effect.
 
 It costs one replay for each free parameter, whose result both halves of the data share. Candidates that do well here
 are then fitted in full.
@@ -58,7 +58,7 @@ def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder
     return Remainder(problem, residual, extra_power, problem.likelihood(values, extra_power), cost)
 
 
-def first_order(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], beside: Sequence[Term] = (),
+def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], beside: Sequence[Term] = (),
                 ) -> FirstOrder:
     """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
 
@@ -86,7 +86,7 @@ def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
     return [t for t in terms if t.shows_in == MEAN and not t.signature.commands_only]
 
 
-def random_look(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
+def judge_random(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
     """Held-out nats of a random effect beside what is chosen, and its scaled strength (k,), the mean of both halves.
 
     What is chosen stays as it is.
