@@ -1,4 +1,4 @@
-"""The page of decisions names every module of the diagnosis, no folder imports one below it, and tests mirror them."""
+"""The page of decisions names every module of the diagnosis, no folder imports one above it, and tests mirror them."""
 
 import ast
 import re
@@ -8,8 +8,8 @@ from airtouch import gap
 
 ROOM = Path(gap.__file__).parent
 PAGE = ROOM.parents[1] / "docs" / "architecture.md"
-#: folders in the order of the package's own words, each a line that begins with its name
-FOLDERS = [name for name in re.findall(r"^(\w+)  +\S", gap.__doc__, re.M) if (ROOM / name).is_dir()]
+#: folders from the lowest up: the package's own words name them in the other order, a line each
+FOLDERS = [name for name in re.findall(r"^(\w+)  +\S", gap.__doc__, re.M) if (ROOM / name).is_dir()][::-1]
 #: Modules that stand beside the folders, and the first folder that may not import them
 BESIDE = {"workspace": None, "second_process": None, "result": None, "measurement": "sealed", "diagnosis": "sealed"}
 
@@ -33,7 +33,7 @@ def test_tests_stand_in_the_folders_that_they_test():
     assert {path.parent.name for path in here.glob("*/test_*.py")} <= set(FOLDERS)
 
 
-def test_a_folder_imports_only_those_above_it():
+def test_a_folder_imports_only_those_below_it():
     upwards = []
     for path in ROOM.glob("*/*.py"):
         here = path.parent.name

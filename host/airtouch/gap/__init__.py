@@ -3,24 +3,25 @@
 `airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` are those of `airtouch.api`, which
 take files, logs or tables. Those of the modules `diagnosis` and `measurement` take logs alone.
 
-One folder a step; each imports only those above it. The decisions, file by file: host/docs/architecture.md.
+One folder a step, the first step last; each imports only those below it. The decisions, file by file:
+host/docs/architecture.md.
 
-flights     a log made ready: on a regular clock, attitude and heights, moments of contact
-signatures  what is known of each effect, and how strong it seems in nominal flights
-edges       what flights do at the edges of a platform
-loop        the closed loop: what noise, set-points and torques make of the commands
-signals     what is compared, channel by channel, and with what: the study of a vehicle
-evidence    how likely flights are under effects, and the fit of effects to them
-passing     effects that come and go: when they act
-nameless    what no effect explains: the nameless model, "a model without names" in answers
-features    what a flight's signals do to one another, in numbers
-relations   these numbers compared with those of simulated flights of each effect
-naming      which effects are named
-nominal     what the baseline flights say: vehicle, floor, scatter
-where       the map of the gap by channel, band, phase and regime
-answer      verdict, probabilities, parameters, how far, what to fly next
-balance     flights without a gyro: the balance of a hover
 sealed      sets whose effect is withheld: made, diagnosed, scored
+balance     flights without a gyro: the balance of a hover
+answer      verdict, probabilities, parameters, how far, what to fly next
+where       the map of the gap by channel, band, phase and regime
+nominal     what the baseline flights say: vehicle, floor, scatter
+naming      which effects are named
+relations   these numbers compared with those of simulated flights of each effect
+features    what a flight's signals do to one another, in numbers
+nameless    what no effect explains: the nameless model, "a model without names" in answers
+passing     effects that come and go: when they act
+evidence    how likely flights are under effects, and the fit of effects to them
+signals     what is compared, channel by channel, and with what: the study of a vehicle
+loop        the closed loop: what noise, set-points and torques make of the commands
+edges       what flights do at the edges of a platform
+signatures  what is known of each effect, and how strong it seems in nominal flights
+flights     a log made ready: on a regular clock, attitude and heights, moments of contact
 
 `diagnosis` calls them all and fills a `result`; `measurement` is the map alone. A `workspace` keeps what is worked out
 once; `second_process` shares work with another core.

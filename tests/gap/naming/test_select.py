@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming import judging, looks, rounds
+from airtouch.gap.naming import judging, rounds, screening
 from airtouch.gap.naming.forward import MOST_EFFECTS
 from airtouch.gap.naming.selection import Step
 from airtouch.gap.signals.spectra import AIR
@@ -134,7 +134,7 @@ def test_a_look_that_is_thorough_fits_what_promises_nothing():
     for thorough in (False, True):
         best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
         assert best["imu_noise"].full == thorough
-        assert best["imu_noise"].gain < looks.HOPELESS and best["imu_noise"].strength.mean[0] < 0.05
+        assert best["imu_noise"].gain < screening.HOPELESS and best["imu_noise"].strength.mean[0] < 0.05
 
 
 def test_halves_share_no_block_and_leave_none_out():

@@ -16,7 +16,7 @@ from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.effect import Gate
 from airtouch.vehicle import Vehicle
 
-if TYPE_CHECKING:  # later layers, for types only
+if TYPE_CHECKING:  # layers above this one, for types only
     from airtouch.gap.nameless.columns import NamelessFloor
     from airtouch.gap.relations.library import Library
 
