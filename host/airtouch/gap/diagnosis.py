@@ -190,7 +190,7 @@ def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
     """The flights with their spectra. Raises AirTouchError where they are too short for two halves."""
     data = Data(study, flights)
-    if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
+    if any(not sum(chosen.sum() for _, state, chosen in p.pieces if state == AIR) for p in halves(data)):
         raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
                             "5 s in the air without a hole are needed")
     return data

@@ -32,7 +32,7 @@ def layout():
 
 
 def by_hand(layout, value):
-    """value(flight, regime, block, bin, channel) of every value, in the order of loops."""
+    """value(flight, state, block, bin, channel) of every value, in the order of loops."""
     return [value(i, r, block, b, c) for i, r, chosen in layout.pieces for block in np.flatnonzero(chosen)
             for b in range(BINS[r]) for c in range(COUNT) if layout.keep[r][b, c]]
 

@@ -23,7 +23,7 @@ KEPT, KEPT_SAMPLES = 96, 20000
 class Data:
     """Flights with their blocks and the spectra of the gap before any effect is added.
 
-    By flight, and the first two by regime: first (blocks,): first sample of each block; base (blocks, bins, COUNT):
+    By flight, and the first two by state: first (blocks,): first sample of each block; base (blocks, bins, COUNT):
     spectra of the gap, unit/sqrt(Hz); measured_torque (blocks, bins, 3): those in the air of the measured angular
     acceleration; quiet (blocks, 3): blocks in the air and axes in which no set-point stepped; bridging (blocks, bins,
     COUNT): power that lost rows add there.
@@ -62,7 +62,7 @@ class Data:
 
 
 def gap_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap with effects in the model, by flight and regime; commands are the command view's.
+    """Spectra of the gap with effects in the model, by flight and state; commands are the command view's.
 
     Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
     """
@@ -115,7 +115,7 @@ def command_torque(data: Data) -> list[np.ndarray]:
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
-    """Power by flight and regime, as `gap_spectra`, that the gap may have because effects change what is cut of a step.
+    """Power by flight and state, as `gap_spectra`, that the gap may have because effects change what is cut of a step.
 
     None where they change nothing of it.
     """
@@ -152,7 +152,7 @@ def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.n
 
 
 def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
-    """`_replay_spectra` of flight i, by regime."""
+    """`_replay_spectra` of flight i, by state."""
     bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
                                data.workspace.cached("residuals", i, Workspace))
     out = {}

@@ -9,7 +9,7 @@ import numpy as np
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR
 
-Piece = tuple[int, str, np.ndarray]  #: number of a flight, regime, and which of its blocks there (blocks,), bool
+Piece = tuple[int, str, np.ndarray]  #: number of a flight, state, and which of its blocks there (blocks,), bool
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class AirBlocks:
 class Layout:
     """The order of values that count: piece by piece, block by block, bin by bin, channel by channel.
 
-    pieces: blocks of flights; keep[regime] (bins, COUNT): the bins of each channel that count.
+    pieces: blocks of flights; keep[state] (bins, COUNT): the bins of each channel that count.
     """
 
     def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:
@@ -36,16 +36,16 @@ class Layout:
         self.sizes = [int(chosen.sum()) * int(keep[r].sum()) for _, r, chosen in pieces]  #: values of each piece
 
     def gather(self, by_flight: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
-        """Values (n,) that count of spectra (blocks, bins, COUNT), by flight and regime."""
+        """Values (n,) that count of spectra (blocks, bins, COUNT), by flight and state."""
         return _joined((by_flight[i][r].take(places)
                         for (i, r, _), places in zip(self.pieces, self._places, strict=True)), complex)
 
     def per_piece(self, value: Callable[[int, str], float]) -> np.ndarray:
-        """A number (n,) that a flight and a regime have, for each value."""
+        """A number (n,) that a flight and a state have, for each value."""
         return _joined(np.full(size, value(i, r)) for (i, r, _), size in zip(self.pieces, self.sizes, strict=True))
 
     def per_bin(self, table: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The entry (n,) of a table (bins, COUNT) by regime for each value; the same for all blocks."""
+        """The entry (n,) of a table (bins, COUNT) by state for each value; the same for all blocks."""
         return _joined(np.tile(table[r][self.keep[r]], int(chosen.sum())) for _, r, chosen in self.pieces)
 
     def channels(self) -> np.ndarray:
@@ -54,15 +54,15 @@ class Layout:
         return self.per_bin(table).astype(int)
 
     def air_blocks(self, first: Sequence[Mapping[str, np.ndarray]]) -> AirBlocks:
-        """The blocks in the air. first: of every block the first sample, by flight and regime."""
+        """The blocks in the air. first: of every block the first sample, by flight and state."""
         of, begin, flight = [], [], []
-        for i, regime, chosen in self.pieces:
+        for i, state, chosen in self.pieces:
             numbers = np.full(int(chosen.sum()), -1)
-            if regime == AIR:
+            if state == AIR:
                 numbers = len(begin) + np.arange(len(numbers))
                 begin += list(first[i][AIR][chosen])
                 flight += [i] * len(numbers)
-            of.append(np.repeat(numbers, int(self.keep[regime].sum())))
+            of.append(np.repeat(numbers, int(self.keep[state].sum())))
         return AirBlocks(_joined(of, int), np.array(begin, int), np.array(flight, int))
 
     @functools.cached_property

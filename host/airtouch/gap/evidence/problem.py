@@ -15,7 +15,7 @@ from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
 from airtouch.gap.evidence.torque_power import TorquePower, beside_edges
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
-from airtouch.gap.signals.command_view import CommandView
+from airtouch.gap.signals.command_view import CommandElements, view_of
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, short_time_spectra
 from airtouch.gap.signatures.candidates import mean_of, random_of
@@ -31,14 +31,14 @@ FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
 
 @dataclass(frozen=True)
 class BlockSet:
-    """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
+    """Which blocks of which flights: (flight, state, chosen bool array), for fitting or judging."""
 
     pieces: tuple[Piece, ...]
 
     @property
     def key(self) -> Hashable:
         """Equal for two parts of the same blocks."""
-        return tuple((flight, regime, chosen.tobytes()) for flight, regime, chosen in self.pieces)
+        return tuple((flight, state, chosen.tobytes()) for flight, state, chosen in self.pieces)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Problem:
         # the data keeps its problems: no cycle, no garbage to wait for
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.means_only))
-        self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
+        self.commands = view_of(data.study.controller, data.flights, data.first, part.pieces)
         noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
                                     for f, b in zip(data.flights, data.first, strict=True)]).real
         replay = _of_replay(data, self.layout, noise)
@@ -81,7 +81,7 @@ class Problem:
         torque = (replay.channel >= TORQUE.start) & (replay.channel < TORQUE.stop)
         self.torque_power = TorquePower(self.data, self.layout, replay.base, replay.known, torque, noise)
         self.air = self.layout.air_blocks(data.first)
-        values = replay.followed_by(_of_commands(self.commands))
+        values = replay.followed_by(_of_commands(self.commands.elements))
         self.base, self.power, self.known = values.base, values.power, values.known
         self.channel, self.flight = values.channel.astype(int), values.flight.astype(int)
         self.freedom, self.tail = values.freedom, values.tail
@@ -93,7 +93,8 @@ class Problem:
         bands = {r: np.digitize(frequencies(r), BANDS_HZ)[:, None] - 1 for r in (AIR, REST)}
         replay = self.layout.per_bin({r: cell_numbers(view, bands[r], np.arange(COUNT))
                                       for r, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
-        commands = cell_numbers(COMMAND_VIEW, np.digitize(self.commands.frequency, BANDS_HZ), self.commands.channel) \
+        of_commands = self.commands.elements
+        commands = cell_numbers(COMMAND_VIEW, np.digitize(of_commands.frequency, BANDS_HZ), of_commands.channel) \
             if len(self.commands) else np.zeros(0)
         return np.concatenate([replay, commands]).astype(int)
 
@@ -126,7 +127,7 @@ class Problem:
         wide: as in `modelled`.
         """
         power, cost = self.commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.torque_power.added_by(active), power - self.commands.floor]), cost
+        return np.concatenate([self.torque_power.added_by(active), power - self.commands.elements.floor]), cost
 
     def random_power(self, terms: Sequence[Term]) -> np.ndarray:
         """Power (n,) that random effects add."""
@@ -146,7 +147,7 @@ class Problem:
                 for i in range(len(self.data.flights)) for c in range(OFFSETS) if spread[c] > 0.0]
 
     def _offset(self, flight: int, channel: int) -> list[dict[str, np.ndarray]]:
-        """Spectra by flight and regime of 1 in one channel of one flight, in the air."""
+        """Spectra by flight and state of 1 in one channel of one flight, in the air."""
         ones = np.zeros((len(self.data.flights[flight]), COUNT))
         ones[~self.data.flights[flight].on_ground, channel] = 1.0
         return [{r: short_time_spectra(ones, begin, r) if j == flight else np.zeros_like(self.data.base[j][r])
@@ -160,7 +161,7 @@ class Problem:
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:
-    """Bins and channels (bins, COUNT) of the replay view that count, by regime. means_only: `Data.means_only`."""
+    """Bins and channels (bins, COUNT) of the replay view that count, by state. means_only: `Data.means_only`."""
     keep = {r: judged_bins(r) for r in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
@@ -175,15 +176,15 @@ def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
     known = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
                                    for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real
-    freedom = layout.per_piece(lambda _, regime: np.clip(FREEDOM_OF_BLOCK * counts[regime], LEAST_FREEDOM, FREEDOM))
+    freedom = layout.per_piece(lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, FREEDOM))
     return Elements(np.where(known, base, 0.0), np.where(known, power, 1.0), known, layout.channels(),
                     layout.per_piece(lambda flight, _: flight), freedom, tail(freedom))
 
 
-def _of_commands(commands: CommandView) -> Elements:
+def _of_commands(commands: CommandElements) -> Elements:
     """The values of the command view, whose floor has its tails in it."""
-    return Elements(commands.values, commands.floor, np.ones(len(commands), bool), commands.channel, commands.flight,
-                    commands.freedom, commands.freedom)
+    return Elements(commands.values, commands.floor, np.ones(len(commands.values), bool), commands.channel,
+                    commands.flight, commands.freedom, commands.freedom)
 
 
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:

@@ -41,7 +41,7 @@ LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four roto
 
 
 def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
-    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
+    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state."""
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     of_unit = data.workspace.cached("random", unit.active().key,
                                     lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
@@ -54,10 +54,10 @@ def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     return [{r: scale * v for r, v in f.items()} for f in of_unit]
 
 
-def _covered(data: Data, i: int, regime: str, gate: Gate) -> np.ndarray:
+def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
     """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
-    length, first = LENGTH[regime], data.first[i][regime]
+    length, first = LENGTH[state], data.first[i][state]
     weight = np.hanning(length + 1)[:-1] ** 2
     windows = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
     return (windows @ weight / weight.sum())[:, None, None]
@@ -72,7 +72,7 @@ def growth(term: Term, x: float) -> float:
 
 
 def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
-    """PSD (blocks, bins, COUNT) by regime that a random effect of unit strength adds to flight i."""
+    """PSD (blocks, bins, COUNT) by state that a random effect of unit strength adds to flight i."""
     closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
     power_by_regime = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
     response = data.study.response
@@ -82,7 +82,7 @@ def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
 
 
 def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
-    """Power by regime of an effect that is run on the flight's own signals with several seeds.
+    """Power by state of an effect that is run on the flight's own signals with several seeds.
 
     A channel has one shape of the spectrum, at the strength of each block.
     """
@@ -113,7 +113,7 @@ def _over_a_sample() -> np.ndarray:
 
 
 def _no_power(data: Data, i: int) -> dict[str, np.ndarray]:
-    """Zeros (blocks, bins, COUNT) by regime, of flight i."""
+    """Zeros (blocks, bins, COUNT) by state, of flight i."""
     return {r: np.zeros(gap.shape) for r, gap in data.base[i].items()}
 
 
@@ -134,14 +134,14 @@ def _imu_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     return out
 
 
-def _torque_noise(study: Study, regime: str, gyro: np.ndarray) -> np.ndarray:
+def _torque_noise(study: Study, state: str, gyro: np.ndarray) -> np.ndarray:
     """PSD (bins, 3) of the torque from that of the gyro's differences: part of these the commands foretell in the air.
 
     Only as much as the floor holds is seen, and of what the floor holds beyond it the gyro's share of the commands.
     """
-    if regime != AIR or regime not in study.floor.power:
+    if state != AIR or state not in study.floor.power:
         return gyro
-    floor = np.nan_to_num(study.floor.power[regime][:, TORQUE])
+    floor = np.nan_to_num(study.floor.power[state][:, TORQUE])
     beyond = _gyro_share(study) * np.maximum(floor - gyro, 0.0)
     return np.minimum(gyro, floor) + beyond
 
@@ -179,9 +179,9 @@ def _gyro_share(study: Study) -> np.ndarray:
     return share
 
 
-def _difference(regime: str) -> np.ndarray:
+def _difference(state: str) -> np.ndarray:
     """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
-    f = frequencies(regime)
+    f = frequencies(state)
     return difference_power(np.maximum(f, LEAKED * f[1])) / PERIOD_S ** 2
 
 

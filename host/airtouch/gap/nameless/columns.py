@@ -91,7 +91,7 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
 
 
 def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
-    """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
+    """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and state; made once."""
     def make() -> list[list[dict[str, np.ndarray]]]:
         """The spectra, by flight and axis."""
         out = []

@@ -117,9 +117,9 @@ def column(data: Data, problem: Problem, term: Term, i: int) -> np.ndarray:
 
 
 def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
-    """Change of the spectra by flight and regime per scaled parameter i of a term at neutral; made once."""
+    """Change of the spectra by flight and state per scaled parameter i of a term at neutral; made once."""
     def make() -> list[dict[str, np.ndarray]]:
-        """The change over STEP, by flight and regime."""
+        """The change over STEP, by flight and state."""
         low, high = term.bounds()
         x = np.zeros(len(term.free))
         x[i] = STEP if STEP <= high[i] else -STEP

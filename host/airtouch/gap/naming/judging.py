@@ -61,14 +61,14 @@ def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     by_flight = len(data.flights) >= HALVED_BY_FLIGHT
     pieces: tuple[list, list] = ([], [])
-    counts = [(i, regime, len(f[regime])) for i, f in enumerate(data.first) for regime in (AIR, REST)]
-    for i, regime, n in counts:
+    counts = [(i, state, len(f[state])) for i, f in enumerate(data.first) for state in (AIR, REST)]
+    for i, state, n in counts:
         if n and by_flight:
-            pieces[i % 2].append((i, regime, np.ones(n, bool)))
+            pieces[i % 2].append((i, state, np.ones(n, bool)))
         elif n:
             even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
-            pieces[0].append((i, regime, even))
-            pieces[1].append((i, regime, ~even))
+            pieces[0].append((i, state, even))
+            pieces[1].append((i, state, ~even))
     return BlockSet(tuple(pieces[0])), BlockSet(tuple(pieces[1]))
 
 

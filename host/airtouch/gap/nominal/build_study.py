@@ -36,7 +36,7 @@ from airtouch.vehicle import Vehicle
 NO_COMMAND, NO_RATE = 1e12, 1e6
 #: power of the floor without baseline flights over that of the declared sensor noise; chosen
 SENSOR_MARGIN = 2.0
-#: blocks of each regime that the floor without baseline flights is as sure as; chosen
+#: blocks of each state that the floor without baseline flights is as sure as; chosen
 DECLARED_BLOCKS = 8
 
 

@@ -123,9 +123,9 @@ def _at_the_ends(data: Data, air: AirBlocks) -> np.ndarray:
 def _part(whole: BlockSet, acting: np.ndarray) -> BlockSet:
     """The blocks in the air in which an effect acts. acting (b,): whether it does in each."""
     pieces, place = [], 0
-    for flight, regime, chosen in whole.pieces:
-        if regime == AIR:
-            pieces.append((flight, regime, acting[place:place + len(chosen)]))
+    for flight, state, chosen in whole.pieces:
+        if state == AIR:
+            pieces.append((flight, state, acting[place:place + len(chosen)]))
             place += len(chosen)
     return BlockSet(tuple(pieces))
 

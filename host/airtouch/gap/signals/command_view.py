@@ -11,6 +11,7 @@ less the correction's cost; each block is counted half, as half overlapping bloc
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -52,92 +53,33 @@ class CommandElements(NamedTuple):
     freedom: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
 class CommandView:
     """The commands of some flights: values with their floor, and their expected power under a hypothesis.
 
-    flights, spectra, powers: number of each flight that has blocks, their spectra (blocks, bins, AXES), and the squares
-    of these; edges: (flight, its number, edge) of each edge. values, floor, channel, frequency, flight, freedom: what
-    `CommandElements` holds of all of them, first the spectra, flight by flight, then the responses at edges.
+    loop: of nominal flights, against which the commands are held; None without, and then the view has no element.
+    elements: first those of the spectra, flight by flight, then those of the responses at edges; powers: squares of the
+    spectra (blocks, bins, AXES) of each flight that has blocks; edges: each with its flight.
     """
 
-    def __init__(self, loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
-                 pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
-        """The view of the pieces in the air. loop: of nominal flights; without one the view has no element.
-
-        first: of each flight by regime the first samples of the replay's blocks; pieces: number of a flight, regime,
-        and which of these blocks count, bool.
-        """
-        self._loop, self.workspace = loop, Workspace()
-        in_air = [(i, first[i][AIR] + AIR_LENGTH[AIR] // 2, chosen) for i, regime, chosen in pieces
-                  if loop is not None and regime == AIR and chosen.any()]
-        by_flight = [(i, self._chosen_spectra(flights[i], middle, chosen)) for i, middle, chosen in in_air]
-        self.flights, self.spectra = [i for i, s in by_flight if len(s)], [s for _, s in by_flight if len(s)]
-        self.powers = [np.abs(s) ** 2 for s in self.spectra]
-        self.edges = [(flights[i], i, e) for i, middle, chosen in in_air for e in self._chosen_edges(
-            flights[i], middle, chosen)]
-        self.values, self.floor, self.channel, self.frequency, self.flight, self.freedom = _joined([
-            *(self._of_blocks(i, s) for i, s in zip(self.flights, self.spectra, strict=True)),
-            *(self._of_edge(flight, i, e) for flight, i, e in self.edges)])
-
-    def _chosen_spectra(self, flight: Flight, middle: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Spectra (blocks, bins, AXES) of the blocks of commands whose nearest replay block is chosen.
-
-        middle: middle samples of the replay's blocks.
-        """
-        begin, spectra = self.loop.levelled_spectra(flight)
-        if not len(begin):
-            return spectra
-        nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1)
-        return spectra[chosen[nearest]]
-
-    def _chosen_edges(self, flight: Flight, middle: np.ndarray, chosen: np.ndarray) -> list[Edge]:
-        """Edges of a flight whose nearest replay block is chosen; none where nominal flights cross no edge."""
-        if self.loop.edges is None:
-            return []
-        return [e for e in edge_response.edges_of(flight) if chosen[np.argmin(np.abs(middle - e.sample))]]
-
-    def _of_blocks(self, number: int, spectra: np.ndarray) -> CommandElements:
-        """The elements of a flight's blocks (blocks, bins, AXES)."""
-        def each(table: np.ndarray) -> np.ndarray:
-            """The table's entry for each element."""
-            return np.broadcast_to(table, spectra.shape).ravel()
-
-        return CommandElements(
-            values=spectra.ravel(), floor=each(self.loop.floor), channel=each(COMMAND.start + np.arange(len(AXES))),
-            frequency=each(frequencies()[:, None]), flight=np.full(spectra.size, number),
-            freedom=np.full(spectra.size, FREEDOM))
-
-    def _of_edge(self, flight: Flight, number: int, edge: Edge) -> CommandElements:
-        """The elements of a response at an edge, whose power is 1 and which has no frequency."""
-        count = edge_response.COUNT
-        return CommandElements(
-            values=edge_response.whitened(self._edge_floor, flight, edge).astype(complex), floor=np.ones(count),
-            channel=EDGE_CHANNELS, frequency=np.zeros(count), flight=np.full(count, number),
-            freedom=np.full(count, EDGE_FREEDOM))
+    loop: ClosedLoop | None
+    elements: CommandElements
+    powers: Sequence[np.ndarray] = ()
+    edges: Sequence[tuple[Flight, Edge]] = ()
+    workspace: Workspace = field(default_factory=Workspace)
 
     def __len__(self) -> int:
-        return len(self.values)
-
-    @property
-    def loop(self) -> ClosedLoop:
-        """The loop that the commands are held against; only asked for where there are any."""
-        assert self._loop is not None
-        return self._loop
-
-    @property
-    def _edge_floor(self) -> edge_response.EdgeFloor:
-        """The floor of responses at edges; only asked for where there are any."""
-        assert self.loop.edges is not None
-        return self.loop.edges
+        return len(self.elements.values)
 
     def values_without(self, active: Sequence[Active]) -> np.ndarray:
         """Values (elements,) less what effects add to the responses at edges; the spectra stay as they are."""
-        if not self.edges or not any(signature_of(a.effect).at_edges for a in active):
-            return self.values
-        out = self.values.copy()
+        floor = None if self.loop is None else self.loop.edges
+        if floor is None or not self.edges or not any(signature_of(a.effect).at_edges for a in active):
+            return self.elements.values
+        out = self.elements.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT
-        for flight, _, e in self.edges:
-            out[at:at + edge_response.COUNT] -= edge_effects.added_response(self._edge_floor, flight, e, active)
+        for flight, e in self.edges:
+            out[at:at + edge_response.COUNT] -= edge_effects.added_response(floor, flight, e, active)
             at += edge_response.COUNT
         return out
 
@@ -146,24 +88,26 @@ class CommandView:
 
         wide: the floor is as uncertain as random effects make it (`floor_correction.WIDE`).
         """
-        if not self.spectra:
-            return self.floor, 0.0
-        ratio = self.loop.ratio(active)
-        return self.workspace.cached("power", (ratio.tobytes(), wide), lambda: self._expected(ratio, wide), KEPT)
+        loop = self.loop
+        if loop is None or not self.powers:
+            return self.elements.floor, 0.0
+        ratio = loop.ratio(active)
+        return self.workspace.cached("power", (ratio.tobytes(), wide),
+                                     lambda: self._expected(loop.floor, ratio, wide), KEPT)
 
-    def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
-        """`power` where effects multiply that of the commands by a ratio (bins, AXES)."""
+    def _expected(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
+        """`power` where effects multiply the floor of the commands by a ratio, (bins, AXES) each."""
         powers, cost = [], 0.0
         for s in self.powers:
-            correction = correction_of(s, self.loop.floor, ratio, wide)
+            correction = correction_of(s, floor, ratio, wide)
             cost += correction.cost
-            powers.append(np.broadcast_to(self.loop.floor * ratio * np.exp(correction.log_power), s.shape).ravel())
+            powers.append(np.broadcast_to(floor * ratio * np.exp(correction.log_power), s.shape).ravel())
         powers.append(np.ones(len(self.edges) * edge_response.COUNT))
         return np.concatenate(powers), cost
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
         """Rise (bins, AXES) of the logarithm of the expected power between hypotheses; (0, AXES) without spectra."""
-        if not self.spectra:
+        if self.loop is None or not self.powers:
             return np.zeros((0, len(AXES)))
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
@@ -174,32 +118,92 @@ class CommandView:
         """
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
-        if not rise.any():
+        if self.loop is None or not rise.any():
             return gradient, information
-        ratio = self.loop.ratio(active)
+        floor, ratio = self.loop.floor, self.loop.ratio(active)
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
-            up, down = (self._level(ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
+            up, down = (self._level(floor, ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
         for s in self.powers:
-            correction = correction_of(s, self.loop.floor, ratio, wide)
+            correction = correction_of(s, floor, ratio, wide)
             for axis in range(len(AXES)):  # what the shapes can take up tells nothing
                 slope = rise[:, :, axis]
                 cross = correction.weight * slope @ smooth_shapes().T
                 information += correction.weight * slope @ slope.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
-    def _level(self, ratio: np.ndarray, wide: bool) -> float:
+    def _level(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> float:
         """Log likelihood of the spectra, less the costs of the floor's correction.
 
-        ratio (bins, AXES): by which effects multiply the floor.
+        floor, ratio (bins, AXES): power in nominal flights, and by what effects multiply it.
         """
         total = 0.0
         for s in self.powers:
-            correction = correction_of(s, self.loop.floor, ratio, wide)
-            power = self.loop.floor * ratio * np.exp(correction.log_power)
+            correction = correction_of(s, floor, ratio, wide)
+            power = floor * ratio * np.exp(correction.log_power)
             tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
             total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + correction.cost
         return total
+
+
+def view_of(loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
+            pieces: Sequence[tuple[int, str, np.ndarray]]) -> CommandView:
+    """The view of the pieces of flights in the air.
+
+    first: of each flight by state the first samples of the replay's blocks; pieces: number of a flight, state, and
+    which of these blocks count, bool.
+    """
+    if loop is None:
+        return CommandView(None, _joined(()))
+    in_air = [(i, first[i][AIR] + AIR_LENGTH[AIR] // 2, chosen) for i, state, chosen in pieces
+              if state == AIR and chosen.any()]
+    by_flight = [(i, _chosen_spectra(loop, flights[i], middle, chosen)) for i, middle, chosen in in_air]
+    by_flight = [(i, s) for i, s in by_flight if len(s)]
+    elements, edges = [_of_blocks(loop, i, s) for i, s in by_flight], []
+    if loop.edges is not None:
+        for i, middle, chosen in in_air:
+            for e in edge_response.edges_of(flights[i]):
+                if chosen[_nearest(middle, e.sample)]:
+                    elements.append(_of_edge(loop.edges, flights[i], i, e))
+                    edges.append((flights[i], e))
+    return CommandView(loop, _joined(elements), [np.abs(s) ** 2 for _, s in by_flight], edges)
+
+
+def _nearest(middle: np.ndarray, sample: int) -> int:
+    """Number of the replay's block whose middle sample is the nearest."""
+    return int(np.argmin(np.abs(middle - sample)))
+
+
+def _chosen_spectra(loop: ClosedLoop, flight: Flight, middle: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Spectra (blocks, bins, AXES) of the blocks of commands whose nearest replay block is chosen.
+
+    middle: middle samples of the replay's blocks.
+    """
+    begin, spectra = loop.levelled_spectra(flight)
+    if not len(begin):
+        return spectra
+    return spectra[chosen[[_nearest(middle, b + LENGTH // 2) for b in begin]]]
+
+
+def _of_blocks(loop: ClosedLoop, number: int, spectra: np.ndarray) -> CommandElements:
+    """The elements of a flight's blocks (blocks, bins, AXES)."""
+    def each(table: np.ndarray) -> np.ndarray:
+        """The table's entry for each element."""
+        return np.broadcast_to(table, spectra.shape).ravel()
+
+    return CommandElements(
+        values=spectra.ravel(), floor=each(loop.floor), channel=each(COMMAND.start + np.arange(len(AXES))),
+        frequency=each(frequencies()[:, None]), flight=np.full(spectra.size, number),
+        freedom=np.full(spectra.size, FREEDOM))
+
+
+def _of_edge(floor: edge_response.EdgeFloor, flight: Flight, number: int, edge: Edge) -> CommandElements:
+    """The elements of a response at an edge, whose power is 1 and which has no frequency."""
+    count = edge_response.COUNT
+    return CommandElements(
+        values=edge_response.whitened(floor, flight, edge).astype(complex), floor=np.ones(count),
+        channel=EDGE_CHANNELS, frequency=np.zeros(count), flight=np.full(count, number),
+        freedom=np.full(count, EDGE_FREEDOM))
 
 
 def _joined(parts: Sequence[CommandElements]) -> CommandElements:

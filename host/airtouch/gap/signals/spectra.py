@@ -16,6 +16,7 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
 
+#: state of the vehicle throughout a block: in the air, at rest on the ground
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
 OVERLAP_WEIGHT = 0.5  #: of a block in a sum of log likelihoods, as half overlapping blocks hold every sample twice
@@ -35,26 +36,26 @@ LEAST_POWER = 1e-300  #: least power that is divided by or has a logarithm; belo
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 
 
-def starts(flight: Flight, regime: str) -> np.ndarray:
-    """First samples of the blocks of a regime that hold usable samples, at most MOST_LOST of them bridged."""
-    length = LENGTH[regime]
-    good = flight.on_ground if regime == REST else flight.phase != GROUND
+def starts(flight: Flight, state: str) -> np.ndarray:
+    """First samples of the blocks in a state, AIR or REST, of usable samples, at most MOST_LOST of them bridged."""
+    length = LENGTH[state]
+    good = flight.on_ground if state == REST else flight.phase != GROUND
     near = good & (flight.usable | flight.bridged)
     may_begin = (count_within(~near, length) == 0) & (count_within(flight.bridged, length) <= MOST_LOST * length)
     return half_overlapping(may_begin, length)
 
 
-def frequencies(regime: str) -> np.ndarray:
-    """Frequencies (bins,) of a regime's blocks, Hz."""
-    return np.fft.rfftfreq(LENGTH[regime], PERIOD_S)
+def frequencies(state: str) -> np.ndarray:
+    """Frequencies (bins,) of the blocks in a state, Hz."""
+    return np.fft.rfftfreq(LENGTH[state], PERIOD_S)
 
 
-def short_time_spectra(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
+def short_time_spectra(values: np.ndarray, first: np.ndarray, state: str) -> np.ndarray:
     """Spectra (blocks, bins, channels) of values (n, channels) in blocks from samples `first`, unit/sqrt(Hz).
 
     The mean of |.|^2 is the one-sided PSD; a constant x gives x * sqrt(duration / 1.5) in the lowest bin.
     """
-    length = LENGTH[regime]
+    length = LENGTH[state]
     if not len(first):
         return np.zeros((0, length // 2 + 1, values.shape[1]), complex)
     window, scale = hann_window(length)
@@ -73,14 +74,14 @@ def squared(values: np.ndarray) -> np.ndarray:
     return values.real ** 2 + values.imag ** 2
 
 
-def judged_bins(regime: str) -> np.ndarray:
+def judged_bins(state: str) -> np.ndarray:
     """Which bins of each channel count, bool (bins, COUNT): those in its band; on the ground of force and rate alone.
 
     In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
     """
-    f = frequencies(regime)[:, None]
+    f = frequencies(state)[:, None]
     in_band = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
-    if regime == REST:
+    if state == REST:
         force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
         return np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
     in_band[:, COLUMN["rate_z"]] = False
@@ -91,7 +92,7 @@ def judged_bins(regime: str) -> np.ndarray:
 class Floor:
     """Power of the residuals of nominal flights, against which a gap is held.
 
-    power: by regime (bins, COUNT), unit^2/Hz; block_counts: by regime, how many blocks it is measured on; offset
+    power: by state (bins, COUNT), unit^2/Hz; block_counts: by state, how many blocks it is measured on; offset
     (COUNT,): standard deviation between flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,):
     that part of it which the power in the lowest bin does not give; clock_s: rms of the logged times around regular
     ones, s; lost: share of lost samples; slopes: of the power in the air with how hard the vehicle is flown, None for
@@ -107,10 +108,10 @@ class Floor:
     least_power: np.ndarray | float = 0.0
     offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
 
-    def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
+    def level(self, flight: Flight, first: np.ndarray, state: str) -> np.ndarray:
         """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
-        power = self.power[regime]
-        if self.slopes is None or regime != AIR:
+        power = self.power[state]
+        if self.slopes is None or state != AIR:
             return np.broadcast_to(power, (len(first), *power.shape))
         return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least_power)
 
@@ -119,7 +120,7 @@ class Floor:
 class NominalBlocks:
     """A flight declared nominal and its blocks.
 
-    residual (n, COUNT): what the calibrated model leaves of it; first, spectra: by regime the first samples (blocks,)
+    residual (n, COUNT): what the calibrated model leaves of it; first, spectra: by state the first samples (blocks,)
     and the spectra (blocks, bins, COUNT) of the blocks; bridging (blocks, bins, COUNT): power that lost rows add in the
     air.
     """
@@ -186,12 +187,12 @@ def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.n
     return np.sqrt(variance), np.sqrt(np.maximum(variance - chance, 0.0))
 
 
-def sensor_power(sensor_rms: np.ndarray, regime: str) -> np.ndarray:
+def sensor_power(sensor_rms: np.ndarray, state: str) -> np.ndarray:
     """PSD (bins, COUNT) of the sensors' white noise; that of the gyro's differences rises with frequency.
 
     sensor_rms (COUNT,): as for `floor_of`.
     """
-    f = frequencies(regime)
+    f = frequencies(state)
     white = np.broadcast_to(2.0 * PERIOD_S * sensor_rms ** 2, (len(f), COUNT)).copy()
     differences = difference_power(np.maximum(f, LEAKED * f[1]))
     white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (sensor_rms[TORQUE] / PERIOD_S) ** 2
