@@ -129,11 +129,10 @@ def test_no_more_than_so_many_effects_are_named(monkeypatch):
     assert {s.name for s in selection.named} == {"imu_noise", "packet_loss"}, "the two that gain most"
 
 
-def test_a_look_that_is_thorough_fits_what_promises_nothing():
-    data = Data(FLOOR, [hover(7)])
-    for thorough in (False, True):
-        best = rounds.round_of(judging.trial_of(data), candidates_of(["imu_noise", "mass"]), None, thorough=thorough)
-        assert best["imu_noise"].full == thorough
+def test_the_strengths_of_all_effects_need_fits_of_what_promises_nothing():
+    on, candidates = judging.trial_of(Data(FLOOR, [hover(7)])), candidates_of(["imu_noise", "mass"])
+    for full, best in ((False, rounds.round_of(on, candidates, None)), (True, rounds.every_strength(on, candidates))):
+        assert best["imu_noise"].full == full
         assert best["imu_noise"].gain < screening.HOPELESS and best["imu_noise"].strength.mean[0] < 0.05
 
 

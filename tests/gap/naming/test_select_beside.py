@@ -110,10 +110,10 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
     assert step.terms[0].values["factor"] == pytest.approx(2.5, rel=0.35)
 
 
-def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
+def test_every_strength_is_that_of_a_parameter_alone(flying):
     data = Data(flying, fly(1, 62))
     on = judging.trial_of(data)
-    looked = rounds.round_of(on, candidates_of(["controller_gain"]), None, thorough=True)["controller_gain"]
+    looked = rounds.every_strength(on, candidates_of(["controller_gain"]))["controller_gain"]
     together = looked.strength
     _, *variants = all_candidates()["controller_gain"]
     assert together.mean.shape == together.variance.shape == (len(variants),) == (4,)

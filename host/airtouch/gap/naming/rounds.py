@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, PricedVariant, Trial, at_bound, cross_validated
-from airtouch.gap.naming.screening import screen_random, screen_variants, start_of
+from airtouch.gap.naming.screening import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import strength_term
@@ -24,39 +24,56 @@ PROMISING = 0.5 * FIRST_GAIN
 
 
 def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,
-             progress: Callable[[str], None] = lambda _: None, thorough: bool = False,
-             promising: Container[str] = ()) -> dict[str, Candidate]:
+             progress: Callable[[str], None] = lambda _: None, promising: Container[str] = ()) -> dict[str, Candidate]:
     """The best hypothesis of every candidate beside what is chosen, by name, with its evidence.
 
-    candidates: variants by name; progress: called with every name. promising: names that are judged in full whatever
-    screening says. thorough, for the strengths of nominal flights: every variant that is fitted is fitted in full,
-    random effects are fitted however little they promise, and each parameter's strength is that of the variant which
-    frees it alone, since the strength of the best of several variants would be biased upwards.
+    candidates: variants by name; progress: called with every name; promising: names that are judged in full whatever
+    screening says.
     """
     start = start_of(trial, chosen)
-    screened = screen_variants(start, candidates, progress)
-    means = _best_variants(screened.means)
-    unpromising, random = screen_random(start, screened.random, means, thorough)
-    to_fit, not_fitted = _by_promise(means + unpromising, start.gain, promising)
-    means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.choice_cost) for c in to_fit]
-    variants = [*screened.unseen, *random, *means_to_fit]
-    if thorough:
-        variants = [v for v in variants if not _is_tried_alone(v)]
-    fitted = map_on_two_cores(lambda v: _fitted(trial, v, chosen, in_full=thorough), variants)
+    variants, not_fitted = _screened(start, candidates, progress, promising)
+    fitted = map_on_two_cores(lambda v: _fitted(trial, v, chosen), variants)
     best = best_of_each([*fitted, *not_fitted], len(start.terms))
-    if thorough:
-        best = {name: _one_by_one(c, [f for f in fitted if f.name == name]) for name, c in best.items()}
     return _with_evidence(trial.data.study.scatter, best, start.gain)
 
 
-def _fitted(trial: Trial, variant: PricedVariant, chosen: Candidate | None, in_full: bool) -> Candidate:
+def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Candidate]:
+    """The best hypothesis of every candidate alone, by name, for the strength that it seems to have; no evidence.
+
+    Every random effect is fitted, and every fit is one in full. Each parameter's strength is that of the variant which
+    frees it alone, since the strength of the best of several variants would be biased upwards. candidates: variants by
+    name.
+    """
+    variants, not_fitted = _screened(start_of(trial, None), candidates, every_random=True)
+    one_by_one = [v for v in variants if not _is_tried_alone(v)]
+    fitted = map_on_two_cores(lambda v: cross_validated(trial, v, None), one_by_one)
+    best = best_of_each([*fitted, *not_fitted], 0)
+    return {name: _one_by_one(c, [f for f in fitted if f.name == name]) for name, c in best.items()}
+
+
+def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
+              progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
+              every_random: bool = False) -> tuple[list[PricedVariant], list[Candidate]]:
+    """The variants that are worth a fit, and hypotheses of the others.
+
+    candidates, progress, promising: as for `round_of`; every_random: as for `screen_random`.
+    """
+    screened = screen_variants(start, candidates, progress)
+    means = _best_variants(screened.means)
+    unpromising, random = screen_random(start, screened.random, means, every_random)
+    to_fit, not_fitted = _by_promise(means + unpromising, start.gain, promising)
+    means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.choice_cost) for c in to_fit]
+    return [*screened.unseen, *random, *means_to_fit], not_fitted
+
+
+def _fitted(trial: Trial, variant: PricedVariant, chosen: Candidate | None) -> Candidate:
     """A variant fitted beside what is chosen.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
-    where that promises something, or where `in_full`.
+    where that promises something.
     """
     fit = partial(cross_validated, trial, variant, chosen)
-    if in_full or not all(t.signature.loop_only for t in variant.terms):
+    if not all(t.signature.loop_only for t in variant.terms):
         return fit()
     briefly, before = fit(brief=True), chosen.gain if chosen else 0.0
     return fit() if briefly.gain - before > PROMISING else briefly

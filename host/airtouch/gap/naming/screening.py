@@ -139,13 +139,13 @@ def _only_in_commands(trial: Trial, terms: Terms) -> bool:
         and not np.allclose(loop.ratio(one_step_off), 1.0)
 
 
-def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], thorough: bool,
+def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], every_random: bool,
                  ) -> tuple[list[Candidate], list[PricedVariant]]:
     """Variants with a random effect: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    Of a candidate that promises more than HOPELESS nats, or of every one if `thorough`, the variant that gains most in
-    screening is fitted, with the longer ones that begin with the same term. means: mean effects judged to first order,
-    best first; a candidate that is among them says by that how little it promises.
+    Of a candidate that promises more than HOPELESS nats, or of every one if `every_random`, the variant that gains most
+    in screening is fitted, with the longer ones that begin with the same term. means: mean effects judged to first
+    order, best first; a candidate that is among them says by that how little it promises.
     """
     mean_of: dict[str, Candidate] = {}
     for mean in means:
@@ -155,7 +155,7 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
     for name, screened in _screened_random_by_name(start, variants, mean_of).items():
         best = max(screened, key=lambda s: s.gain)
         mean_promises = name in mean_of and mean_of[name].gain - start.gain > HOPELESS
-        if thorough or best.gain > HOPELESS or mean_promises:
+        if every_random or best.gain > HOPELESS or mean_promises:
             to_fit += [best.variant, *_longer(best.variant, variants)]
         elif name not in mean_of:
             unpromising.append(_as_judged(start, best))

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
-from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.rounds import every_strength
 from airtouch.gap.naming.select import nameless_nats
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
@@ -45,7 +45,7 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
 def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     trial = trial_of(data)
-    singles = round_of(trial, all_candidates(without), None, thorough=True)
+    singles = every_strength(trial, all_candidates(without))
     known = {name: candidate for name, candidate in singles.items() if len(candidate.strength.mean)}
     return ApparentStrengths(
         {name: candidate.strength.mean for name, candidate in known.items()},
