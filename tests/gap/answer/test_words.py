@@ -63,6 +63,13 @@ def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
     assert told in words.sentences(diagnosis(cells))[2]
 
 
+@pytest.mark.parametrize(("before", "told"), [(1.01, "at the floor, so there is nothing to close."),
+                                              (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
+def test_none_says_how_large_the_gap_is(before, told):
+    none = diagnosis(verdict="none", effects=())
+    assert words.sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {told}"
+
+
 def test_headline_and_ranking_cannot_disagree():
     first, beside = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
     sentences = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],

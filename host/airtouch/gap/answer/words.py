@@ -67,8 +67,9 @@ def _how_far(diagnosis: Diagnosis) -> str:
     if before is None or after is None:
         return "How far it would close is not known."
     if diagnosis.verdict == "none":
-        size = "at the floor" if short(before) == "1" else f"{short(before)} times the floor"
-        return f"Over all it is {size}, so there is nothing to close."
+        if short(before) == "1":
+            return "Over all it is at the floor, so there is nothing to close."
+        return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
