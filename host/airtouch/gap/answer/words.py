@@ -27,7 +27,7 @@ def _where(diagnosis: Diagnosis) -> str:
     """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
     cell = diagnosis.headline
     if cell is None:
-        return "Nowhere does the gap stand out of its floor."
+        return "In no cell of the map does the gap stand out of its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
@@ -52,7 +52,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if cell is not None and cell.after is not None and not summary.closes(cell):
         sentence = f"The effect named, {first} (probability {chance}), does not close this cell"
         return sentence + (f", nor does {joined(others)} beside it." if others else ".")
-    return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
+    begin = "Its cause" if cell is not None else "The effect named, from all cells together,"
+    return f"{begin} is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
 
 
 def _named(effect: NamedEffect) -> str:
