@@ -19,7 +19,7 @@ class Chosen:
     named: list
     chosen: SimpleNamespace
     singles: dict
-    least: dict
+    least_gain: dict
     parts: tuple = field(default=())
 
 
