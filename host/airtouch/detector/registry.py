@@ -54,7 +54,7 @@ class InFloat(Detector, Protocol):
     """A detector whose network also runs in float, as trained."""
 
     def run_float(self, log: FlightLog, model: Any = None) -> Trace:
-        """As `run`."""
+        """As `run`, by the float network, before quantisation."""
 
 
 @runtime_checkable

@@ -60,8 +60,9 @@ def model_for(model: BestModel | None, log: FlightLog) -> BestModel:
     return (model or load(None)).serving(sensors.missing_sensors(log))
 
 
-def run_float(log: FlightLog, model: BestModel) -> Trace:
+def run_float(log: FlightLog, model: BestModel | None = None) -> Trace:
     """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
+    model = model_for(model, log)
     x, airborne = channels_of(log, model.recipe.motion)
     steps = float_logits(model.weights, model.recipe.graph, x)
     edge = np.zeros(len(log), dtype=np.uint8)

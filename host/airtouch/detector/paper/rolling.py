@@ -33,9 +33,9 @@ def run(log: FlightLog, model: Model | None = None) -> Trace:
     return paper.run(log, model or load(None))
 
 
-def run_float(log: FlightLog, model: Model) -> Trace:
+def run_float(log: FlightLog, model: Model | None = None) -> Trace:
     """As `run`, with the float network as trained, over windows: what quantisation is measured against."""
-    return paper.run_float(log, model)
+    return paper.run_float(log, model or load(None))
 
 
 def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, stride: int = STRIDE,
