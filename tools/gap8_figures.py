@@ -10,7 +10,6 @@ import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -116,9 +115,9 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
     cache = out / f"float_{Path(folds[0]['model']).stem}.json"
     if not cache.exists():
         tell("the same models in float")
-        view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+        float_detector = registry.InFloatOnly(detector)
         readable, _ = crossval.readable_flights(files)
-        exact = [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+        exact = [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
                  for f in files if f.path in readable]
         write_bytes(json.dumps([score.as_dict() for score in exact]).encode(), cache, force=True)
     exact = [FlightScore.from_dict(entry) for entry in json.loads(cache.read_text())]

@@ -41,7 +41,7 @@ def flight_shown(name="a<b>.csv", detections=DETECTIONS):
     signals["band_power"][:200] = np.nan
     trace = Trace(np.r_[np.full(300, np.nan), rng.uniform(size=N - 300)], list(detections), signals)
     condition = Condition(height="low", angle_deg=0.0, wind="none", speed_mps=0.2)
-    score = score_flight(name, condition, EDGES, np.ones(N, bool), trace.probability, trace.edges)
+    score = score_flight(name, condition, EDGES, np.ones(N, bool), trace)
     return ShownFlight(log, trace, EDGES, score, {"baseline": Trace(np.full(N, np.nan), [Detection(90, "edge")])})
 
 

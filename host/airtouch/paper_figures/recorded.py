@@ -4,8 +4,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from airtouch.detector import ablation
 from airtouch.detector.best import free_air
-from airtouch.detector.evaluation import ablation, crossval
+from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset, folds
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, get

@@ -3,14 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from airtouch.detector.evaluation import crossval, evaluate, summary
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper.variants import Variant
-from airtouch.detector.registry import Detector, InFloat, get
+from airtouch.detector.registry import Detector, InFloat, InFloatOnly, get
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES
 
@@ -104,7 +103,7 @@ def in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict],
     if not isinstance(detector, InFloat):
         raise AirTouchError("this detector's network does not run in float")
     models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
-    view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+    float_detector = InFloatOnly(detector)
     readable, _ = crossval.readable_flights(files)
-    return [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+    return [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
             for f in files if f.path in readable]
