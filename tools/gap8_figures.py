@@ -110,9 +110,9 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
         """Print a line about the row to standard error."""
         click.echo(f"{row.name}: {line}", err=True)
 
-    scores, folds, _ = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
-    models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
-    cache = out / f"float_{Path(folds[0]['model']).stem}.json"
+    validation = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
+    models = {fold.fold: detector.load(out / fold.model) for fold in validation.folds}
+    cache = out / f"float_{Path(validation.folds[0].model).stem}.json"
     if not cache.exists():
         tell("the same models in float")
         float_detector = registry.InFloatOnly(detector)
@@ -121,8 +121,8 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
                  for f in files if f.path in readable]
         write_bytes(json.dumps([score.as_dict() for score in exact]).encode(), cache, force=True)
     exact = [FlightScore.from_dict(entry) for entry in json.loads(cache.read_text())]
-    return {"int8": summary.summarise(scores), "float": summary.summarise(exact),
-            "more_m": more_error(scores, exact)}, models[min(models)]
+    return {"int8": summary.summarise(validation.scores), "float": summary.summarise(exact),
+            "more_m": more_error(validation.scores, exact)}, models[min(models)]
 
 
 def more_error(scores: list[FlightScore], exact: list[FlightScore]) -> tuple[float, float, float, int]:
