@@ -111,7 +111,7 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
         click.echo(f"{row.name}: {line}", err=True)
 
     validation = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
-    models = {fold.fold: detector.load(out / fold.model) for fold in validation.folds}
+    models: dict[Any, Any] = {fold.fold: detector.load(out / fold.model) for fold in validation.folds}
     cache = out / f"float_{Path(validation.folds[0].model).stem}.json"
     if not cache.exists():
         tell("the same models in float")

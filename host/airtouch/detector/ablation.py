@@ -103,7 +103,7 @@ def in_float(detector: Detector, files: Sequence[FlightFile], folds: Sequence[Fo
     """Scores of the same folds and models, with the float network as trained; files are the flights of these folds."""
     if not isinstance(detector, InFloat):
         raise AirTouchError("this detector's network does not run in float")
-    models = {fold.fold: detector.load(out / fold.model) for fold in folds}
+    models: dict[int | str | None, Any] = {fold.fold: detector.load(out / fold.model) for fold in folds}
     float_detector = InFloatOnly(detector)
     readable, _ = crossval.readable_flights(files)
     return [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
