@@ -39,6 +39,12 @@ def test_a_cell_that_the_effect_closes_is_not_called_most_of_the_gap_where_anoth
     assert sentences[0].startswith(begin) and sentences[1].startswith("Its cause is ground effect")
 
 
+def test_an_effect_without_a_cell_of_its_own_is_no_cause_of_one():
+    where, which, _ = words.sentences(diagnosis([cell("force_z", "hover", 0.05)]))
+    assert where == "In no cell of the map does the gap stand out of its floor."
+    assert which.startswith("The effect named, from all cells together, is imu bias")
+
+
 def test_rotors_are_told_apart():
     weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
@@ -61,6 +67,13 @@ def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
              cell("force_y", "hover", 0.5, after=0.45)]
     told = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
     assert told in words.sentences(diagnosis(cells))[2]
+
+
+@pytest.mark.parametrize(("before", "told"), [(1.01, "at the floor, so there is nothing to close."),
+                                              (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
+def test_none_says_how_large_the_gap_is(before, told):
+    none = diagnosis(verdict="none", effects=())
+    assert words.sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {told}"
 
 
 def test_headline_and_ranking_cannot_disagree():

@@ -24,7 +24,7 @@ def steps(answer: Diagnosis, flights: Sequence[Flight]) -> tuple[NextStep, ...]:
     if answer.verdict == "unknown":
         next_steps += _for_an_open_gap(answer.headline, answer.vehicle)
     if answer.verdict == "effect":
-        named = " and ".join(e.name for e in answer.effects)
+        named = " and ".join(dict.fromkeys(e.name for e in answer.effects))
         next_steps.append(NextStep(
             f"Switch on {named} with these parameters in the simulator, and fly it again.",
             switched_on(answer.effects, answer.vehicle)))

@@ -27,7 +27,7 @@ def _where(diagnosis: Diagnosis) -> str:
     """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
     cell = diagnosis.headline
     if cell is None:
-        return "Nowhere does the gap stand out of its floor."
+        return "In no cell of the map does the gap stand out of its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
@@ -52,7 +52,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if cell is not None and cell.after is not None and not summary.closes(cell):
         sentence = f"The effect named, {first} (probability {chance}), does not close this cell"
         return sentence + (f", nor does {joined(others)} beside it." if others else ".")
-    return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
+    begin = "Its cause" if cell is not None else "The effect named, from all cells together,"
+    return f"{begin} is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
 
 
 def _named(effect: NamedEffect) -> str:
@@ -67,8 +68,9 @@ def _how_far(diagnosis: Diagnosis) -> str:
     if before is None or after is None:
         return "How far it would close is not known."
     if diagnosis.verdict == "none":
-        size = "at the floor" if short(before) == "1" else f"{short(before)} times the floor"
-        return f"Over all it is {size}, so there is nothing to close."
+        if short(before) == "1":
+            return "Over all it is at the floor, so there is nothing to close."
+        return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"

@@ -17,7 +17,7 @@ from airtouch.logs.segments import PLATFORM_STEP_M
 LEAST_AIR_S = 3.0  #: seconds in the air that a flight needs to be diagnosed; chosen
 LARGEST = 1e5  #: magnitude above which a value is none, in any column's unit; chosen, beyond what any sensor says
 PWM_RANGE = (-1.0, 66000.0)  #: of a motor command, which has 16 bits: 0 to 65535; its margins are chosen
-READ = frozenset({*ACC, *GYRO, "vbat_V"})  #: channels whose standing still is told; a motor may stand at its limit
+IMU = frozenset({*ACC, *GYRO})  #: channels whose standing still is told; a motor may stand at its limit
 LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the column is left out; chosen
 
 
@@ -45,14 +45,14 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
 
 
 def _stuck_shares(log: FlightLog) -> dict[str, float]:
-    """Share of the samples in the air in which a channel that the diagnosis reads is stuck, for those that are."""
+    """Share of the samples in the air in which a channel of the IMU is stuck, for those that are."""
     try:
         flying = airborne(log)
     except AirTouchError:  # no motors, no height
         return {}
     out: dict[str, float] = {}
     for channel, start, stop in stuck_intervals(log, flying):
-        if channel in READ:
+        if channel in IMU:
             out[channel] = out.get(channel, 0.0) + float(flying[start:stop].sum() / max(flying.sum(), 1))
     return out
 
