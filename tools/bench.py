@@ -18,7 +18,7 @@ from airtouch import kernels, logs
 from airtouch.cli.shared.flights import find_flights
 from airtouch.detector import best, paper
 from airtouch.detector.best.batches import channels_of
-from airtouch.detector.best.recipe import CHANNELS, STRIDE
+from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.paper.features import flight_features
 from airtouch.detector.shared.channels import nine_channels
@@ -109,7 +109,7 @@ def bench_inference(table: Table, flights: list[FlightLog]) -> None:
     length = stream.recipe.receptive_samples
     ends = np.linspace(length, len(quantised), 40).astype(int)
     cut = np.stack([quantised[e - length:e] for e in ends]).reshape(-1, 1, length, CHANNELS)
-    rows = -(-len(quantised) // STRIDE)
+    rows = -(-len(quantised) // ROW_STRIDE)
     row_of_peers(table, "best network, a step", lambda: kernels.run_stream(stream.int8, quantised), stream.tflite, cut,
                  rows)
 

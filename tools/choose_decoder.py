@@ -18,12 +18,12 @@ from airtouch import kernels, logs
 from airtouch.cli.shared import scores as show_scores
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
-from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.shared import sensors
-from airtouch.detector.trace import Detection
+from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
@@ -65,7 +65,7 @@ def outcomes(flights: list[HeldOutFlight], config: DecoderConfig) -> list[tuple[
     """For each flight the delays of the detected edges, s, and the number of false detections."""
     out = []
     for flight in flights:
-        at = np.flatnonzero(kernels.edge_decoder(flight.logits, flight.airborne, config)) * STRIDE
+        at = np.flatnonzero(kernels.edge_decoder(flight.logits, flight.airborne, config)) * ROW_STRIDE
         pairs = match(flight.edges, list(at), TOLERANCE_S / SAMPLE_PERIOD_S)
         delays = np.array([(at[j] - flight.edges[i]) * SAMPLE_PERIOD_S for i, j in pairs])
         out.append((delays, len(at) - len(pairs)))
@@ -75,9 +75,9 @@ def outcomes(flights: list[HeldOutFlight], config: DecoderConfig) -> list[tuple[
 def score(flight: HeldOutFlight, config: DecoderConfig, lag: float) -> FlightScore:
     """The flight's score, as `airtouch evaluate` has it, with these settings and this lag."""
     edges = kernels.edge_decoder(flight.logits, flight.airborne, config)
-    detections = [Detection(int(i) * STRIDE, best.KINDS[int(edges[i])]) for i in np.flatnonzero(edges)]
-    return score_flight(flight.file.path.name, flight.file.condition, flight.true, flight.flying, flight.over,
-                        detections, lag)
+    detections = [Detection(int(i) * ROW_STRIDE, best.KINDS[int(edges[i])]) for i in np.flatnonzero(edges)]
+    return score_flight(flight.file.path.name, flight.file.condition, flight.true, flight.flying,
+                        Trace(flight.over, detections), lag)
 
 
 def figures(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:

@@ -27,7 +27,7 @@ from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.logs.files import write_bytes
 from airtouch.report.figures import error_distribution, flight
-from airtouch.report.map_figure import edge_map as draw_map
+from airtouch.report.map_figure import draw_edge_map
 
 COLOURS = 96  #: of a picture's palette, so that it is a third of its size
 #: names of Chromium's programs
@@ -75,7 +75,7 @@ def zig_zag_map() -> bytes:
     edges = best.run(log, model).edges
     edge_points = edge_map.edge_map(log, edges, lag_s=best.lag_s(model),
                              sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
-    return draw_map(edge_points, f"zig-zag: {len(edge_points.points)} edges felt")
+    return draw_edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges felt")
 
 
 def virtual_errors(count: int = 20) -> bytes:

@@ -10,7 +10,6 @@ import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -111,19 +110,19 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
         """Print a line about the row to standard error."""
         click.echo(f"{row.name}: {line}", err=True)
 
-    scores, folds, _ = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
-    models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
-    cache = out / f"float_{Path(folds[0]['model']).stem}.json"
+    validation = crossval.crossval(row.detector, files, out, crossval.Settings(options=row.options), tell=tell)
+    models: dict[Any, Any] = {fold.fold: detector.load(out / fold.model) for fold in validation.folds}
+    cache = out / f"float_{Path(validation.folds[0].model).stem}.json"
     if not cache.exists():
         tell("the same models in float")
-        view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+        float_detector = registry.InFloatOnly(detector)
         readable, _ = crossval.readable_flights(files)
-        exact = [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+        exact = [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
                  for f in files if f.path in readable]
         write_bytes(json.dumps([score.as_dict() for score in exact]).encode(), cache, force=True)
     exact = [FlightScore.from_dict(entry) for entry in json.loads(cache.read_text())]
-    return {"int8": summary.summarise(scores), "float": summary.summarise(exact),
-            "more_m": more_error(scores, exact)}, models[min(models)]
+    return {"int8": summary.summarise(validation.scores), "float": summary.summarise(exact),
+            "more_m": more_error(validation.scores, exact)}, models[min(models)]
 
 
 def more_error(scores: list[FlightScore], exact: list[FlightScore]) -> tuple[float, float, float, int]:

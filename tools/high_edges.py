@@ -24,7 +24,7 @@ from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
-from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.shared import training_set
 from airtouch.errors import AirTouchError, in_one_line
@@ -52,7 +52,7 @@ Groups = dict[str, list[tuple[FlightLog, Course]]]  #: class of height -> its fl
 
 def over(model: BestModel, values: np.ndarray, path: Course) -> float:
     """Median "over" logit over the platform. values: (n, 12) channels."""
-    steps = slice((path.entry + SETTLED.start) // STRIDE, (path.exit + SETTLED.stop) // STRIDE)
+    steps = slice((path.entry + SETTLED.start) // ROW_STRIDE, (path.exit + SETTLED.stop) // ROW_STRIDE)
     return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
 
 

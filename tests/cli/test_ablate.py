@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from airtouch.cli.learning.ablate import command
 from airtouch.detector import best
-from airtouch.detector.evaluation.ablation import ABLATIONS
+from airtouch.detector.ablation import ABLATIONS
 from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels
 from made_flight import SMALL
 

@@ -31,12 +31,12 @@ def test_every_flight_is_scored_by_a_model_that_never_saw_it(generated, tmp_path
 
     monkeypatch.setattr(baseline, "fit", spy_fit)
     monkeypatch.setattr(crossval.evaluate, "evaluate_flight", spy_evaluate)
-    scores, folds, left_out = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
-    assert len(scores) == 4 and len(folds) == 2 and not left_out
+    first = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
+    assert len(first.scores) == 4 and len(first.folds) == 2 and not first.left_out
     assert len(scored) == 4 and all(name not in trained[fold] for name, fold in scored)
-    repeat, _, _ = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
+    repeat = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
     assert len(trained) == 2, "finished folds are not done again"
-    assert [s.as_dict() for s in repeat] == [s.as_dict() for s in scores]
+    assert [s.as_dict() for s in repeat.scores] == [s.as_dict() for s in first.scores] and repeat.folds == first.folds
 
 
 def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(generated, tmp_path):
@@ -55,8 +55,7 @@ def test_a_damaged_cache_is_done_again(generated, tmp_path):
     crossval.crossval("baseline", files, tmp_path)
     for cache in tmp_path.glob("*.json"):
         cache.write_text(cache.read_text()[:100])
-    scores, _, _ = crossval.crossval("baseline", files, tmp_path)
-    assert len(scores) == 4
+    assert len(crossval.crossval("baseline", files, tmp_path).scores) == 4
 
 
 def test_the_cache_changes_with_the_conditions(generated, tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
+from airtouch.detector.evaluation.crossval import Fold
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.paper_figures import recorded, simulated
@@ -47,8 +48,8 @@ def verdict(figure, claim):
 
 
 def folds(**parameters):
-    return [{"fold": 0, "seconds": 60.0, "parameters": {"converged_after_epochs": 3, "parameter_bytes": 11088,
-                                                        "epochs_run": 9, **parameters}}]
+    trained = {"converged_after_epochs": 3, "parameter_bytes": 11088, "epochs_run": 9, **parameters}
+    return [Fold(0, "paper_fold0.npz", 0.3, trained, 60.0)]
 
 
 @pytest.mark.parametrize(("paper_m", "missed", "answer"), [(0.028, 0.0, REPRODUCED), (0.028, 0.5, NOT_REPRODUCED),

@@ -5,7 +5,8 @@ trace       what a detector returns for a flight
 paper       the paper's pipeline: band powers, fusion, int8 network, physical filter (sections 4 and 5)
 best        this project's detector: twelve motion channels, a causal int8 network that runs on a stream of samples
 baseline    the comparison of the paper without a network
-evaluation  flights with conditions, folds, scores with intervals, cross-validation, ablations, maps
+evaluation  flights with conditions, folds, scores with intervals, cross-validation, maps; finds detectors by name
+ablation    what each part of `paper` and `best` is worth
 shared      what both networks use: channels, sensors, pruning, TensorFlow, model files, C sources
 
 A stream is the samples of a flight as they come, one every 10 ms. A streaming network takes one sample at a time and

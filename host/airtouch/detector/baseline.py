@@ -20,6 +20,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S, Parameters
 
+QUANTILES = (0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)  #: of |slope| that `fit` tries as thresholds; chosen
+
 
 @dataclass(frozen=True)
 class Baseline:
@@ -53,17 +55,23 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, **_: Any) -> Baseline:
     truth = [logs.true_edges(log) for log in flights]
     correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]
     slopes = {s: [derivative(c, s) for c in correlations] for s in (25, 50, 100)}
-    candidates = [
-        Baseline(smoothing=smoothing, threshold=float(np.quantile(np.abs(np.concatenate(finite)), q)))
-        for smoothing, finite in ((s, [np.nan_to_num(x) for x in xs]) for s, xs in slopes.items())
-        for q in (0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)
-    ]
+    candidates = [Baseline(smoothing=smoothing, threshold=threshold)
+                  for smoothing, of_flights in slopes.items() for threshold in thresholds_of(of_flights)]
 
     def detect(settings: Baseline, i: int) -> list[Detection]:
         return [Detection(int(s), "edge") for s in extrema(slopes[settings.smoothing][i], settings.threshold)]
 
     chosen, lag_s, _score = tuning.choose(candidates, truth, detect)
     return replace(chosen, lag_s=lag_s)
+
+
+def thresholds_of(slopes: Sequence[np.ndarray]) -> list[float]:
+    """Thresholds to try: quantiles of the slopes' absolute values over all flights.
+
+    A slope that is not known yet (NaN) counts as 0, as it can pass no threshold.
+    """
+    sizes = np.abs(np.concatenate([np.nan_to_num(slope) for slope in slopes]))
+    return [float(np.quantile(sizes, q)) for q in QUANTILES]
 
 
 def load(path: Path | None) -> Baseline:

@@ -2,6 +2,7 @@
 
 import importlib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -27,6 +28,7 @@ class Detector(Protocol):
     def run(self, log: FlightLog, model: Any = None) -> Trace:
         """Edges of one flight at 100 Hz; None is the shipped model. AirTouchError for what it cannot use."""
 
+    # a property that is callable, for each detector's `fit` has options of its own, which no one signature covers
     @property
     def fit(self) -> Callable[..., Any]:
         """fit(flights, seed=0, **options): a model from training flights, deterministic per seed."""
@@ -54,7 +56,7 @@ class InFloat(Detector, Protocol):
     """A detector whose network also runs in float, as trained."""
 
     def run_float(self, log: FlightLog, model: Any = None) -> Trace:
-        """As `run`."""
+        """As `run`, by the float network, before quantisation."""
 
 
 @runtime_checkable
@@ -63,6 +65,34 @@ class Choosing(Detector, Protocol):
 
     def model_for(self, model: Any, log: FlightLog) -> Any:
         """The model that serves this log."""
+
+
+@dataclass(frozen=True)
+class InFloatOnly:
+    """A detector whose `run` is another one's `run_float`; all else is the other's."""
+
+    detector: InFloat
+
+    def run(self, log: FlightLog, model: Any = None) -> Trace:
+        """`run_float` of the detector."""
+        return self.detector.run_float(log, model)
+
+    @property
+    def fit(self) -> Callable[..., Any]:
+        """`fit` of the detector."""
+        return self.detector.fit
+
+    def load(self, path: Path | None) -> Any:
+        """`load` of the detector."""
+        return self.detector.load(path)
+
+    def lag_s(self, model: Any) -> float:
+        """`lag_s` of the detector."""
+        return self.detector.lag_s(model)
+
+    def parameters(self, model: Any) -> dict[str, Any]:
+        """`parameters` of the detector."""
+        return self.detector.parameters(model)
 
 
 def model_for(detector: Detector, model: Any, log: FlightLog) -> Any:

@@ -49,6 +49,11 @@ class Measurement:
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
 
+    @property
+    def headline(self) -> Cell | None:
+        """The cell that the answer speaks of, the first of `where`; None where no cell stands out."""
+        return self.where[0] if self.where else None
+
     def plain(self) -> dict[str, Any]:
         """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
         return rounded({

@@ -63,6 +63,21 @@ class Control:
 
 
 @dataclass(frozen=True)
+class HowFar:
+    """How far the gap closes with one model: before and after in units of the floor, and the share of it that goes.
+
+    own_start: whether the vehicle is not the calibrated one, so that model, floor and the gap before are others.
+    """
+
+    model: str
+    before: float
+    after: float
+    share: Quantity | None
+    floor: float | None = None
+    own_start: bool = False
+
+
+@dataclass(frozen=True)
 class NamedEffect:
     """An effect that the diagnosis names, with its fitted parameters.
 
@@ -213,6 +228,23 @@ class Diagnosis:
         answer = (named or ["effect"])[0] if self.verdict == "effect" else self.verdict
         if self.ranking and (answer != self.ranking[0].name or bool(named) != (self.verdict == "effect")):
             raise ValueError(f"the ranking begins with {self.ranking[0].name}, the verdict is {self.verdict} {named}")
+
+    @property
+    def how_far(self) -> tuple[HowFar, ...]:
+        """How far the gap closes: with the named effects, with a wrong one, and without the vehicle's calibration.
+
+        An arm whose share is that of the answer is the answer, and not told again.
+        """
+        named = ", ".join(e.name for e in self.effects)
+        rows = []
+        if self.gap:
+            rows.append(HowFar(named, self.gap["before"], self.gap["after"], self.shrink, self.gap.get("floor")))
+        if self.control is not None:
+            wrong = self.control.shrink
+            rows.append(HowFar(f"wrong effect: {self.control.name}", wrong.before, wrong.after, wrong.share))
+        rows += [HowFar(f"{named}, vehicle as {name}", arm.before, arm.after, arm.share, own_start=True)
+                 for name, arm in self.arms.items() if arm.share != self.shrink]
+        return tuple(rows)
 
     @property
     def advice(self) -> str:

@@ -4,8 +4,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from airtouch.detector import ablation
 from airtouch.detector.best import free_air
-from airtouch.detector.evaluation import ablation, crossval
+from airtouch.detector.evaluation import crossval
+from airtouch.detector.evaluation.crossval import Fold
 from airtouch.detector.evaluation.data import dataset, folds
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, get
@@ -33,8 +35,8 @@ def files(job: Job) -> list[dataset.FlightFile]:
 
 
 @cache
-def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]]:
-    """Scores, one for each flight, and entries, one for each fold, of a detector by cross-validation over flights.
+def scores(job: Job, name: str) -> tuple[list[FlightScore], list[Fold]]:
+    """Scores, one for each flight, and the folds, of a detector by cross-validation over flights.
 
     Results are cached while the program runs, because several figures show the same scores.
     """
@@ -45,29 +47,29 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
     if job.quick:
         held_out = {QUICK_FOLD: held_out[QUICK_FOLD]} if QUICK_FOLD in held_out else dict(list(held_out.items())[:1])
     settings = crossval.Settings(options=options, free_air=air)
-    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", settings, folds=held_out,
+    result = crossval.crossval(name, flights, job.work / "folds", settings, folds=held_out,
                                            tell=lambda line: job.tell(f"{name}, {line}"))
-    return result, entries
+    return result.scores, result.folds
 
 
 def variant_scores(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
-           ) -> tuple[list[FlightScore], list[dict[str, Any]]]:
+           ) -> tuple[list[FlightScore], list[Fold]]:
     """As `scores`, of a variant of a detector, over ABLATION_FOLDS (in a quick run over QUICK_FOLD)."""
     flights = files(job)
     by_fold = folds.by_fold(flights)
     numbers = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
     held_out = {k: by_fold[k] for k in numbers if k in by_fold} or dict(list(by_fold.items())[:1])
     label = name if detector is None else f"variant-{name}"
-    result, entries, _ = crossval.crossval(label, flights, job.work / "folds", crossval.Settings(options=options),
+    result = crossval.crossval(label, flights, job.work / "folds", crossval.Settings(options=options),
                                            folds=held_out, detector=detector,
                                            tell=lambda line: job.tell(f"{name}, {line}"))
-    return result, entries
+    return result.scores, result.folds
 
 
-def in_float(job: Job, name: str, entries: list[dict[str, Any]]) -> list[FlightScore]:
+def in_float(job: Job, name: str, held_out: list[Fold]) -> list[FlightScore]:
     """Scores of the float networks of a variant, on the folds and with the models of `variant_scores`."""
-    numbers = {entry["fold"] for entry in entries}
-    return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in numbers], entries,
+    numbers = {fold.fold for fold in held_out}
+    return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in numbers], held_out,
                              job.work / "folds")
 
 

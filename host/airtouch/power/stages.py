@@ -8,7 +8,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.errors import AirTouchError
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.power.ina219 import Power, added_power
@@ -107,8 +107,8 @@ def estimate(budget: dict, gap8: dict) -> dict[str, Estimate]:
     sums = {stage: sum(instructions(budget, k) for k in kernels) for stage, kernels in KERNELS.items()}
     result = {stage: Estimate(*stm32_mw(count), count) for stage, count in sums.items()}
     result |= {f"network, {name} on the GAP8": gap8_mw(network) for name, network in gap8.items()}
-    # the network and its decoder run on every STRIDE-th sample, and the budget counts those
-    count = sum(instructions(budget, k) for k in ("stream_int8", "edge_decoder")) / STRIDE
+    # the network and its decoder run on every ROW_STRIDE-th sample, and the budget counts those
+    count = sum(instructions(budget, k) for k in ("stream_int8", "edge_decoder")) / ROW_STRIDE
     count += instructions(budget, "motion_channels")
     result["network, best on the STM32 instead"] = Estimate(*stm32_mw(count), count)
     return result

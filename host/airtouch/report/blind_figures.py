@@ -1,54 +1,72 @@
 """The result of a blind check: its figures beside the goals, and a picture."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from airtouch.gap.sealed.score import GOALS, SEVERITIES
 from airtouch.report.style import BLUE, GREY, png, style
 
 Rows = list[tuple[str, str, str, str]]  #: of a table of four columns, as text
+APART = "where the data tell the effects apart"
 
 
-def rows(score: Mapping[str, Any]) -> Rows:
-    """Rows (figure, value with 95 % interval, n, goal) of a blind check's score, for the terminal and the docs."""
+def score_rows(score: Mapping[str, Any]) -> Rows:
+    """Rows (figure, value with 95 % interval, n, goal) of a blind check's score, for the terminal and the docs.
+
+    A figure without a value has no row; an AUROC without one has, so that the row after it is not read as its own.
+    """
     out: Rows = []
-
-    def add(name: str, figure: Mapping[str, Any] | None, goal: str = "") -> None:
-        """Add the row of a figure that the score has: its value, with `low` and `high` where it has an interval."""
-        if figure is None or figure.get("value") is None:
-            return
-        text = f"{figure['value']:.3f}"
-        if "low" in figure:
-            text = f"{figure['value']:.1%} ({figure['low']:.1%} to {figure['high']:.1%})"
-        out.append((name, text, str(figure.get("n", "")), goal))
-
-    add("top-1, single effects", score["top_1"], "at least 95 %")
-    add("top-3, single effects", score["top_3"])
-    for level, goal in (("weakest", "at least 80 %"), ("2x", ""), ("4x", "")):
-        of_level = score["by_severity"].get(level, {})
-        add(f"top-1, {level} severity", of_level.get("top_1"), goal)
-        add(f"test for the true effect at its true strength, {level} severity", of_level.get("ideal"))
-    add("exact set, single effects", score["exact"])
-    add("false alarms, no effect", score["false_alarms"], "at most 2 %")
-    add("pairs: exact set", score["pairs_exact"], "at least 80 %")
-    add("pairs: one right", score["pairs_one_right"], "at least 97 %")
-    for group, of_group in score["unknown"].items():
-        goal_of_auroc, goal_of_names = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
-        for key, condition in (("auroc", ""), ("auroc_told_apart", ", where the data tell the effects apart")):
-            auroc = of_group.get(key)
-            out.append((f"effect left out, {group}: AUROC of unknown{condition}",
-                        "" if auroc is None else f"{auroc:.3f}", str(of_group["wrong_name"]["n"]), goal_of_auroc))
-        add(f"effect left out, {group}: given a wrong name", of_group["wrong_name"])
-        add(f"effect left out, {group}: the same where the data tell the two apart",
-            of_group.get("wrong_name_told_apart"), goal_of_names)
-    add("shrink with the right effect", score["shrink"]["right"], "at least 90 %")
-    add("shrink with a wrong effect", score["shrink"]["wrong"], "at most 20 %")
-    add("parameters: median relative error", score["parameters"]["error"], "at most 10 %")
-    add("parameters: in the 90 % interval", score["parameters"]["coverage"], "85 to 95 %")
+    for name, place in figures_shown(score["unknown"]):
+        figure = _figure_at(score, place)
+        if figure.get("value") is not None or "auroc" in place:
+            out.append((name, _in_words(figure), str(figure.get("n", "")), GOALS.get(place, "")))
     return out
+
+
+def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
+    """(name, place in the score with "/" between keys) of the figures of the table, in its order.
+
+    left_out: groups of flights whose effect was left out, keys of the score's `unknown`.
+    """
+    shown = [("top-1, single effects", "top_1"), ("top-3, single effects", "top_3")]
+    for level in SEVERITIES:
+        shown += [(f"top-1, {level} severity", f"by_severity/{level}/top_1"),
+                  (f"test for the true effect at its true strength, {level} severity", f"by_severity/{level}/ideal")]
+    shown += [("exact set, single effects", "exact"), ("false alarms, no effect", "false_alarms"),
+              ("pairs: exact set", "pairs_exact"), ("pairs: one right", "pairs_one_right")]
+    for group in left_out:
+        name, place = f"effect left out, {group}", f"unknown/{group}"
+        shown += [(f"{name}: AUROC of unknown", f"{place}/auroc"),
+                  (f"{name}: AUROC of unknown, {APART}", f"{place}/auroc_told_apart"),
+                  (f"{name}: given a wrong name", f"{place}/wrong_name"),
+                  (f"{name}: the same where the data tell the two apart", f"{place}/wrong_name_told_apart")]
+    return [*shown, ("shrink with the right effect", "shrink/right"), ("shrink with a wrong effect", "shrink/wrong"),
+            ("parameters: median relative error", "parameters/error"),
+            ("parameters: in the 90 % interval", "parameters/coverage")]
+
+
+def _figure_at(score: Mapping[str, Any], place: str) -> Mapping[str, Any]:
+    """The figure at a place of the score; empty where there is none. An AUROC has the n of the wrong names beside."""
+    *keys, last = place.split("/")
+    group: Mapping[str, Any] = score
+    for key in keys:
+        group = group.get(key, {})
+    if last.startswith("auroc"):
+        return {"value": group.get(last), "n": group["wrong_name"]["n"]}
+    return group.get(last) or {}
+
+
+def _in_words(figure: Mapping[str, Any]) -> str:
+    """The value of a figure, as a percentage with its interval where it has one; empty without a value."""
+    if figure["value"] is None:
+        return ""
+    if "low" in figure:
+        return f"{figure['value']:.1%} ({figure['low']:.1%} to {figure['high']:.1%})"
+    return f"{figure['value']:.3f}"
 
 
 def effect_rows(score: Mapping[str, Any]) -> Rows:

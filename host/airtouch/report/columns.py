@@ -1,6 +1,6 @@
 """The columns of score tables, on the terminal and in reports."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 #: column -> (path in the summary, format); misses and false edges always stand beside the error
 COLUMNS = {
@@ -16,16 +16,23 @@ COLUMNS = {
 }
 
 
-def cell(table: dict[str, Any], key: str, form: str) -> str:
-    """A figure of a summary with its interval on a second line; "-" for None.
+class WithInterval(NamedTuple):
+    """A number as text, and its interval as text, "" where there is none."""
+
+    value: str
+    interval: str = ""
+
+
+def cell(table: dict[str, Any], key: str, form: str) -> WithInterval:
+    """A figure of a summary with its interval; "-" for None.
 
     table: the summary, with `intervals`; key: path in it, with "/" between keys; form: format of the number.
     """
     value, interval = _value_at(table, key), _value_at(table["intervals"], key)
     if value is None:
-        return "-"
-    text = form.format(value)
-    return text if interval is None else f"{text}\n{' - '.join(form.format(bound) for bound in interval)}"
+        return WithInterval("-")
+    bounds = [] if interval is None else [form.format(bound) for bound in interval]
+    return WithInterval(form.format(value), " - ".join(bounds))
 
 
 def _value_at(source: Any, path: str) -> Any:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from airtouch.detector.evaluation.score_report import HitCurve, Reliability
 from airtouch.detector.shared.channels import NAMES
+from airtouch.detector.shared.sensors import GRAVITY_MPS2
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
@@ -105,7 +106,7 @@ def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
 
 def _accelerations(ax: Axes, plotted: PlottedFlight) -> None:
     """Draw the accelerations, without gravity."""
-    channels = plotted.trace.signals["channels"][:, :3] - [0, 0, 9.81]
+    channels = plotted.trace.signals["channels"][:, :3] - [0, 0, GRAVITY_MPS2]
     ax.plot(plotted.time_s, channels, lw=0.6, label=["x", "y", "z - g"])
     _finish(ax, "acceleration\nm/s²", channels)
 

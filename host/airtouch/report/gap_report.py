@@ -1,4 +1,9 @@
-"""The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement and computes nothing."""
+"""The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement.
+
+Nothing is fitted, replayed or averaged here. The answer, its figures and its headline stand in the diagnosis; of the
+map's cells `gap.where.summary` says which stay over the floor and sums them up by phase; `gap.answer.words` has the
+sentences. This module chooses how many of each are shown, and lays them out.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -31,10 +36,9 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
 
     Raises AirTouchError for a file that exists, without `force`.
     """
-    headline = measurement.where[0] if measurement.where else None
     page = _page(
-        title="Gap between flights and simulator", headline=headline,
-        answers=(words.measured_in_words(headline), words.overall_in_words(measurement.gap)),
+        title="Gap between flights and simulator", headline=measurement.headline,
+        answers=(words.measured_in_words(measurement.headline), words.overall_in_words(measurement.gap)),
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
         calibration=gap_tables.parameter_rows(measurement.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),
@@ -58,7 +62,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         ranking=gap_tables.ranking_rows(diagnosis),
         indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart."
                            for g in diagnosis.indistinguishable],
-        pictures=diagnosis.pictures, how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None,
+        pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
         remaining=words.remaining_in_words(left[:gap_tables.MOST_REMAINING]), remaining_count=len(left),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
@@ -72,9 +76,9 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
 def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], pictures: Pictures | None,
           **context: Any) -> str:
     """The HTML of a page: what diagnosis and measurement share, and `context`, whose parts a page may lack."""
-    absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],
-              "remaining": [], "remaining_count": 0, "unexplained": [], "nearest": [], "steps": (), "calibration": [],
-              "anchor": ANCHOR}
+    absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": [],
+              "how_far_columns": gap_tables.HOW_FAR_COLUMNS, "phase_figures": [], "remaining": [], "remaining_count": 0,
+              "unexplained": [], "nearest": [], "steps": (), "calibration": [], "anchor": ANCHOR}
     shows_how_to_add = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
     return rendered("gap.html", **{
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
@@ -103,7 +107,10 @@ class Plot(NamedTuple):
 
 
 def _images(pictures: Pictures | None) -> list[dict[str, str]]:
-    """The plots as data URLs, each with title and text; none where they are not asked for or cannot be drawn."""
+    """The plots as data URLs, each with title and text; none where they are not asked for or cannot be drawn.
+
+    Where a second core is idle, a second process draws some of them at the same time.
+    """
     if pictures is None or lacking("plots"):
         return []
     plots = _plots(pictures)

@@ -1,13 +1,18 @@
-"""Rows of the gap report's tables, ready for the page."""
+"""Rows of the gap report's tables, ready for the page: texts, colours, what is folded and what is marked.
+
+What stands out of its floor, what stays, and the order of phases `gap.where.summary` decides; here its answers are
+asked for and written out.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import digits, leading, quantity, seconds_in_words
+from airtouch.gap.answer.words import digits, leading, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
-from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, ratio, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, ratio, short
+from airtouch.report.columns import WithInterval
 
 
 class Shade(NamedTuple):
@@ -92,7 +97,7 @@ def heat_map_cell(cell: Cell) -> dict[str, str]:
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """Rows of the largest cells, in their units, with the effect that takes most from each beside its unit."""
-    return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": short(c.gap),
+    return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": short(c.gap),
              "interval": interval(c), "after": "-" if c.after is None else short(c.after), "floor": short(c.floor),
              "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(ratio(c))} for c in cells]
 
@@ -129,40 +134,29 @@ OTHER_START = ("without the calibration on the baseline flights, so model, floor
                "above")
 
 
-def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Table of the gap before and after, the floor and the shrink: right effect, wrong effect, and both arms.
-
-    `why` of a row says why its gap before differs from the first row's, or is empty. None without figures.
-    """
-    named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
-    figures: list[tuple[str, Mapping[str, Any]]] = []
-    if diagnosis.gap:
-        figures.append((named, {**diagnosis.gap, "shrink": diagnosis.shrink}))
-    if diagnosis.control is not None:
-        figures.append((f"wrong effect: {diagnosis.control.name}", diagnosis.control.plain()))
-    figures += [(f"{named}, vehicle as {name}", arm.plain()) for name, arm in diagnosis.arms.items()
-                if arm.share != diagnosis.shrink]
-    rows = []
-    for name, by_column in figures:
-        cells = [figure(by_column.get(column)) for column in HOW_FAR_COLUMNS]
-        before = cells[0]
-        first = rows[0]["cells"][0] if rows else before
-        rows.append({"name": name, "cells": cells, "why": OTHER_START if before not in ("-", first) else ""})
-    rows = [row for row in rows if set(row["cells"]) != {"-"}]
-    return {"columns": HOW_FAR_COLUMNS, "rows": rows} if rows else None
+def how_far_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Rows of how far the gap closes: the model, its figures, and why it starts from another gap, or ""."""
+    return [{"name": arm.model, "why": OTHER_START if arm.own_start else "",
+             "cells": [_number(arm.before), _number(arm.after), _number(arm.floor), _share(arm.share)]}
+            for arm in diagnosis.how_far]
 
 
-def figure(value: Any) -> str:
-    """Text of a number, a quantity or a quantity's JSON form; "-" for anything else."""
-    if isinstance(value, Mapping) and "value" in value:
-        value = Quantity(**{k: v for k, v in value.items() if k in ("value", "low", "high", "unit")})
-    if isinstance(value, Quantity):
-        return quantity(value, "{:.2f}")
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return f"{value:.3g}"
-    return "-"
+def _number(value: float | None) -> WithInterval:
+    """A number to three digits; "-" for None."""
+    return WithInterval("-" if value is None else f"{value:.3g}")
 
 
-def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, str]]:
+def _share(share: Quantity | None) -> WithInterval:
+    """A share with its interval; "-" for None."""
+    return WithInterval("-") if share is None else with_interval(share, "{:.2f}")
+
+
+def with_interval(q: Quantity, form: str) -> WithInterval:
+    """A quantity with its unit, and its interval. form: format of a number, as `{:.2f}`."""
+    unit = "" if q.unit in ("1", "") else f" {q.unit}"
+    return WithInterval(form.format(q.value) + unit, _interval(q, form))
+
+
+def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, WithInterval]]:
     """(name, value with interval) of calibrated parameters."""
-    return [(k, quantity(q)) for k, q in parameters.items()]
+    return [(name, with_interval(q, digits(q))) for name, q in parameters.items()]

@@ -14,24 +14,24 @@ STRIP_M = 0.3  #: m, drawn width of a platform that was crossed once; its true w
 COLOURS = {"entry": BLUE, "exit": RED, "edge": GREEN}
 
 
-def edge_map(plane: EdgeMap, title: str) -> bytes:
+def draw_edge_map(edges: EdgeMap, title: str) -> bytes:
     """PNG of the track, the edges with 2-sigma bars along the track, platforms and a scale bar."""
     with style():
-        return png(figure_of(plane, title))
+        return png(figure_of(edges, title))
 
 
-def figure_of(plane: EdgeMap, title: str) -> Figure:
+def figure_of(edges: EdgeMap, title: str) -> Figure:
     """The map as a matplotlib figure."""
-    xy = plane.xy
+    xy = edges.xy
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
         ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
         ax.plot(*xy.T, color=GREY, lw=0.9, label="track")
         _ends(ax, xy)
-        for platform in plane.platforms:
+        for platform in edges.platforms:
             _draw_platform(ax, platform)
-        _draw_points(ax, plane)
+        _draw_points(ax, edges)
         _room_below(ax, xy)
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
@@ -58,14 +58,14 @@ def _draw_platform(ax: Axes, platform: Platform) -> None:
             ax.plot(*np.array(side.coords).T, color=GREEN, lw=0.8, ls=":")
 
 
-def _draw_points(ax: Axes, plane: EdgeMap) -> None:
+def _draw_points(ax: Axes, edges: EdgeMap) -> None:
     """Draw each edge, with a bar of 2 sigma along the track."""
-    for point in plane.points:
-        along = _direction(plane.xy, point.sample) * 2 * point.sigma_m
+    for point in edges.points:
+        along = _direction(edges.xy, point.sample) * 2 * point.sigma_m
         ends = np.array([[point.x_m, point.y_m]]) + np.outer([-1, 1], along)
         ax.plot(*ends.T, color=COLOURS[point.kind], lw=2.5, alpha=0.4, solid_capstyle="round")
     for kind, colour in COLOURS.items():
-        at = [p for p in plane.points if p.kind == kind]
+        at = [p for p in edges.points if p.kind == kind]
         if at:
             ax.scatter([p.x_m for p in at], [p.y_m for p in at], s=14, color=colour, zorder=3,
                        label=f"{kind} ({len(at)})")

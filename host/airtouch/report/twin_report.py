@@ -1,9 +1,7 @@
 """The page of `airtouch twin`: recorded and simulated flights side by side."""
 
-from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
@@ -12,19 +10,25 @@ from airtouch.report.html_page import data_url, rendered
 from airtouch.twin.comparison.compare import Comparison
 from airtouch.twin.comparison.curves import Curves
 from airtouch.twin.comparison.words import answer, gap_row
-from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.fitting.calibrate import Calibration
 from airtouch.twin.recorded.flights import RecordedFlights
 
 MOST_GAPS = 30  #: gaps that the page lists, largest first; no source: about one screen
 
 
-def write_report(path: Path, recorded: RecordedFlights, comparison: Comparison, curves: Curves, levers: Sequence[Lever],
-                 values: np.ndarray, misfit_before: dict[str, float], *, command: str, force: bool = False) -> None:
-    """Write the page as a self-contained HTML file.
+class FlownTwin(NamedTuple):
+    """A twin as the page shows it: the flights that it was fitted to, the fit, and how its own flights compare."""
 
-    values: (levers,), fitted. misfit_before: group -> misfit before the fit. Raises AirTouchError for a file that
-    exists, without `force`.
-    """
+    recorded: RecordedFlights
+    fit: Calibration
+    comparison: Comparison
+    curves: Curves
+
+
+def write_report(path: Path, twin: FlownTwin, *, command: str, force: bool = False) -> None:
+    """Write the page as a self-contained HTML file; raises AirTouchError for a file that exists, without `force`."""
+    recorded, fit, comparison, curves = twin
+    misfit_before = fit.history[0]["misfit"]
     images = [("One flight and its twin", "", twin_figures.overlaid(curves.overlaid)),
               ("Spectra in free air", "", twin_figures.spectra(curves.spectra)),
               *(("Around the edges, medians and quartiles", twin_figures.class_in_words(name),
@@ -34,7 +38,7 @@ def write_report(path: Path, recorded: RecordedFlights, comparison: Comparison, 
         misfit=[(g, misfit_before.get(g), v) for g, v in comparison.misfit.items()],
         gaps=[gap_row(g) for g in comparison.gaps[:MOST_GAPS]],
         levers=[(lever.name, f"{value:.4g}", f"{lever.start:.4g}", lever.unit)
-                for lever, value in zip(levers, values, strict=True)],
+                for lever, value in zip(fit.levers, fit.values, strict=True)],
         images=[(title, text, data_url(data)) for title, text, data in images],
         flights=len(recorded.courses), simulated=len(comparison.flights), lost=comparison.diverged,
         left_out=recorded.left_out,

@@ -10,7 +10,7 @@ from airtouch.detector import registry
 from airtouch.detector.evaluation import tuning
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
-from airtouch.detector.trace import Detection
+from airtouch.detector.trace import Detection, Trace
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.vision import lines
 from airtouch.vision.camera import Camera
@@ -100,7 +100,7 @@ def flight_scores(films: Sequence[Film], by_film: Sequence[Sequence[Detection]])
         filming[int(shot.first_s / SAMPLE_PERIOD_S):int(shot.last_s / SAMPLE_PERIOD_S)] = True
         inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in detected]
         scores.append(score_flight(Path(shot.log.source).name, Condition(speed_mps=shot.speed_mps), shot.edges, filming,
-                                   np.full(len(shot.log), np.nan), inside))
+                                   Trace(np.full(len(shot.log), np.nan), inside)))
     return scores
 
 

@@ -16,7 +16,7 @@ from airtouch.detector.best import batches, quantisation, training
 from airtouch.detector.best import model as model_file
 from airtouch.detector.best.network import float_logits, keras_model, weight_names
 from airtouch.detector.best.outputs import OUTPUTS, goals
-from airtouch.detector.best.recipe import CHANNELS, STRIDE, Recipe
+from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.reference.edge_decoder import LOGITS
@@ -66,9 +66,9 @@ def _check_against_tflite_micro(model, x: np.ndarray, count: int) -> int:
     assert np.array_equal(streamed, run_stream(model.int8, quantised))
     interpreter = runtime.Interpreter.from_bytes(model.tflite, arena_size=1 << 20)
     length = model.recipe.receptive_samples
-    rows = np.linspace(-(-length // STRIDE), len(streamed) - 1, count).astype(int)
+    rows = np.linspace(-(-length // ROW_STRIDE), len(streamed) - 1, count).astype(int)
     for row in rows:
-        end = row * STRIDE + 1
+        end = row * ROW_STRIDE + 1
         interpreter.set_input(quantised[end - length:end].reshape(1, 1, length, CHANNELS), 0)
         interpreter.invoke()
         assert np.array_equal(interpreter.get_output(0).ravel(), streamed[row])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore, match, over_platform, score_edges, score_flight
 from airtouch.detector.evaluation.summary import by_centimetre, by_height, summarise
-from airtouch.detector.trace import Detection
+from airtouch.detector.trace import Detection, Trace
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ LOW = Condition(height="low", angle_deg=0.0, wind="none", speed_mps=0.2)
 
 def flight(detections, condition=LOW, true=(ENTRY, EXIT), probability=None, lag_s=0.0):
     probability = np.full(len(AIRBORNE), np.nan) if probability is None else probability
-    return score_flight("f.csv", condition, true, AIRBORNE, probability, detections, lag_s)
+    return score_flight("f.csv", condition, true, AIRBORNE, Trace(probability, list(detections)), lag_s)
 
 
 def test_early_is_positive_and_metres_are_seconds_times_speed():
@@ -149,8 +149,8 @@ def test_a_score_says_which_flight_and_which_edges():
     for true in ((ENTRY, EXIT), None):
         score = flight([Detection(500, "entry")], true=true)
         assert (score.file, score.condition, score.airborne_s) == ("f.csv", LOW, pytest.approx(16.0))
-    assert score_flight("f.csv", LOW, [ENTRY], AIRBORNE, np.full(2000, np.nan),
-                        [Detection(1000, "entry")]).edges[0].error_s == 0.0
+    assert score_flight("f.csv", LOW, [ENTRY], AIRBORNE,
+                        Trace(np.full(2000, np.nan), [Detection(1000, "entry")])).edges[0].error_s == 0.0
 
 
 def test_a_probability_of_a_half_says_over_and_unknown_ones_count_as_nothing():

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from scipy.signal import correlate
 
-from airtouch.detector.paper.graph import CONV, DENSE, GRAPH, INPUT_SHAPE, LAYERS, MAX_POOL, OPERATIONS, Row, graph_of
+from airtouch.detector.paper.graph import (
+    CONV,
+    DENSE,
+    GRAPH,
+    INPUT_SHAPE,
+    LAYERS,
+    MAX_POOL,
+    OPERATIONS,
+    LayerSpec,
+    graph_of,
+)
 from skips import needs
 
 
@@ -16,8 +26,8 @@ def test_it_is_the_network_of_section_5_2():
     assert sum(int(np.prod(s)) for s in shapes) == 36944 and sum(s[-1] for s in shapes) == 66
 
 
-OTHER = (Row("a", CONV, (4, 2), 5, relu=True), Row("b", MAX_POOL, (3, 1)), Row("c", CONV, (2, 1), 6),
-         Row("d", DENSE, outputs=7), Row("e", DENSE, outputs=3))
+OTHER = (LayerSpec("a", CONV, (4, 2), 5, relu=True), LayerSpec("b", MAX_POOL, (3, 1)), LayerSpec("c", CONV, (2, 1), 6),
+         LayerSpec("d", DENSE, outputs=7), LayerSpec("e", DENSE, outputs=3))
 
 
 @needs("tensorflow")

@@ -35,7 +35,7 @@ def easy(model, **changes):
 def test_edges_are_those_of_the_reference_pipeline(log, model):
     loose = easy(model)
     trace = paper.run(log, loose)
-    settings, physical = paper.decoding(loose)
+    settings, physical = paper.decoding_settings(loose)
     events = reference.edge_pipeline(
         level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle.load(), vbat_v=log["vbat_V"],
         thrust_axis=thrust_axis(log), probability=trace.probability,
@@ -71,7 +71,7 @@ def test_tuning_states_what_it_chose(log, model):
     assert 0.0 <= tuned.metadata["tuned_timed_f1"] <= 1.0 and np.isfinite(paper.lag_s(tuned))
     off = paper.tune(model, [log], physical_filter=False)
     assert off.metadata["physical_filter"] is False
-    assert off.metadata["tuned_timed_f1"] >= 0.0 and paper.decoding(off)[1] is False
+    assert off.metadata["tuned_timed_f1"] >= 0.0 and paper.decoding_settings(off)[1] is False
 
 
 def test_a_model_of_another_version_is_refused(log, model):

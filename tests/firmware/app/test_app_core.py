@@ -63,7 +63,7 @@ def test_a_network_of_features_over_the_link_is_its_pipeline(flight, module):
     answered = np.flatnonzero(np.isfinite(probability))
     assert len(answered) > 100
     np.testing.assert_allclose(probability[answered], expected[answered - 1], rtol=1e-6)  # known one sample later
-    settings, physical = paper.decoding(module.load(None))
+    settings, physical = paper.decoding_settings(module.load(None))
     later = pipeline(log, settings, np.append(np.nan, expected[:-1]), physical_filter=physical)
     assert edges == [(int(i), ("entry", "exit")[k - 1]) for i, k in enumerate(later.edge) if k]
 

@@ -40,7 +40,7 @@ def test_an_unknown_parameter_is_refused():
 
 
 def test_decoding_of_paper_is_that_of_the_shipped_model():
-    settings, _ = paper.decoding(paper.load(None))
+    settings, _ = paper.decoding_settings(paper.load(None))
     core = AppCore().params()
     assert core["probabilityIn"] == pytest.approx(settings.probability_entry)
     assert core["probabilityOut"] == pytest.approx(settings.probability_exit)
@@ -52,7 +52,7 @@ def test_decoding_as_shipped_is_that_of_the_detector_in_force(recorded):
     log, expected = recorded[0][0], []
     probability = rolling.run(log[0]).probability
     for changes in ({}, {"probability_entry": 0.8}, {"probability_entry": 0.3}, {"dwell_samples": 300}):
-        settings = replace(paper.decoding(rolling.load(None))[0], **changes)
+        settings = replace(paper.decoding_settings(rolling.load(None))[0], **changes)
         if settings.probability_exit >= settings.probability_entry:  # 0.4 as tuned, 0.3 as set
             settings = replace(settings, probability_exit=settings.probability_entry - 0.01)
         edges = pipeline(log[0], settings, np.append(np.nan, probability[:-1]), physical_filter=True).edge

@@ -114,7 +114,7 @@ def test_closing_figures_are_one(pushed_flights, tmp_path):
     fields = result.plain()
     assert fields["shrink"] == fields["ranking"][0]["shrink"] and fields["gap"]["before"] == 4.0
     assert "from 4 to 1.3 times the floor" in words.sentences(result)[2]
-    rows = gap_tables.how_far(result)["rows"]
+    rows = gap_tables.how_far_rows(result)
     assert [r["name"] for r in rows] == ["imu_bias", "wrong effect: wind", "imu_bias, vehicle as declared"]
     # the row that starts from another gap says why
     assert [r["why"] for r in rows] == ["", "", gap_tables.OTHER_START]

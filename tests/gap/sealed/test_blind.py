@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import re
 import select
 import signal
 import time
@@ -26,6 +27,7 @@ from airtouch.gap.sealed import score as blind_score
 from airtouch.gap.sealed import severity as blind_severity
 from airtouch.gap.sealed.severity import three_severities
 from airtouch.gap.signatures.random_draws import KINDS
+from airtouch.report import blind_figures
 
 ROOT = Path(__file__).parents[3]
 CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_offset": (5e-4, 1e-3, 2e-3),
@@ -313,3 +315,16 @@ def test_a_set_is_balanced():
 def test_a_set_that_cannot_be_drawn_is_refused(kinds, says):
     with pytest.raises(AirTouchError, match=says):
         blind.draw(100, {k: (1.0, 2.0, 4.0) for k in kinds}, np.random.default_rng(0))
+
+
+def test_the_goals_are_those_of_the_page_and_of_figures_of_a_score(blind_check):
+    page = (ROOT / "host/docs/gap-blind.md").read_text()
+    table = re.search(r"^\| figure \| measured \| n \| goal \|.*\n\|[-|]*\n((?:\|.*\n)+)", page, re.M).group(1)
+    on_page = [re.findall(r"0\.\d+|\d+", line.split("|")[4]) for line in table.splitlines()]
+    goals = dict.fromkeys(goal for text in blind_score.GOALS.values() for goal in re.findall(r"0\.\d+|\d+", text))
+    assert [goal for row in on_page for goal in row] == list(goals)
+    shown = [place for _, place in blind_figures.figures_shown(["all", *blind_score.SEVERITIES])]
+    assert set(blind_score.GOALS) <= set(shown)
+    rows = {name: (value, n, goal) for name, value, n, goal in blind_figures.score_rows(blind_check[1])}
+    assert rows["top-1, single effects"][1:] == ("4", "at least 95 %")
+    assert rows["pairs: exact set"][1:] == ("2", "at least 85 %")

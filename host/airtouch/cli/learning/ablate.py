@@ -9,8 +9,8 @@ from rich.table import Table
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
-from airtouch.detector.evaluation import ablation
-from airtouch.detector.evaluation.ablation import ABLATIONS
+from airtouch.detector import ablation
+from airtouch.detector.ablation import ABLATIONS
 from airtouch.detector.evaluation.data import dataset
 from airtouch.logs.files import check_free
 

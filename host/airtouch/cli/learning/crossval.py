@@ -70,16 +70,17 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
     air = _free_air(free_air)
     settings = crossval.Settings(seed, options, air, physical_filter, silence, silence_training)
-    scores, folds, left_out = crossval.crossval(detector, files, out, settings, folds=split,
-                                                tell=lambda line: click.echo(line, err=True))
+    validation = crossval.crossval(detector, files, out, settings, folds=split,
+                                   tell=lambda line: click.echo(line, err=True))
+    scores, folds, left_out = validation.scores, validation.folds, validation.left_out
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     title = ", ".join([detector, *([] if physical_filter else ["physical filter off"]),
                        *(f"no {sensor}" for sensor in silence), *([f"trained without {without}"] if without else []),
                        *(["whole days held out"] if by == "day" and not without else []),
                        *([f"{len(air)} flights in free air"] if air else [])])
-    result = evaluate.as_json(title, scores, left_out, [f["lag_s"] for f in folds], {})
-    result["folds"] = folds
+    result = evaluate.as_json(title, scores, left_out, [f.lag_s for f in folds], {})
+    result["folds"] = [f.plain() for f in folds]
     screen = show.console()
     show.print_table(screen, {title: result, **result["by_height"]},
                      f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}")

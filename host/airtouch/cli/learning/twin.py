@@ -81,8 +81,8 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     summary = _summary(comparison, by_name, fitted.history, recorded, typed)
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
     with Bar("report"):
-        twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flights),
-                                 fitted.levers, fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
+        flown = twin_report.FlownTwin(recorded, fitted, comparison, curves(recorded, comparison.flights))
+        twin_report.write_report(out / REPORT, flown, command=typed, force=True)
     _say(comparison, len(recorded.courses), fitted.history[0]["misfit"])
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 

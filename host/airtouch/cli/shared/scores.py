@@ -36,7 +36,9 @@ def print_table(screen: Console, rows: Mapping[str, dict[str, Any]], title: str)
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
-    return [str(row["flights"]), str(row["edges"]), *(cell(row, *form) for form in COLUMNS.values())]
+    """The figures of a summary, each interval on a second line."""
+    figures = ("\n".join(filter(None, cell(row, *form))) for form in COLUMNS.values())
+    return [str(row["flights"]), str(row["edges"]), *figures]
 
 
 def _table(title: str, head: Sequence[str], lines: Iterable[Sequence[str]], caption: str) -> Table:

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
-from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection, Trace
 from airtouch.kernels.stream_session import StreamSession
@@ -49,7 +49,7 @@ class HostDetector:
         self._logits.append(events.logits)
         self._edge.append(events.edge)
         self._airborne.append(events.airborne)
-        recent = (self._decoder.hold_steps + self._decoder.look_back) * STRIDE
+        recent = (self._decoder.hold_steps + self._decoder.look_back) * ROW_STRIDE
         edges = []
         for i in np.flatnonzero(events.edge):
             past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]

@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch import kernels, logs
 from airtouch.detector.best.outputs import OUTPUTS, goals
-from airtouch.detector.best.recipe import CHANNELS, STRIDE, Recipe
+from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE, Recipe
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
@@ -68,7 +68,7 @@ def batch(flights: Sequence[TrainingFlight], recipe: Recipe, rng: np.random.Gene
     share = np.array([f.weight for f in flights])
     drawn = [flights[i] for i in rng.choice(len(flights), recipe.batch, p=share / share.sum())]
     x = np.empty((recipe.batch, recipe.crop, CHANNELS), np.float32)
-    y = np.empty((recipe.batch, recipe.crop // STRIDE, len(OUTPUTS)), np.float32)
+    y = np.empty((recipe.batch, recipe.crop // ROW_STRIDE, len(OUTPUTS)), np.float32)
     silent = _silent(recipe, rng)
     for row, flight in enumerate(drawn):
         if free_air and rng.random() < recipe.free_air_share:
@@ -104,7 +104,7 @@ def _crop(flight: TrainingFlight, recipe: Recipe, rng: np.random.Generator) -> t
     low = np.minimum(t.astype(int), last - 1)
     part = (t - low)[:, None].astype(np.float32)
     x = flight.x[low] * (1 - part) + flight.x[low + 1] * part
-    return x, flight.goals[np.round(t[::STRIDE]).astype(int)]
+    return x, flight.goals[np.round(t[::ROW_STRIDE]).astype(int)]
 
 
 def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
@@ -118,6 +118,7 @@ def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.ran
     if len(flight.edges) and rng.random() < recipe.edge_share:
         ahead = rng.uniform(1.1 * recipe.warm_up, 0.93 * recipe.crop) * speed
         return float(flight.edges[rng.integers(len(flight.edges))]) - ahead
+    # conditional on not being an edge crop, so that `phases` is a share of all crops
     if rng.random() < recipe.phases / max(1.0 - recipe.edge_share, recipe.phases):
         return first - BEHIND * rng.random() if rng.random() < 0.5 else final + BEHIND * rng.random()
     return rng.uniform(min(first, final), max(first, final))

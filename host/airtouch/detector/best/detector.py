@@ -16,7 +16,7 @@ from airtouch.detector.best import sensor_note
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
-from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.shared import sensors
 from airtouch.detector.shared.channels import nine_channels
 from airtouch.detector.trace import Detection, Trace
@@ -60,14 +60,15 @@ def model_for(model: BestModel | None, log: FlightLog) -> BestModel:
     return (model or load(None)).serving(sensors.missing_sensors(log))
 
 
-def run_float(log: FlightLog, model: BestModel) -> Trace:
+def run_float(log: FlightLog, model: BestModel | None = None) -> Trace:
     """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
+    model = model_for(model, log)
     x, airborne = channels_of(log, model.recipe.motion)
     steps = float_logits(model.weights, model.recipe.graph, x)
     edge = np.zeros(len(log), dtype=np.uint8)
-    edge[::STRIDE] = kernels.edge_decoder(steps[:, :len(LOGITS)], airborne[::STRIDE],
+    edge[::ROW_STRIDE] = kernels.edge_decoder(steps[:, :len(LOGITS)], airborne[::ROW_STRIDE],
                                           model.decoder_without(sensors.missing_sensors(log)))
-    return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
+    return trace_of(log, model, np.repeat(steps, ROW_STRIDE, axis=0)[:len(log)], edge, airborne)
 
 
 def trace_of(log: FlightLog, model: BestModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
@@ -78,7 +79,7 @@ def trace_of(log: FlightLog, model: BestModel, logits: np.ndarray, edge: np.ndar
     over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
     absent = sensors.missing_sensors(log)
     decoder = model.decoder_without(absent)
-    recent = (decoder.hold_steps + decoder.look_back) * STRIDE
+    recent = (decoder.hold_steps + decoder.look_back) * ROW_STRIDE
     edges = []
     for i in np.flatnonzero(edge):
         kind = int(edge[i])
@@ -114,6 +115,6 @@ def parameters(model: BestModel | None) -> dict[str, Any]:
     return {"width": model.recipe.width, "receptive_s": model.recipe.receptive_samples / SAMPLE_RATE_HZ,
             "parameter_bytes": parameter_bytes(model.int8),
             "state_bytes": arena_bytes(model.int8),
-            "mac_per_sample": model.int8.multiplications / STRIDE, **asdict(model.decoder),
+            "mac_per_sample": model.int8.multiplications / ROW_STRIDE, **asdict(model.decoder),
             "seed": model.metadata.get("seed")}
 

@@ -9,7 +9,7 @@ from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
 
 CHANNELS = len(NAMES)  #: values a sample
-STRIDE = 2  #: samples between two rows that are computed: 50 Hz
+ROW_STRIDE = 2  #: samples between two rows that are computed: 50 Hz
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Recipe:
         """The network: a strided convolution, dilated ones, and a head that reads a row of each of those."""
         width, dilated = self.width, range(1, 1 + len(self.dilations))
         return (
-            StreamLayer("layer0", CONV, self.first_taps, CHANNELS, width, stride=STRIDE),
+            StreamLayer("layer0", CONV, self.first_taps, CHANNELS, width, stride=ROW_STRIDE),
             *(StreamLayer(f"layer{i}", CONV, self.taps, width, width, dilation, pruned=True)
               for i, dilation in zip(dilated, self.dilations, strict=True)),
             StreamLayer(f"layer{len(dilated) + 1}", HEAD, len(dilated), width, len(OUTPUTS), relu=False,

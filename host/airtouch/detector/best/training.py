@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.detector.best.batches import TrainingFlight, batch
 from airtouch.detector.best.network import keras_model, weight_names, weight_shapes
 from airtouch.detector.best.outputs import OUTPUTS
-from airtouch.detector.best.recipe import STRIDE, Recipe
+from airtouch.detector.best.recipe import ROW_STRIDE, Recipe
 from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.logs.files import write_bytes
 
@@ -101,7 +101,7 @@ def compiled_step(recipe: Recipe) -> Learner:
     optimizer.build(model.trainable_variables)
     masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
     weight = tf.constant([output.weight(recipe) for output in OUTPUTS])
-    scored = recipe.warm_up // STRIDE
+    scored = recipe.warm_up // ROW_STRIDE
 
     @tf.function(jit_compile=True)
     def learn(x, y):  # noqa: ANN001, ANN202

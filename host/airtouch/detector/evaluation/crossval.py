@@ -5,7 +5,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -58,10 +58,39 @@ class Settings:
         return "".join(("" if self.physical_filter else "-unfiltered", *(f"-no-{s}" for s in self.silenced)))
 
 
+@dataclass(frozen=True)
+class Fold:
+    """One fold: its model's file in the folder of results, that model's lag and parameters, and what the fold took.
+
+    fold: its name, as in the manifest. seconds, cpu_seconds: of training, if it was not done before, and scoring;
+    cpu_seconds is None in results of an older version.
+    """
+
+    fold: int | str
+    model: str
+    lag_s: float
+    parameters: dict[str, Any]
+    seconds: float
+    cpu_seconds: float | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready, without what is not known."""
+        return {k: v for k, v in asdict(self).items() if v is not None}
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Scores of all flights, the folds, and (file, reason) of flights that were left out."""
+
+    scores: list[FlightScore]
+    folds: list[Fold]
+    left_out: list[tuple[str, str]]
+
+
 def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settings | None = None, *,
              folds: Folds | None = None, detector: Detector | None = None, tell: Tell = lambda _: None,
-             ) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
-    """(scores of all flights, one entry a fold, flights left out with the reason).
+             ) -> CrossValidation:
+    """The scores of a detector's folds, each by a model of the other flights.
 
     Finished folds are kept in `out` and not done again for the same flights, settings and version.
     settings: `Settings()` for None. folds: which flights are held out together (`data.folds`); those of the manifest
@@ -75,7 +104,7 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settin
     make_folder(out)
     readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []
-    entries: list[dict[str, Any]] = []
+    done: list[Fold] = []
     for fold, members in folds.items():
         key = cache_key(name, files, members, settings.seed, settings.hashed())
         cache = out / f"{name}{settings.variant()}_fold{fold}_{key}.json"
@@ -91,8 +120,8 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settin
         else:
             tell(f"fold {fold}: done before, {cache.name}")
         scores += [FlightScore.from_dict(s) for s in entry["per_flight"]]
-        entries.append({k: v for k, v in entry.items() if k != "per_flight"})
-    return scores, entries, left_out
+        done.append(Fold(**{k: v for k, v in entry.items() if k != "per_flight"}))
+    return CrossValidation(scores, done, left_out)
 
 
 def _score_fold(settings: Settings, detector: Detector, train: Sequence[FlightLog],
@@ -153,11 +182,12 @@ def cache_key(name: str, files: Sequence[FlightFile], test: Sequence[FlightFile]
 
 
 def read_fold(path: Path) -> dict[str, Any] | None:
-    """A finished fold, or None where there is none or it is damaged."""
+    """A finished fold as JSON: the fields of `Fold`, and `per_flight`; None where there is none or it is damaged."""
     try:
         entry = json.loads(path.read_text())
         for score in entry["per_flight"]:
             FlightScore.from_dict(score)
+        Fold(**{k: v for k, v in entry.items() if k != "per_flight"})
         return entry
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -114,8 +114,8 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
 def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
     """The score of a trace that the detector gave with this model."""
     condition = with_flown_speed(file, log).condition
-    score = score_flight(file.path.name, condition, truth(log), logs.airborne(log), trace.probability,
-                         trace.edges, detector.lag_s(model))
+    score = score_flight(file.path.name, condition, truth(log), logs.airborne(log), trace,
+                         detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)
     return Result(log, trace, replace(score, note=note, in_training=trained))

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from airtouch.detector.evaluation.calibration import BINS, reliability
 from airtouch.detector.evaluation.data.dataset import Condition
-from airtouch.detector.trace import Detection
+from airtouch.detector.trace import Detection, Trace
 from airtouch.parameters import SAMPLE_PERIOD_S
 
 TOLERANCE_S = 1.5  #: a detection further than this from every true edge is false
@@ -164,17 +164,16 @@ def score_flight(
     condition: Condition,
     true: Sequence[TrueEdge] | None,
     airborne: np.ndarray,
-    probability: np.ndarray,
-    detections: Sequence[Detection],
+    trace: Trace,
     lag_s: float = 0.0,
 ) -> FlightScore:
     """The score of one flight of n samples.
 
     true: edges, or None where the log has no down range; then no detection is called false.
-    airborne: (n,) bool. probability: (n,) of being over a platform; 0.5 and more predicts it. A detector
-    without probabilities (all NaN) is judged by the state between its detections. Detections on the
-    ground count too.
+    airborne: (n,) bool. trace: of the detector; its probability of being over a platform, 0.5 and more, predicts it,
+    and where it has none (all NaN) the state between its edges does. Edges on the ground count too.
     """
+    probability, detections = trace.probability, trace.edges
     airborne_s = float(np.count_nonzero(airborne)) * SAMPLE_PERIOD_S
     if true is None:
         note = "no down range in this log: detections are listed, not judged"

@@ -45,6 +45,7 @@ def choose(
     """(settings, lag in seconds, timed F1) of the candidate that scores best; the first of equals.
 
     detect(settings, i) gives the detections in training flight i, whose edges are truth[i].
+    Raises ValueError without candidates.
     """
     best: tuple[Settings, float, float] | None = None
     for settings in candidates:

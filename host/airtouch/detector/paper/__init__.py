@@ -18,7 +18,7 @@ variants      the pipeline with one of its choices changed, for ablations
 
 from airtouch.detector.paper.detector import (
     choose_decoding,
-    decoding,
+    decoding_settings,
     fit,
     lag_s,
     load,
@@ -33,5 +33,5 @@ from airtouch.detector.paper.detector import (
 )
 from airtouch.detector.paper.model import Model
 
-__all__ = ["Model", "choose_decoding", "decoding", "fit", "lag_s", "load", "parameters", "probability_of", "retune",
-           "run", "run_float", "signals", "stride", "tune"]
+__all__ = ["Model", "choose_decoding", "decoding_settings", "fit", "lag_s", "load", "parameters", "probability_of",
+           "retune", "run", "run_float", "signals", "stride", "tune"]

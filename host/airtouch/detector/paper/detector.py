@@ -44,7 +44,7 @@ def run(log: FlightLog, model: Model | None = None) -> Trace:
     Raises AirTouchError that names missing columns.
     """
     model = model or load(None)
-    features = flight_features(log, parameters=decoding(model)[0])
+    features = flight_features(log, parameters=decoding_settings(model)[0])
     return _trace(log, model, features, probability_of(model, features.fused))
 
 
@@ -63,9 +63,10 @@ def stride(model: Model) -> int:
     return value
 
 
-def run_float(log: FlightLog, model: Model) -> Trace:
+def run_float(log: FlightLog, model: Model | None = None) -> Trace:
     """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
-    features = flight_features(log, parameters=decoding(model)[0])
+    model = model or load(None)
+    features = flight_features(log, parameters=decoding_settings(model)[0])
     windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
     logits = infer_float(model.float_layers, windows).astype(np.float64)
     probability = np.full(len(log), np.nan)
@@ -75,7 +76,7 @@ def run_float(log: FlightLog, model: Model) -> Trace:
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
     """The trace of a flight whose P(over a platform) is known, (n,), with edges from the C pipeline."""
-    settings, physical = decoding(model)
+    settings, physical = decoding_settings(model)
     events = pipeline(log, settings, probability, physical_filter=physical)
     return Trace(probability, detections(events.edge, probability), signals(features))
 
@@ -157,7 +158,7 @@ def parameters(model: Model | None) -> dict[str, Any]:
     return {**size, **metadata.get("parameters", asdict(DEFAULT)), **{k: metadata[k] for k in named if k in metadata}}
 
 
-def decoding(model: Model) -> tuple[Parameters, bool]:
+def decoding_settings(model: Model) -> tuple[Parameters, bool]:
     """The model's settings, and whether its physical filter is on.
 
     Raises AirTouchError for settings of another version.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.detector.paper import decoding, stride
+from airtouch.detector.paper import decoding_settings, stride
 from airtouch.detector.paper.model import Model
 from airtouch.detector.paper.network import WEIGHTED
 from airtouch.detector.shared.c_source import CONST, CONST_DEFAULT, float_literal, golden_header, golden_source, layer
@@ -126,7 +126,7 @@ extern const networkInt8_t airtouchNetwork;
 
 def _decoding(model: Model, prefix: str) -> str:
     """C constants that turn the network's outputs into edges, for the processor that does not run the network."""
-    settings = decoding(model)[0] if "parameters" in model.metadata else DEFAULT
+    settings = decoding_settings(model)[0] if "parameters" in model.metadata else DEFAULT
     return f"""// How its logits become edges, as chosen with it; samples of 10 ms.
 #define {prefix}_OUTPUT_SCALE {float_literal(model.int8.layers[-1].output_scale)}  // P is the softmax of the logits
 #define {prefix}_PROBABILITY_ENTRY {settings.probability_entry!r}f

@@ -19,7 +19,7 @@ Shape = tuple[int, int, int]  #: rows, columns, channels
 INPUT_SHAPE: Shape = (100, 3, 1)  #: samples, sensors, one value
 
 
-class Row(NamedTuple):
+class LayerSpec(NamedTuple):
     """One layer as it is written in LAYERS, before its shapes are known.
 
     kernel: rows and columns that an output reads. outputs: channels; 0 for as many as the layer before has.
@@ -33,12 +33,12 @@ class Row(NamedTuple):
 
 
 LAYERS = (
-    Row("conv1", CONV, (3, 1), 16, relu=True),
-    Row("pool1", MAX_POOL, (2, 1)),
-    Row("conv2", CONV, (3, 1), 32, relu=True),
-    Row("pool2", MAX_POOL, (2, 1)),
-    Row("dense1", DENSE, outputs=16, relu=True),
-    Row("dense2", DENSE, outputs=2),
+    LayerSpec("conv1", CONV, (3, 1), 16, relu=True),
+    LayerSpec("pool1", MAX_POOL, (2, 1)),
+    LayerSpec("conv2", CONV, (3, 1), 32, relu=True),
+    LayerSpec("pool2", MAX_POOL, (2, 1)),
+    LayerSpec("dense1", DENSE, outputs=16, relu=True),
+    LayerSpec("dense2", DENSE, outputs=2),
 )
 
 
@@ -59,24 +59,33 @@ class PaperLayer:
 class Operation:
     """What one operation is.
 
-    output_shape, kernel_shape (input shape, row): of a layer. keras(layer, **options): new Keras layers, the last one
+    output_shape, kernel_shape (input shape, spec): of a layer. keras(layer, **options): new Keras layers, the last one
     with these options. window(layer, kernel, bias, x): TensorFlow, of (1, rows, columns, channels), without ReLU.
     """
 
-    output_shape: Callable[[Shape, Row], Shape]
-    kernel_shape: Callable[[Shape, Row], tuple[int, ...]]
+    output_shape: Callable[[Shape, LayerSpec], Shape]
+    kernel_shape: Callable[[Shape, LayerSpec], tuple[int, ...]]
     keras: Callable[..., list["keras.Layer"]]
     window: Callable[[PaperLayer, np.ndarray | None, np.ndarray | None, Any], Any]
 
 
-def graph_of(rows: Sequence[Row], input_shape: Shape) -> tuple[PaperLayer, ...]:
+def graph_of(specs: Sequence[LayerSpec], input_shape: Shape) -> tuple[PaperLayer, ...]:
     """The layers of a list, each with the shape that the one before leaves it."""
     layers: list[PaperLayer] = []
-    for row in rows:
-        before, of = layers[-1].output_shape if layers else input_shape, OPERATIONS[row.operation]
-        layers.append(PaperLayer(row.name, row.operation, before, of.output_shape(before, row), row.kernel, row.relu,
-                                 of.kernel_shape(before, row)))
+    for spec in specs:
+        before, operation = layers[-1].output_shape if layers else input_shape, OPERATIONS[spec.operation]
+        layers.append(PaperLayer(spec.name, spec.operation, before, operation.output_shape(before, spec), spec.kernel,
+                                 spec.relu, operation.kernel_shape(before, spec)))
     return tuple(layers)
+
+
+def _conv_shape(before: Shape, spec: LayerSpec) -> Shape:
+    """Without padding, so a kernel of k rows leaves k - 1 fewer."""
+    return before[0] - spec.kernel[0] + 1, before[1] - spec.kernel[1] + 1, spec.outputs
+
+
+def _conv_kernel(before: Shape, spec: LayerSpec) -> tuple[int, ...]:
+    return *spec.kernel, before[2], spec.outputs
 
 
 def _conv_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
@@ -92,6 +101,15 @@ def _conv_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray 
     return tf.nn.conv2d(x, kernel, 1, "VALID") + bias
 
 
+def _pool_shape(before: Shape, spec: LayerSpec) -> Shape:
+    """The rows and columns that fill no kernel are left out."""
+    return before[0] // spec.kernel[0], before[1] // spec.kernel[1], before[2]
+
+
+def _pool_kernel(before: Shape, spec: LayerSpec) -> tuple[int, ...]:
+    return ()
+
+
 def _pool_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
     import keras
 
@@ -102,6 +120,14 @@ def _pool_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray 
     import tensorflow as tf
 
     return tf.nn.max_pool2d(x, layer.kernel, layer.kernel, "VALID")
+
+
+def _dense_shape(before: Shape, spec: LayerSpec) -> Shape:
+    return 1, 1, spec.outputs
+
+
+def _dense_kernel(before: Shape, spec: LayerSpec) -> tuple[int, ...]:
+    return int(np.prod(before)), spec.outputs
 
 
 def _dense_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
@@ -119,12 +145,9 @@ def _dense_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray
 
 
 OPERATIONS = {
-    CONV: Operation(lambda at, row: (at[0] - row.kernel[0] + 1, at[1] - row.kernel[1] + 1, row.outputs),
-                    lambda at, row: (*row.kernel, at[2], row.outputs), _conv_keras, _conv_window),
-    MAX_POOL: Operation(lambda at, row: (at[0] // row.kernel[0], at[1] // row.kernel[1], at[2]),
-                        lambda at, row: (), _pool_keras, _pool_window),
-    DENSE: Operation(lambda at, row: (1, 1, row.outputs),
-                     lambda at, row: (int(np.prod(at)), row.outputs), _dense_keras, _dense_window),
+    CONV: Operation(_conv_shape, _conv_kernel, _conv_keras, _conv_window),
+    MAX_POOL: Operation(_pool_shape, _pool_kernel, _pool_keras, _pool_window),
+    DENSE: Operation(_dense_shape, _dense_kernel, _dense_keras, _dense_window),
 }
 
 GRAPH = graph_of(LAYERS, INPUT_SHAPE)

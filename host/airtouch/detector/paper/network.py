@@ -39,10 +39,10 @@ def weight_shapes() -> dict[str, tuple[int, ...]]:
 
 def float_layers(weights: Weights) -> list[FloatLayer]:
     """The network for `airtouch.kernels.network.infer_float`."""
-    return [FloatLayer(of.operation, of.input_shape, of.output_shape, of.kernel, of.relu,
-                       *((kernel_of_c(weights[f"{of.name}.kernel"]), weights[f"{of.name}.bias"])
-                         if of.kernel_shape else ()))
-            for of in GRAPH]
+    return [FloatLayer(layer.operation, layer.input_shape, layer.output_shape, layer.kernel, layer.relu,
+                       *((kernel_of_c(weights[f"{layer.name}.kernel"]), weights[f"{layer.name}.bias"])
+                         if layer.kernel_shape else ()))
+            for layer in GRAPH]
 
 
 def kernel_of_c(kernel: np.ndarray) -> np.ndarray:
@@ -55,9 +55,9 @@ def build_keras(constraints: Mapping[str, object] | None = None, rows: int = INP
     import keras
 
     constraints = constraints or {}
-    layers = [one for of in GRAPH
-              for one in OPERATIONS[of.operation].keras(of, **(
-                  {"kernel_constraint": constraints.get(of.name)} if of.kernel_shape else {}))]
+    layers = [one for layer in GRAPH
+              for one in OPERATIONS[layer.operation].keras(layer, **(
+                  {"kernel_constraint": constraints.get(layer.name)} if layer.kernel_shape else {}))]
     return keras.Sequential([keras.Input((rows, *INPUT_SHAPE[1:])), *layers], name="airtouch_paper")
 
 

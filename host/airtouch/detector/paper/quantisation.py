@@ -27,10 +27,10 @@ def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
     import tensorflow as tf
 
     def network(x):
-        for of in GRAPH:
-            kernel, bias = weights.get(f"{of.name}.kernel"), weights.get(f"{of.name}.bias")
-            x = OPERATIONS[of.operation].window(of, kernel, bias, x)
-            x = tf.nn.relu(x) if of.relu else x
+        for layer in GRAPH:
+            kernel, bias = weights.get(f"{layer.name}.kernel"), weights.get(f"{layer.name}.bias")
+            x = OPERATIONS[layer.operation].window(layer, kernel, bias, x)
+            x = tf.nn.relu(x) if layer.relu else x
         return x
 
     return convert(network, (1, *INPUT_SHAPE), windows)
@@ -52,16 +52,16 @@ def network_of_arrays(arrays: dict[str, np.ndarray]) -> Int8Network:
     """The int8 network from the arrays of `int8_shapes`; activations are input, then each weighted layer."""
     layers = []
     at = 0  # which activation the layer reads
-    for of in GRAPH:
-        shapes = (of.operation, of.input_shape, of.output_shape, of.kernel)
+    for layer in GRAPH:
+        shapes = (layer.operation, layer.input_shape, layer.output_shape, layer.kernel)
         scale, zero_point = float(arrays["scale"][at]), int(arrays["zero_point"][at])
-        if not of.kernel_shape:
+        if not layer.kernel_shape:
             layers.append(Int8Layer(*shapes, scale, zero_point, scale, zero_point))
             continue
         at += 1
         layers.append(Int8Layer(*shapes, scale, zero_point, float(arrays["scale"][at]), int(arrays["zero_point"][at]),
-                                of.relu, arrays[f"{of.name}.weights"], arrays[f"{of.name}.bias"],
-                                arrays[f"{of.name}.weight_scale"]))
+                                layer.relu, arrays[f"{layer.name}.weights"], arrays[f"{layer.name}.bias"],
+                                arrays[f"{layer.name}.weight_scale"]))
     return Int8Network(tuple(layers))
 
 

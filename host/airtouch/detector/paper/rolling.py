@@ -22,7 +22,7 @@ from airtouch.kernels.rolling import rolling_size
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.networks.int8_network import rolling_multiplications
 
-STRIDE = 4  #: samples between two answers: the two pools halve the rows each, so that no row is computed in vain
+ANSWER_STRIDE = 4  #: samples between two answers: the two pools halve the rows each, so that no row is computed in vain
 #: shares of zeros in the first dense layer and in the second convolution: with them a sample takes less than 8,000
 #: instructions of a RISC-V core in the mean (host/docs/gap8-network.md)
 SPARSITY, CONV_SPARSITY = 0.96, 0.8
@@ -33,12 +33,12 @@ def run(log: FlightLog, model: Model | None = None) -> Trace:
     return paper.run(log, model or load(None))
 
 
-def run_float(log: FlightLog, model: Model) -> Trace:
+def run_float(log: FlightLog, model: Model | None = None) -> Trace:
     """As `run`, with the float network as trained, over windows: what quantisation is measured against."""
-    return paper.run_float(log, model)
+    return paper.run_float(log, model or load(None))
 
 
-def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, stride: int = STRIDE,
+def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, stride: int = ANSWER_STRIDE,
         sparsity: float = SPARSITY, conv_sparsity: float = CONV_SPARSITY, **options: Any) -> Model:
     """A model as `paper.fit` trains it, with inputs on a fixed scale and more zeros.
 

@@ -4,7 +4,7 @@ import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,13 +21,16 @@ from airtouch.kernels.network import infer_float, infer_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 
+if TYPE_CHECKING:
+    import keras
+
 BATCH = 128  #: windows a batch; 32 in the paper
 HELD_OUT = 0.15  #: fraction of the flights held out for early stopping; no source: round number
 PRUNED_BY = 0.6  #: fraction of the steps after which the pruning masks are fixed; no source: leaves time to recover
 PATIENCE = 3  #: epochs without a lower loss on the held-out flights, until training stops; no source: round number
 PEAK_RATE = 2e-3  #: largest learning rate of the cycle; no source: round number
 BATCHES_A_CALL = 50  #: batches between two returns to Python, for speed
-STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
+WINDOW_STEP = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
 
 #: progress(stage, done, total, note), stage "features" (flights) or "epochs"
 Progress = Callable[[str, int, int, str], None]
@@ -85,7 +88,7 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
         "flights": [os.path.basename(log.source) for log in flights],
         "held_out": [os.path.basename(flights[i].source) for i in validation], "data_sha256": data_hash(windows),
     }, scale)
-    score = accuracy(model, windows.select(~in_training & (np.arange(len(in_training)) % STRIDE == 0)))
+    score = accuracy(model, windows.select(~in_training & (np.arange(len(in_training)) % WINDOW_STEP == 0)))
     return replace(model, metadata={**model.metadata, "held_out_accuracy": score})
 
 
@@ -173,14 +176,16 @@ def fit_windows(train: Windows, validation: Windows, recipe: PaperRecipe,
     return network.weights_of_keras(model), len(losses)
 
 
-def fit_keras(train: Windows, validation: Windows, recipe: PaperRecipe, progress: Progress):
+def fit_keras(train: Windows, validation: Windows, recipe: PaperRecipe,
+              progress: Progress) -> tuple["keras.Model", list[float]]:
     """The trained Keras model, and the loss on the held-out windows after each epoch.
 
-    Without held-out windows it is the loss on the training windows. Without sparsity windows may have any length.
+    Without held-out windows it is the loss on the training windows. Without sparsity windows may have any length: the
+    masks of pruning are made for the kernels of the shipped network, whose first dense layer grows with the window.
     """
     import keras
 
-    train, validation = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, validation))
+    train, validation = (part.select(np.arange(len(part.x)) % WINDOW_STEP == 0) for part in (train, validation))
     batches, epochs = max(len(train.x) // BATCH, 1), recipe.epochs
     pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
     constraints, callbacks = {}, []
@@ -196,7 +201,7 @@ def fit_keras(train: Windows, validation: Windows, recipe: PaperRecipe, progress
     stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
                                              start_from_epoch=pruned_epochs)
     report = keras.callbacks.LambdaCallback(
-        on_epoch_end=lambda epoch, logs: progress("epochs", epoch + 1, epochs, f"loss {logs['loss']:.3f}"))
+        on_epoch_end=lambda epoch, losses: progress("epochs", epoch + 1, epochs, f"loss {losses['loss']:.3f}"))
     callbacks += [report] + ([stopping] if len(validation.x) else [])
     history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
                         shuffle=False,

@@ -14,17 +14,17 @@ CONST = "AIRTOUCH_MODEL_CONST"
 CONST_DEFAULT = f"#ifndef {CONST}\n#define {CONST} const\n#endif\n"
 
 
-def layer(name: str, of: Int8Layer) -> tuple[str, str]:
+def layer(name: str, int8: Int8Layer) -> tuple[str, str]:
     """The C arrays of one layer, whose names begin with `name`, and the initialiser of its layerInt8_t."""
-    _, *shape = layer_shape(of)
-    kind = f"{'SPARSE_' if runs_sparse(of) else ''}{of.kind.name.upper()}"
+    _, *shape = layer_shape(int8)
+    kind = f"{'SPARSE_' if runs_sparse(int8) else ''}{int8.kind.name.upper()}"
     sizes = [", ".join(map(str, shape[start:stop])) for start, stop in ((0, 3), (3, 6), (6, 8), (8, 11))]
     head = (f"{{.kind = LAYER_{kind}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), "
             f"LAYER_KERNEL({sizes[2]}), LAYER_RANGE({sizes[3]})")
-    if not of.weighted:
+    if not int8.weighted:
         return "", head + "}"
-    weights, counts, skips = packed_weights(of)
-    bias, multiplier, shift = of.c_constants()
+    weights, counts, skips = packed_weights(int8)
+    bias, multiplier, shift = int8.c_constants()
     arrays = [("Weights", "int8_t", weights), ("Bias", "int32_t", bias),
               ("Multiplier", "int32_t", multiplier), ("Shift", "int8_t", shift)]
     if counts.size:

@@ -19,6 +19,19 @@ from airtouch.gap.signatures.candidates import terms
 
 Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
+#: goals of the figures, by their place in `figures` with "/" between keys; host/docs/gap-blind.md has them too
+GOALS = {
+    "top_1": "at least 95 %",
+    "by_severity/weakest/top_1": "at least 80 %",
+    "false_alarms": "at most 2 %",
+    "pairs_exact": "at least 85 %",
+    **{f"unknown/{level}/auroc_told_apart": "at least 0.97" for level in SEVERITIES[1:]},
+    **{f"unknown/{level}/wrong_name_told_apart": "at most 5 %" for level in SEVERITIES[1:]},
+    "shrink/right": "at least 90 %",
+    "shrink/wrong": "at most 20 %",
+    "parameters/error": "at most 10 %",
+    "parameters/coverage": "87 to 93 %",
+}
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
 

@@ -11,10 +11,14 @@ PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "i
 
 def in_words(cell: Cell) -> str:
     """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
+    return f"{place_in_words(cell)}: {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
+
+
+def place_in_words(cell: Cell) -> str:
+    """The cell's place in the map as a phrase, `over the platform, 0-0.5 Hz, roll torque`."""
     regime = "" if cell.regime == "all" else f" ({cell.regime})"
     return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
-            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, "
-            f"{short(ratio(cell))} times the floor")
+            f"{CHANNEL_WORDS[cell.channel]}")
 
 
 def interval(cell: Cell) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.crossval import Fold
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper.variants import Variant, VariantModel
 from airtouch.logs.flight_log import FlightLog
@@ -40,8 +41,8 @@ SIZES = {50: ("input-50", replace(UNFILTERED, rows=50)), 100: ("no-filter", UNFI
          170: ("input-170", replace(UNFILTERED, rows=170)), 250: ("input-250", replace(UNFILTERED, rows=250))}
 
 
-def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], list[dict[str, Any]]]:
-    """Scores of a variant, one for each flight, and the entries of its folds."""
+def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], list[Fold]]:
+    """Scores of a variant, one for each flight, and its folds."""
     return recorded.variant_scores(job, name, variant, {"epochs": QUICK_EPOCHS if job.quick else EPOCHS})
 
 
@@ -50,7 +51,7 @@ def df_loss(job: Job) -> Figure:
     recorded.files(job)
     scored = {what: scores(job, *variant) for what, variant in LOSSES.items()}
     rows = {what: summary.summarise(flights) for what, (flights, _) in scored.items()}
-    epochs = {what: float(np.mean([f["parameters"]["converged_after_epochs"] for f in folds]))
+    epochs = {what: float(np.mean([f.parameters["converged_after_epochs"] for f in folds]))
               for what, (_, folds) in scored.items()}
     table = [words.table_row(what, r, epochs_to_converge=epochs[what]) for what, r in rows.items()]
     names = list(LOSSES)

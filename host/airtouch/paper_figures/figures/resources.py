@@ -121,13 +121,13 @@ def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Ve
         _, folds = recorded.scores(job, "paper")
     except Missing:
         return Verdict(UNTESTABLE, f"{text}; {Missing('no recorded flights here to train the paper’s network on')}")
-    durations = [f["cpu_seconds"] for f in folds if "cpu_seconds" in f] or [f["seconds"] for f in folds]
+    durations = [f.cpu_seconds for f in folds if f.cpu_seconds is not None] or [f.seconds for f in folds]
     seconds = float(np.mean(durations))
     rows[1]["training_s"] = seconds
     verdict = REPRODUCED if seconds < CLAIMS["training"].values[1] else UNTESTABLE
     return Verdict(verdict, f"paper's network {seconds / 60:.1f} min of processor time a fold here (n = "
                             f"{len(durations)}, choice of thresholds and scoring included, "
-                            f"{folds[0]['parameters'].get('epochs_run', '?')} epochs of one cycle in place of 200); "
+                            f"{folds[0].parameters.get('epochs_run', '?')} epochs of one cycle in place of 200); "
                             f"{text}")
 
 

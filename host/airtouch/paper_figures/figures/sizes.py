@@ -101,7 +101,7 @@ def _accuracies(job: Job, rows: list[dict[str, Any]]) -> str:
         scores, folds = recorded.variant_scores(job, "paper", None, {**epochs, **options})
         exact = recorded.in_float(job, "paper", folds)
         row, float_row = summary.summarise(scores), summary.summarise(exact)
-        rows.append({"what": f"{100 * zeros:.0f} % zeros, int8", "bytes": folds[0]["parameters"]["parameter_bytes"],
+        rows.append({"what": f"{100 * zeros:.0f} % zeros, int8", "bytes": folds[0].parameters["parameter_bytes"],
                      "zeros": zeros, "balanced_float": float_row["balanced_accuracy"],
                      "balanced_int8": row["balanced_accuracy"], "flights": row["flights"]})
         texts.append(f"{100 * zeros:.0f} % zeros: float {words.percent(float_row['balanced_accuracy'])}, int8 "

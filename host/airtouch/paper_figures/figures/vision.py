@@ -129,7 +129,7 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
     try:
         for zeros in BEST_ZEROS:
             scores, folds = recorded.variant_scores(job, "best", None, {"steps": STEPS, "sparsity": zeros})
-            rows[folds[0]["parameters"]["parameter_bytes"]] = summary.summarise(scores)
+            rows[folds[0].parameters["parameter_bytes"]] = summary.summarise(scores)
     except Missing as missing:
         return {}, Verdict(UNTESTABLE, str(missing))
     text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from airtouch.detector.evaluation import crossval, evaluate, summary
+from airtouch.detector.evaluation.crossval import Fold
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper.variants import Variant
-from airtouch.detector.registry import Detector, InFloat, get
+from airtouch.detector.registry import Detector, InFloat, InFloatOnly, get
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES
 
@@ -88,23 +88,23 @@ def ablate(
         tell(f"{number}/{len(names)} {name}: {ablation.title}")
         detector = ablation.variant or get(ablation.name)
         shared = best_options if ablation.variant is None and ablation.name == "best" else paper_options
-        scores, folds, left_out = crossval.crossval(
+        result = crossval.crossval(
             name if ablation.variant else ablation.name, files, out,
             crossval.Settings(seed, {**(shared or {}), **ablation.options}), detector=detector, tell=tell)
-        results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(scores),
-                         "by_height": summary.by_height(scores), "folds": folds,
-                         "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}
+        results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(result.scores),
+                         "by_height": summary.by_height(result.scores), "folds": [f.plain() for f in result.folds],
+                         "seconds": sum(f.seconds for f in result.folds), "left_out": len(result.left_out)}
         if ablation.group == "size":
-            results[name]["float"] = summary.summarise(in_float(detector, files, folds, out))
+            results[name]["float"] = summary.summarise(in_float(detector, files, result.folds, out))
     return results
 
 
-def in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict], out: Path) -> list[FlightScore]:
+def in_float(detector: Detector, files: Sequence[FlightFile], folds: Sequence[Fold], out: Path) -> list[FlightScore]:
     """Scores of the same folds and models, with the float network as trained; files are the flights of these folds."""
     if not isinstance(detector, InFloat):
         raise AirTouchError("this detector's network does not run in float")
-    models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
-    view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+    models: dict[int | str | None, Any] = {fold.fold: detector.load(out / fold.model) for fold in folds}
+    float_detector = InFloatOnly(detector)
     readable, _ = crossval.readable_flights(files)
-    return [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+    return [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
             for f in files if f.path in readable]
