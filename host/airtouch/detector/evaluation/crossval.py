@@ -172,7 +172,10 @@ def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, 
 
 def cache_key(name: str, files: Sequence[FlightFile], test: Sequence[FlightFile], seed: int,
               options: dict[str, Any]) -> str:
-    """Twelve hexadecimal digits that change with anything a fold's result depends on."""
+    """Twelve hexadecimal digits that change with version, detector, seed, options and the flights' files.
+
+    What the code sets by default is not among them: after a change of a recipe delete the folds that were kept.
+    """
     total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}".encode())
     for file in files:
         stat = os.stat(file.path) if file.path.exists() else None
