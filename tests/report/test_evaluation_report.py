@@ -1,6 +1,5 @@
 """The report: self-contained, well formed, with the figures of the summary in it."""
 
-import html.parser
 import re
 
 import numpy as np
@@ -24,6 +23,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.report import figures
 from airtouch.report.columns import COLUMNS, cell
 from airtouch.report.evaluation_report import answer, in_words, write_report
+from html_page import PageReader
 
 N = 600
 EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
@@ -45,22 +45,6 @@ def flight_shown(name="a<b>.csv", detections=DETECTIONS):
     return ShownFlight(log, trace, EDGES, score, {"baseline": Trace(np.full(N, np.nan), [Detection(90, "edge")])})
 
 
-class Checker(html.parser.HTMLParser):
-    """Collects open tags and everything that is loaded."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.loaded = [], []
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in ("meta", "img", "br"):
-            self.open.append(tag)
-        self.loaded += [value for key, value in attrs if key in ("src", "href")]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-
 def test_report_is_one_file_with_the_figures(tmp_path):
     flight = flight_shown()
     path = tmp_path / "report.html"
@@ -68,9 +52,9 @@ def test_report_is_one_file_with_the_figures(tmp_path):
     write_report(path, "A & B", score_report(scores, [flight]), parameters={"p_fa": 1e-6}, command="airtouch demo",
                  left_out=[("x.csv", "x.csv: the file is empty")])
     text = path.read_text()
-    checker = Checker()
-    checker.feed(text)
-    assert not checker.open and checker.loaded and all(v.startswith("data:image/png;base64,") for v in checker.loaded)
+    page = PageReader()
+    page.feed(text)
+    assert not page.open and page.loaded and all(v.startswith("data:image/png;base64,") for v in page.loaded)
     assert "http" not in re.sub(r"base64,[^\"]*", "", text)
     assert "A &amp; B" in text and "a&lt;b&gt;.csv" in text and "<b>.csv" not in text
     table = summarise(scores["paper"])

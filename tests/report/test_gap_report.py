@@ -1,7 +1,6 @@
 """The gap report: self-contained, well formed, the answer first, every figure of the diagnosis in it and none of its
 own."""
 
-import html.parser
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.report import gap_report, gap_tables
 from airtouch.simulation.effects import EFFECTS
+from html_page import PageReader
 from made_diagnosis import VEHICLE, cell, diagnosis, of_flights
 
 
@@ -29,40 +29,21 @@ def pushed_flights():
     return made_diagnosis.fly_pushed()
 
 
-class Checker(html.parser.HTMLParser):
-    """Collects open tags, text and everything that is loaded."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.loaded, self.text = [], [], []
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in ("meta", "img", "br"):
-            self.open.append(tag)
-        self.loaded += [value for key, value in attrs if key in ("src", "href")]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-
 def checked(path):
     source = path.read_text()
-    checker = Checker()
-    checker.feed(source)
-    inside = {v for v in checker.loaded if v.startswith("#")}
-    assert not checker.open and all(v.startswith("data:image/png;base64,") for v in set(checker.loaded) - inside)
+    page = PageReader()
+    page.feed(source)
+    inside = {v for v in page.loaded if v.startswith("#")}
+    assert not page.open and all(v.startswith("data:image/png;base64,") for v in set(page.loaded) - inside)
     assert all(f'id="{v[1:]}"' in source for v in inside), inside
     assert "http" not in re.sub(r"base64,[^\"]*", "", source) and "<script" not in source and "viewport" in source
-    return " ".join(" ".join(checker.text).split()), checker
+    return " ".join(" ".join(page.text).split()), page
 
 
 def test_page_of_a_diagnosis(pushed_flights, tmp_path):
     path, result = tmp_path / "gap.html", of_flights(pushed_flights)
     gap_report.write_diagnosis(path, result, command="airtouch gap diagnose <x>")
-    text, checker = checked(path)
+    text, page = checked(path)
     sentences = words.sentences(result)
     assert result.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in sentences[0]
     assert "imu bias (probability 93%)" in sentences[1] and "takes away 90% (80% to 95%)" in sentences[2]
@@ -74,7 +55,7 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
                  "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>",
                  "another fits better", "airtouch collect --mission hover"):
         assert part in text, part
-    assert sum(v.startswith("data:") for v in checker.loaded) == 3
+    assert sum(v.startswith("data:") for v in page.loaded) == 3
     with pytest.raises(AirTouchError, match="--force"):
         gap_report.write_diagnosis(path, result, command="x")
 
@@ -128,9 +109,9 @@ def test_page_of_a_measurement(pushed_flights, tmp_path):
     path, gap = tmp_path / "gap.html", measure(pushed_flights, VEHICLE)
     pictures = pictures_of_measurement(gap, pushed_flights, VEHICLE)
     gap_report.write_measurement(path, gap, pictures, command="airtouch gap measure x")
-    text, checker = checked(path)
+    text, page = checked(path)
     assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
-    assert sum(v.startswith("data:") for v in checker.loaded) == 3 and "Which effect" not in text and "→" not in text
+    assert sum(v.startswith("data:") for v in page.loaded) == 3 and "Which effect" not in text and "→" not in text
 
 
 def test_the_report_computes_nothing():

@@ -151,5 +151,5 @@ def _flights(names: Sequence[str], vehicle: str, baseline: Sequence[str]) -> str
 
 def _few(names: Sequence[str]) -> str:
     """The file names of the first MOST_NAMED flights, and how many more there are."""
-    shown, more = ", ".join(Path(n).name for n in names[:MOST_NAMED]), len(names) - MOST_NAMED
-    return f"{shown} and {more} more" if more > 0 else shown
+    first_names = ", ".join(Path(n).name for n in names[:MOST_NAMED])
+    return f"{first_names} and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else first_names

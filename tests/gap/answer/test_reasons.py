@@ -109,8 +109,8 @@ def test_where_nothing_is_named():
 
 def test_what_is_named_and_not_enough_is_held_against_itself():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
-    left = selection(beside=70.0)
-    assert why_not(left, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
+    open_gap = selection(beside=70.0)
+    assert why_not(open_gap, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
     contradicted = selection(lost=(60.0, "yaw torque"))
     assert why_not(contradicted, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
                                                         "most in yaw torque; 18 may be chance")

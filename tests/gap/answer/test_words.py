@@ -65,15 +65,15 @@ def test_what_got_worse_is_said():
 def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "hover", 0.1, after=0.4),
              cell("force_y", "hover", 0.5, after=0.45)]
-    told = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
-    assert told in words.sentences(diagnosis(cells))[2]
+    counts = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
+    assert counts in words.sentences(diagnosis(cells))[2]
 
 
-@pytest.mark.parametrize(("before", "told"), [(1.01, "at the floor, so there is nothing to close."),
-                                              (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
-def test_none_says_how_large_the_gap_is(before, told):
+@pytest.mark.parametrize(("before", "size"), [(1.01, "at the floor, so there is nothing to close."),
+                                            (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
+def test_none_says_how_large_the_gap_is(before, size):
     none = diagnosis(verdict="none", effects=())
-    assert words.sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {told}"
+    assert words.sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {size}"
 
 
 def test_headline_and_ranking_cannot_disagree():

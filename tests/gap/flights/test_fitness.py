@@ -13,11 +13,11 @@ SAMPLES, HEIGHT = 1000, 0.4  #: 10 s of a hover, m
 def hover(**columns):
     """A hover of SAMPLES at 100 Hz whose every channel is noise, with these columns instead."""
     rng = np.random.default_rng(3)
-    made = {name: rng.normal(0.0, 0.1, SAMPLES) for name in (*ACC, *GYRO)}
-    made |= {name: rng.normal(36000.0, 100.0, SAMPLES) for name in PWM}
-    made |= {"t_s": np.arange(SAMPLES) * 0.01, "zrange_m": np.full(SAMPLES, HEIGHT),
-             "vbat_V": rng.normal(3.8, 0.01, SAMPLES)}
-    return FlightLog({**made, **columns}, {"source": "a/hover.csv", "format": "canonical"})
+    channels = {name: rng.normal(0.0, 0.1, SAMPLES) for name in (*ACC, *GYRO)}
+    channels |= {name: rng.normal(36000.0, 100.0, SAMPLES) for name in PWM}
+    channels |= {"t_s": np.arange(SAMPLES) * 0.01, "zrange_m": np.full(SAMPLES, HEIGHT),
+                 "vbat_V": rng.normal(3.8, 0.01, SAMPLES)}
+    return FlightLog({**channels, **columns}, {"source": "a/hover.csv", "format": "canonical"})
 
 
 def test_a_sound_log_stays_as_it_is():

@@ -82,11 +82,12 @@ def _how_far(diagnosis: Diagnosis) -> str:
 def _cells_in_words(cells: Sequence[Cell]) -> str:
     """How many cells still stand out with the effects named, and how many got worse; "" where neither."""
     open_cells, worse_cells = summary.remaining(cells), summary.worse(cells)
-    over, still = (sum(c.regime == "all" and summary.stands_out(c) for c in some) for some in (cells, open_cells))
+    over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
+    still = sum(summary.stands_out(c) for c in open_cells)
     out = ""
     if open_cells:
-        others = f", beside {len(open_cells) - still} that did not before" if len(open_cells) > still else ""
-        out = f"; {still} of {over} cells still stand out{others}, mostly {_after_in_words(open_cells[0])}"
+        new = f", beside {len(open_cells) - still} that did not before" if len(open_cells) > still else ""
+        out = f"; {still} of {over} cells still stand out{new}, mostly {_after_in_words(open_cells[0])}"
     return out + (f", and {len(worse_cells)} got worse" if worse_cells else "")
 
 

@@ -45,7 +45,7 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
 
 
 def _stuck_shares(log: FlightLog) -> dict[str, float]:
-    """Share of the samples in the air in which a channel of the IMU is stuck, for those that are."""
+    """Share of the samples in the air in which a channel of the IMU is stuck, by the channels that ever are."""
     try:
         flying = airborne(log)
     except AirTouchError:  # no motors, no height

@@ -24,10 +24,10 @@ STANDS_OUT = 1.1
 def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     """Share of the gap that the effects named must close, to be named; None where they need not.
 
-    gap: before they are in the model, in units of the floor. In recorded flights one of the loop, and one that passes
-    where a gap stands out, must close LEAST_CLOSED. Others, where a gap stands out, must close some: a name that leaves
-    all of it is not its cause. That holds neither for the log's own times nor for an effect whose seconds are known
-    from another vehicle's log.
+    gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
+    must close LEAST_CLOSED, and so must one that comes and goes if the gap is over STANDS_OUT. Over STANDS_OUT any
+    other must close more than 0: an effect that leaves the whole gap is not its cause. Effects of the logged times, and
+    one whose seconds are known from another vehicle's log, need close nothing.
     """
     chosen = selection.chosen
     if not data.study.recorded or chosen is None or any(s.key == KNOWN_OVERHEAD for s in selection.named):
