@@ -2,8 +2,9 @@
 
     python tools/bench_diagnosis.py [--runs 5]
 
-Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles. Nothing else
-should run beside it.
+Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles: with the first
+flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else should run
+beside it.
 """
 
 import argparse
@@ -16,16 +17,19 @@ import time
 from importlib import resources
 from pathlib import Path
 
+from airtouch.gap.nominal.kept_scatter import VARIABLE
 
-def seconds(processors: set[int], out: Path) -> float:
-    """Wall time of one diagnosis on some processors."""
+
+def seconds(processors: set[int], out: Path, kept: str) -> float:
+    """Wall time of one diagnosis on some processors; kept: folder of kept scatters, empty for none."""
     example = resources.files("airtouch.gap.example")
     baseline = [str(example / f"nominal_{i}.csv.gz") for i in range(4)]
     command = [sys.executable, "-m", "airtouch", "gap", "diagnose", str(example / "real.csv.gz"),
                "--baseline", *baseline, "--json", str(out / "it.json"),
                "--report", str(out / "it.html"), "--force"]
     start = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True, preexec_fn=lambda: os.sched_setaffinity(0, processors))
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, VARIABLE: kept},
+                   preexec_fn=lambda: os.sched_setaffinity(0, processors))
     return time.perf_counter() - start
 
 
@@ -39,12 +43,17 @@ def main() -> None:
     every = os.sched_getaffinity(0)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
+        kept = str(out / "kept")
+        rows = {f"{flight} flight, {name}": (processors, cache)
+                for flight, cache in (("first", ""), ("further", kept))
+                for name, processors in ((f"{len(every)} processors", every), ("1 processor", {min(every)}))}
         print("warming up: the first time compiles", file=sys.stderr, flush=True)
-        seconds(every, out)
-        pairs = [(seconds(every, out), seconds({min(every)}, out)) for _ in range(runs)]
-    for name, column in zip((f"{len(every)} processors", "1 processor"), zip(*pairs, strict=True), strict=True):
-        print(f"{name}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")
-    print(f"ratio of the pairs, median: {statistics.median(b / a for a, b in pairs):.2f}")
+        seconds(every, out, kept)
+        rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
+                  for _ in range(runs)]
+    for row in rows:
+        column = [times[row] for times in rounds]
+        print(f"{row}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")
 
 
 if __name__ == "__main__":

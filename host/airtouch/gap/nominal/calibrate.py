@@ -9,6 +9,7 @@ in the torque alone: it stays as declared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from airtouch.gap.nameless.model import nameless_floor
 from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
 from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, split_unlike
+from airtouch.gap.nominal.kept_scatter import kept_scatter
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.study import Study
@@ -91,7 +93,8 @@ def _measured(vehicle: Vehicle, flights: Sequence[Flight], scatter: bool, withou
     study, fitted = _fitted_vehicle(declared, flights)
     study = replace(study, nameless_floor=nameless_floor(Data(study, flights)))
     if scatter:
-        study = replace(study, scatter=baseline_scatter(study, flights, without))
+        measure = partial(baseline_scatter, study, flights, without)
+        study = replace(study, scatter=kept_scatter(vehicle, flights, without, measure))
     return _Measured(flights, declared, study, fitted)
 
 
