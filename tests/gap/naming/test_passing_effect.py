@@ -64,19 +64,26 @@ def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(
     assert [s.name for s in select_from(flights, (), study, ())[0].named] == named
 
 
-def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_nominal_flights_have():
-    """A push all along, harder for half of the flight: the harder half alone gains most, and less beside a mass."""
+@pytest.mark.parametrize("nominal_sizes", [{}, {"mass": [3.0]}])
+def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_nominal_flights_have(nominal_sizes):
+    """A push all along, harder for half of the flight: the harder half alone gains most, and less beside a mass.
+
+    So it does beside a mass that is not named, as nominal flights have it as well.
+    """
     harder = with_a_push(8.0, 23.0, mps2=0.35)
     flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
-    selection, data = select_from(flights, ("mass",), scattered(), ())
+    selection, data = select_from(flights, ("mass",), scattered(**nominal_sizes), ())
     wake, mass = selection.steps
-    assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
-    rates = (nats / data.seconds for nats in (mass.share, wake.share, wake.gain))
+    assert (wake.name, mass.name) == ("downwash", "mass") and mass.named != bool(nominal_sizes)
+    assert wake.share < 0.9 * wake.gain
+    of_mass = 0.0 if nominal_sizes else mass.share
+    assert of_mass < wake.share
+    rates = (nats / data.seconds for nats in (of_mass, wake.share, wake.gain))
     least, share, gain = (size_of(rate, wake.strength.mean) for rate in rates)
 
     def names_where_nominal_flights_have(size):
         """FALSE_SHARE of the nominal flights have a larger one."""
-        study, spread = scattered(), 0.1
+        study, spread = scattered(**nominal_sizes), 0.1
         middle = size - spread * student.ppf(1.0 - FALSE_SHARE, study.scatter.freedom)
         study = replace(study, scatter=replace(study.scatter, passing={"downwash": (middle, spread)}))
         return {s.name for s in select_from(flights, ("mass",), study, ())[0].steps}

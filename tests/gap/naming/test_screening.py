@@ -1,10 +1,14 @@
-"""Which variants may stand beside the effects that are chosen, and what their choice costs."""
+"""Which variants may stand beside the effects that are chosen, what their choice costs, and which are fitted."""
 
 import numpy as np
 import pytest
 
-from airtouch.gap.naming.screening import addable
-from airtouch.gap.signatures.candidates import all_candidates
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.judging import trial_of
+from airtouch.gap.naming.screening import ALIKE, addable, screen_random, start_of
+from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.signatures.candidates import all_candidates, random_of
+from hovers import FLOOR, hover
 
 CANDIDATES = all_candidates()
 
@@ -37,3 +41,15 @@ def test_a_companion_is_not_held_by_itself():
     """Gusts with drag beside them leave the rotors' drag a candidate."""
     gust_with_drag = next(v for v in CANDIDATES["gust"] if len(v) == 2)
     assert addable("rotor_drag", CANDIDATES["rotor_drag"], gust_with_drag)
+
+
+def test_mean_terms_that_screening_cannot_tell_apart_are_all_fitted_with_a_random_part():
+    """Three shapes of a lift: the second is nearly as good as the best, the third is not."""
+    start = start_of(trial_of(Data(FLOOR, [hover(7, length_s=10.0)])), None)
+    variants = addable("ground_effect", CANDIDATES["ground_effect"], ())
+    shapes = [v.terms for v in variants if not random_of(v.terms)][:3]
+    gains = (20.0, 20.0 - 0.9 * ALIKE, 20.0 - 1.1 * ALIKE)
+    means = [Candidate("ground_effect", terms, gain) for terms, gain in zip(shapes, gains, strict=True)]
+    _, fitted = screen_random(start, [v for v in variants if random_of(v.terms)], means, every_random=False)
+    shape_of = {i: terms[0].values for i, terms in enumerate(shapes)}
+    assert {i for v in fitted for i, values in shape_of.items() if v.terms[0].values == values} == {0, 1}

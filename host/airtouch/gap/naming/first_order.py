@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, gap_spectra
-from airtouch.gap.evidence.fit import PRIOR_UNITS, left_over, strongest
+from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem
+from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem, problem_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -26,12 +26,13 @@ UNBOUNDED = 1e6  #: bound of the scaled parameters of effects beside, larger tha
 class Remainder:
     """What a hypothesis, fitted on the other half of the flights, leaves of this one.
 
-    problem: how likely the n flattened values of this half are; residual (n,): what is left of them, complex;
-    extra_power (n,): what the hypothesis adds to their expected power; level: log likelihood of the residual less the
-    flights' offsets; cost: nats that these offsets cost.
+    problem: how likely the n flattened values of this half are; values (n,): what is left of them, complex; residual
+    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power; level:
+    log likelihood of the residual; cost: nats that the offsets cost.
     """
 
     problem: Problem
+    values: np.ndarray
     residual: np.ndarray
     extra_power: np.ndarray
     level: float
@@ -52,10 +53,10 @@ class FirstOrder:
 
 def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder:
     """What effects with these parameters leave of a part of the flights."""
-    problem, residual, power = left_over(data, part, terms)
-    extra_power = power - problem.power
-    values, cost = without_offsets(problem, residual, extra_power)
-    return Remainder(problem, residual, extra_power, problem.likelihood(values, extra_power), cost)
+    problem = problem_of(data, part)
+    values, extra_power, _ = problem.modelled(terms)
+    residual, cost = without_offsets(problem, values, extra_power)
+    return Remainder(problem, values, residual, extra_power, problem.likelihood(residual, extra_power), cost)
 
 
 def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], beside: Sequence[Term] = (),
@@ -73,8 +74,8 @@ def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
     for train, test in ROUND_TRIP:
         x, variance = _least_squares(halves[train], tables[train], bounds)
         held_out = halves[test]
-        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.residual)))
-        after, cost = without_offsets(held_out.problem, held_out.residual + moved, held_out.extra_power)
+        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
+        after, cost = without_offsets(held_out.problem, held_out.values + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.level + held_out.cost
         fitted.append(x[:k])
         variances.append(variance[:k])
@@ -142,19 +143,19 @@ def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[np.ndarray, np.ndarray],
                    ) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled parameters (k,) that explain the residual of a half best, and their variances (k,).
+    """Scaled parameters (k,) that explain the values of a half best, and their variances (k,).
 
     table: change (n,) of the spectra per scaled parameter, k of them; bounds: lowest and highest parameters (k,).
     """
     size, constants = len(table), half.problem.unit_offsets
     columns = np.array([*table, *(-c for c, _ in constants)])
     prior = np.concatenate([np.full(size, PRIOR_UNITS), [deviation for _, deviation in constants]])
-    x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.residual
+    x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.values
     for _ in range(ROUNDS):
         weights = weights_of(half.problem, values, half.extra_power)
         equations = normal_equations(columns, prior, values, weights, np.concatenate([x, offsets]))
         change, covariance = bounded_step(equations, x, bounds)
         x = np.clip(x + change[:size], *bounds)
         offsets = offsets + change[size:]
-        values = half.residual + np.concatenate([x, offsets]) @ columns
+        values = half.values + np.concatenate([x, offsets]) @ columns
     return x, np.diag(covariance)

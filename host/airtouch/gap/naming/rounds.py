@@ -60,7 +60,8 @@ def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     """
     screened = screen_variants(start, candidates, progress)
     means = _best_variants(screened.means)
-    unpromising, random = screen_random(start, screened.random, means, every_random)
+    by_gain = sorted(screened.means, key=lambda c: -c.gain)
+    unpromising, random = screen_random(start, screened.random, by_gain, every_random)
     to_fit, not_fitted = _by_promise(means + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.choice_cost) for c in to_fit]
     return [*screened.unseen, *random, *means_to_fit], not_fitted

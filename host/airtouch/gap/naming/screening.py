@@ -16,6 +16,9 @@ from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term, Terms
 
 HOPELESS = 0.5  #: nats that an effect must gain in screening to be fitted; chosen
+#: nats by which variants of an effect must differ in screening for the worse not to be fitted with its random part;
+#: chosen: odds of 20, as between candidates (`answer.ranking.CLOSE`)
+ALIKE = 3.0
 
 
 class ScreenedRandom(NamedTuple):
@@ -144,34 +147,57 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
     """Variants with a random effect: of candidates that promise little as hypotheses, of others those to be fitted.
 
     Of a candidate that promises more than HOPELESS nats, or of every one if `every_random`, the variant that gains most
-    in screening is fitted, with the longer ones that begin with the same term. means: mean effects judged to first
-    order, best first; a candidate that is among them says by that how little it promises.
+    in screening is fitted, with the longer ones that begin with the same term. Where it begins with a mean term, so is
+    the best with each other mean term that is about as good. means: mean effects judged to first order, best first; a
+    candidate that is among them says by that how little it promises.
     """
-    mean_of: dict[str, Candidate] = {}
-    for mean in means:
-        if len(mean.terms) == len(start.terms) + 1:
-            mean_of.setdefault(mean.name, mean)
+    means_of = _about_as_good(means, len(start.terms) + 1)
     unpromising, to_fit = [], []
-    for name, screened in _screened_random_by_name(start, variants, mean_of).items():
+    for name, screened in _screened_random_by_name(start, variants, means_of).items():
         best = max(screened, key=lambda s: s.gain)
-        mean_promises = name in mean_of and mean_of[name].gain - start.gain > HOPELESS
+        mean_promises = name in means_of and means_of[name][0].gain - start.gain > HOPELESS
         if every_random or best.gain > HOPELESS or mean_promises:
-            to_fit += [best.variant, *_longer(best.variant, variants)]
-        elif name not in mean_of:
+            chosen = [one.variant for one in _best_by_mean_term(screened)]
+            to_fit += [v for one in chosen for v in (one, *_longer(one, variants))]
+        elif name not in means_of:
             unpromising.append(_as_judged(start, best))
     return unpromising, to_fit
 
 
-def _screened_random_by_name(start: RoundStart, variants: Iterable[PricedVariant], mean_of: Mapping[str, Candidate],
-                          ) -> dict[str, list[ScreenedRandom]]:
+def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Candidate]]:
+    """By name, the best hypothesis of so many terms, and those of the same effect less than ALIKE nats behind it.
+
+    means: best first.
+    """
+    out: dict[str, list[Candidate]] = {}
+    for mean in means:
+        if len(mean.terms) == length:
+            best = out.setdefault(mean.name, [])
+            if not best or best[0].gain - mean.gain < ALIKE:
+                best.append(mean)
+    return out
+
+
+def _best_by_mean_term(screened: Sequence[ScreenedRandom]) -> list[ScreenedRandom]:
+    """The best variant with each mean term; the best of all where variants have none."""
+    best: list[ScreenedRandom] = []
+    for one in sorted(screened, key=lambda s: -s.gain):
+        first = one.variant.terms[0]
+        if not best or (first.shows_in == MEAN and not any(_same(first, b.variant.terms[0]) for b in best)):
+            best.append(one)
+    return best
+
+
+def _screened_random_by_name(start: RoundStart, variants: Iterable[PricedVariant],
+                             means_of: Mapping[str, Sequence[Candidate]]) -> dict[str, list[ScreenedRandom]]:
     """By name, the variants of every candidate whose random part stands alone or beside one mean term.
 
-    mean_of: the best variant of a mean effect, by name; where there is one, only that variant of the mean term counts.
+    means_of: the best variants of a mean effect, by name; where there are any, only these count as the mean term.
     """
     screened: dict[str, list[ScreenedRandom]] = {}
     for variant in variants:
         name, terms, cost = variant
-        if name in mean_of and not _same(terms[0], mean_of[name].terms[-1]):
+        if name in means_of and not any(_same(terms[0], m.terms[-1]) for m in means_of[name]):
             continue
         if len(terms) == 1 or terms[0].shows_in == MEAN:
             gain, strength = judge_random(start.halves, random_of(terms)[0])

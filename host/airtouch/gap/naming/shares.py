@@ -18,11 +18,14 @@ from airtouch.gap.signatures.term import Term
 
 
 def with_shares(trial: Trial, steps: Sequence[Step]) -> list[Step]:
-    """The steps of a selection, those that are named with their `share`, nats, where there are several."""
-    if sum(s.named for s in steps) < 2:
-        return list(steps)
-    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place)) if s.named else s
-            for place, s in enumerate(steps)]
+    """The steps of a selection, with the `share`, nats, of those that stand beside others.
+
+    These are all that are named, where there are several, and one that comes and goes beside any other: what is as
+    strong as in nominal flights may have its seconds as well.
+    """
+    several = sum(s.named for s in steps) > 1
+    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place))
+            if s.named and (several or (s.key and len(steps) > 1)) else s for place, s in enumerate(steps)]
 
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
