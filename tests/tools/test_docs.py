@@ -78,6 +78,13 @@ def test_every_page_can_be_reached_from_the_readme():
     assert {p.name for p in DOCS.glob("*.md")} <= reached, {p.name for p in DOCS.glob("*.md")} - reached
 
 
+def test_the_first_page_and_the_site_list_every_page_in_the_same_order():
+    listed = re.findall(r"\]\(([\w-]+\.md)\)", (DOCS / "index.md").read_text("utf-8"))
+    site = (ROOT / "host/mkdocs.yml").read_text("utf-8")
+    assert ["index.md", *listed] == re.findall(r"- ([\w-]+\.md)", site[site.index("nav:"):])
+    assert sorted(["index.md", *listed]) == sorted(p.name for p in DOCS.glob("*.md"))
+
+
 def test_lines_are_no_longer_than_they_may():
     for name in ("tutorial", "python", "glossary", "dask"):
         long = [line for line in (DOCS / f"{name}.md").read_text("utf-8").splitlines() if len(line) > 170

@@ -50,19 +50,19 @@ def test_prior_decides_where_all_blocks_are_flown_alike():
     power, _ = draw_swings(0.0, 40)
     slopes = slopes_of(power, np.full(40, 1.3), FREQUENCY)
     assert slopes.slope == pytest.approx(1.0)  # its mean: errors are a share of what is flown
-    assert slopes.level(np.full(3, 1.3)) == pytest.approx(1.0)
+    assert slopes.relative_power(np.full(3, 1.3)) == pytest.approx(1.0)
 
 
 def test_level_divides_out_hardness_within_the_trusted_range_only():
     power, hardness = draw_swings(2.0, 400)
     slopes = slopes_of(power, hardness, FREQUENCY)
-    even = power / slopes.level(hardness)
+    even = power / slopes.relative_power(hardness)
     wide = FREQUENCY >= BANDS_HZ[2]
     low, high = (even[k][:, wide, 0].mean() for k in (hardness < 0.5, hardness > 1.5))
     assert high / low == pytest.approx(1.0, abs=0.2)
     assert power[hardness > 1.5][:, wide, 0].mean() / power[hardness < 0.5][:, wide, 0].mean() > 10.0
     edge = np.array([hardness.min() - CALMER, hardness.max() + HARDER])
-    assert slopes.level(np.array([-50.0, 50.0])) == pytest.approx(slopes.level(edge))
+    assert slopes.relative_power(np.array([-50.0, 50.0])) == pytest.approx(slopes.relative_power(edge))
 
 
 def test_a_flight_flown_unlike_its_baseline_is_said_so():

@@ -68,9 +68,9 @@ def spectrum(effects):
     total = 0.0
     for log in simulated(scenario.parse(LONG, "long hover"), 8, vehicle=VEHICLE, effects=effects, workers=1):
         commands = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ command_spectra.MIX.T
-        f, power = welch(commands[500:6000, :3], 100.0, nperseg=command_spectra.LENGTH, axis=0)
+        f, power = welch(commands[500:6000, :3], 100.0, nperseg=command_spectra.COMMAND_LENGTH, axis=0)
         total = total + power
-    return total[np.isin(f, command_spectra.frequencies())]
+    return total[np.isin(f, command_spectra.command_frequencies())]
 
 
 @pytest.mark.parametrize("effects", [
@@ -83,7 +83,7 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     for i, axis in enumerate(controller.AXES):
         strengths = identify.noise_strengths(
             controller.firmware(row, axis), axis_plant(row, axis), nominal[:, i]).strengths
-        f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
+        f, fine = command_spectra.command_frequencies(), command_spectra.fine_frequencies()
         expected = command_spectra.through_window(strengths @ noise_spectra.noise_power(
             controller.firmware(with_effects, axis), axis_plant(with_effects, axis), fine))
         expected /= command_spectra.through_window(strengths @ noise_spectra.noise_power(

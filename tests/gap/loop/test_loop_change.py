@@ -96,7 +96,7 @@ def in_bands(x):
 def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
     f = frequencies(AIR)
     law = (nominal().response.quiet_law, nominal().response.stepped_law)[stepped]
-    predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f), stepped)[:, 1]
+    predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f))[:, 1]
     simulated = shares(name)[stepped] / shares(None)[stepped]
     band = (f > low) & (f < high)
     predicted, simulated = (in_bands(x[band]) for x in (predicted, simulated))
@@ -134,7 +134,7 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     fine = command_spectra.fine_frequencies()
     by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, axis_plant(row, "roll"), fine))
     predicted = law.strengths[1][0] * by_sensor[0] / (law.strengths[1] @ by_sensor)
-    f = command_spectra.frequencies()
+    f = command_spectra.command_frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):
         band = (f > low) & (f < high)
         np.testing.assert_allclose(predicted[band].mean(), (gyro / all_sensors)[band].mean(), atol=0.12)

@@ -1,6 +1,7 @@
 """How the gyro follows logged commands: against the closed forms of errors in variables and of a closed loop."""
 
 import numpy as np
+import pytest
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready_flights
@@ -91,6 +92,21 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
     np.testing.assert_allclose(np.abs(response.stepped_law.coherent), 1.0 / 3.0, atol=0.05)
     variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
     np.testing.assert_allclose(np.median(response.stepped_law.weight), np.sqrt(variances[0] / variances[1]), rtol=0.1)
+
+
+@pytest.mark.parametrize("strength", [1.0, 1.8, 2.0, 3.0])
+def test_flights_that_differ_so_much_that_an_axis_is_never_quiet_have_no_response(strength):
+    """The share is 1/2 in all flights; two short ones are flown harder, so that no block is like those of the others.
+
+    Without quiet blocks there is neither a share nor a floor to weight other blocks to: it would weight them by 0.
+    """
+    rng = np.random.default_rng(8)
+    long, short = flights(rng, 1.0, 1.0, 1, 40), flights(rng, 1.0, 1.0, 2, 8)
+    felt, commands = ([*a, *(strength * x for x in b)] for a, b in zip(long, short, strict=True))
+    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    assert (response is None) == (strength > 1.0)
+    if response is not None:
+        np.testing.assert_allclose(np.median(np.abs(response.quiet_law.coherent), axis=0), 0.5, atol=0.02)
 
 
 def test_turning_under_an_outside_torque_is_the_closed_loop_s():

@@ -16,7 +16,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.edge_decoder import DecoderConfig
 
 #: The fields of a recipe that differ where training goes on from a model: fewer steps, at a quarter of the rate of a
-#: full training. Chosen; what ten labelled flights gain with them is in host/docs/train.md.
+#: full training. Chosen; what ten labelled flights gain with them is in host/docs/results.md.
 FINE_TUNING: dict[str, Any] = {"steps": 300, "peak_rate": 1e-3}
 
 #: progress(stage, done, total, note), stage "features" (flights) or "steps"

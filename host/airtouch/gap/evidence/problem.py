@@ -74,7 +74,7 @@ class Problem:
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.means_only))
         self.commands = view_of(data.study.controller, data.flights, data.first, part.pieces)
-        noise = self.layout.gather([{r: data.study.floor.level(f, b[r], r) for r in b}
+        noise = self.layout.gather([{r: data.study.floor.of_blocks(f, b[r], r) for r in b}
                                     for f, b in zip(data.flights, data.first, strict=True)]).real
         replay = _of_replay(data, self.layout, noise)
         self.replay_count = len(replay.base)

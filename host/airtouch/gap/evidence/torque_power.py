@@ -14,7 +14,8 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies, squared
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.simulation.effects import Active
 
-#: relative error of the loop model in a change of the torque by effects that change the loop; chosen (host/docs/gap.md)
+#: relative error of the loop model in a change of the torque by effects that change the loop; chosen
+#: (host/docs/gap-method.md)
 TORQUE_DOUBT = 0.25
 
 

@@ -40,7 +40,7 @@ class Slopes:
     mean: float
     hardest: float
 
-    def level(self, hardness: np.ndarray) -> np.ndarray:
+    def relative_power(self, hardness: np.ndarray) -> np.ndarray:
         """Power (blocks, bins, COUNT) relative to that at the mean hardness of nominal flights.
 
         A flight calmer or harder than every nominal one has a floor as far beyond theirs as the slopes are trusted.

@@ -18,11 +18,11 @@ from airtouch.gap.flights.hardness import Slopes, hardness_of
 from airtouch.gap.loop.axis_plant import PlantRow, axis_plant
 from airtouch.gap.loop.command_response import fitted_step
 from airtouch.gap.loop.command_spectra import (
-    LENGTH,
+    COMMAND_LENGTH,
     block_spectra,
+    command_frequencies,
     commands,
     fine_frequencies,
-    frequencies,
     through_window,
 )
 from airtouch.gap.loop.controller import AXES, TURNING, Controller, firmware_of
@@ -81,7 +81,7 @@ class ClosedLoop:
     def levelled_spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """First samples and spectra (blocks, bins, AXES) of a flight's commands as if flown as hard as nominal ones."""
         first, spectra = block_spectra(flight, self.vehicle)
-        return first, spectra / np.sqrt(self.slopes.level(hardness_of(flight, first, LENGTH)))
+        return first, spectra / np.sqrt(self.slopes.relative_power(hardness_of(flight, first, COMMAND_LENGTH)))
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
@@ -119,7 +119,7 @@ class ClosedLoop:
         f = np.fft.rfftfreq(len(logged), PERIOD_S)
         spectrum = np.fft.rfft(logged, axis=0)
         for i in range(len(AXES)):
-            spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
+            spectrum[:, i] /= np.sqrt(np.interp(f, command_frequencies(), ratio[:, i]))
         return np.fft.irfft(spectrum, len(logged), axis=0)
 
     def nominal_power(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
-LENGTH = 128  #: samples of a block, 1.28 s; chosen
+COMMAND_LENGTH = 128  #: samples of a block, 1.28 s; chosen
 BAND_HZ = (1.5, 40.0)  #: below it set-points, which no log holds, move the commands; chosen
 HIGHPASS_HZ = 0.6  #: below it the commands are filtered out before blocks are cut; chosen
 PADDING = 60  #: samples that the filter mirrors at each end of a flight; chosen
@@ -39,9 +39,9 @@ def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndar
 def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     """`block_spectra`, worked out."""
     first = starts(flight)
-    window, scale = hann_window(LENGTH)
+    window, scale = hann_window(COMMAND_LENGTH)
     logged = commands(flight, vehicle)[:, :len(AXES)]
-    cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
+    cut = logged[first[:, None] + np.arange(COMMAND_LENGTH)] if len(first) else np.zeros((0, COMMAND_LENGTH, len(AXES)))
     spectra = np.fft.rfft(cut * window, axis=1)[:, _judged()] * scale
     level = _without_step(np.abs(spectra) ** 2)
     return first[level], spectra[level]
@@ -60,7 +60,7 @@ def highpassed(values: np.ndarray) -> np.ndarray:
 
 def starts(flight: Flight) -> np.ndarray:
     """First samples of the blocks, half overlapping."""
-    return half_overlapping(count_within(~steady(flight), LENGTH) == 0, LENGTH)
+    return half_overlapping(count_within(~steady(flight), COMMAND_LENGTH) == 0, COMMAND_LENGTH)
 
 
 def steady(flight: Flight) -> np.ndarray:
@@ -97,14 +97,14 @@ def typical(power: np.ndarray) -> np.ndarray:
 
 
 @cache
-def frequencies() -> np.ndarray:
+def command_frequencies() -> np.ndarray:
     """Hz of the bins that are judged; not to be changed."""
     return _constant(_all_frequencies()[_judged()])
 
 
 def _all_frequencies() -> np.ndarray:
-    """Frequencies (LENGTH / 2 + 1,) of a block, Hz."""
-    return np.fft.rfftfreq(LENGTH, PERIOD_S)
+    """Frequencies (COMMAND_LENGTH / 2 + 1,) of a block, Hz."""
+    return np.fft.rfftfreq(COMMAND_LENGTH, PERIOD_S)
 
 
 def _judged() -> np.ndarray:
@@ -115,7 +115,7 @@ def _judged() -> np.ndarray:
 @cache
 def fine_frequencies() -> np.ndarray:
     """FINE points a bin, REACH bins beyond first and last: what a block's window mixes. Not to be changed."""
-    f = frequencies()
+    f = command_frequencies()
     step = (f[1] - f[0]) / FINE
     return _constant(f[0] + step * np.arange(-REACH * FINE, (len(f) - 1 + REACH) * FINE + 1))
 

@@ -20,10 +20,10 @@ from airtouch.gap.flights.hardness import hardness_of, slopes_of
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, axis_plant
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.loop.command_spectra import (
-    LENGTH,
+    COMMAND_LENGTH,
     block_spectra,
+    command_frequencies,
     fine_frequencies,
-    frequencies,
     through_window,
     typical,
 )
@@ -67,10 +67,11 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     by_flight = [block_spectra(f, vehicle) for f in flights]
     if sum(len(first) for first, _ in by_flight) < FEWEST:
         return None
-    hardness = np.concatenate([hardness_of(f, first, LENGTH) for f, (first, _) in zip(flights, by_flight, strict=True)])
+    hardness = np.concatenate([hardness_of(f, first, COMMAND_LENGTH)
+                               for f, (first, _) in zip(flights, by_flight, strict=True)])
     powers = np.abs(np.concatenate([s for _, s in by_flight])) ** 2
-    slopes = slopes_of(powers, hardness, frequencies())
-    power = typical(powers / slopes.level(hardness))
+    slopes = slopes_of(powers, hardness, command_frequencies())
+    power = typical(powers / slopes.relative_power(hardness))
     row = prepare(vehicle, calibration)[0][0]
     documented = [noise_strengths(firmware(row, a), axis_plant(row, a), power[:, i]) for i, a in enumerate(AXES)]
     searched = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]

@@ -29,7 +29,7 @@ FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
 #: the same of simulated flights, which have no trim of their own: six of the deviations of 60 nominal flights of the
 #: scenario `diagnosis` and more. With FAR a flight that lands on an edge hid masses of 5 % (gap-blind.md, seed 112233)
 FAR_SIMULATED = 0.1 * FAR
-#: range of the baseline flights' trims that a note mentions, m/s^2 and rad/s^2 (gap.md); chosen
+#: range of the baseline flights' trims that a note mentions, m/s^2 and rad/s^2 (host/docs/gap-floor.md); chosen
 APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])
 SURE = 6.0  #: standard errors of a flight's trim that this range must exceed as well; chosen
 PARTS = 8  #: equal parts of a flight, whose means give the trim's standard error

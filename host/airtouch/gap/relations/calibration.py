@@ -25,9 +25,9 @@ from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
 NOMINAL_FLIGHTS = 300  #: whose distances are measured
-CLASS_FLIGHTS = 80  #: of each class (host/docs/gap.md, "How far right names lie"); those that show it count
+CLASS_FLIGHTS = 80  #: of each class (host/docs/gap-relations.md, "How far right names lie"); those that show it count
 WITH_SECOND = 12  #: of them, those beside whose effect a second one is tried
-FLIGHTS_OF_TWO = 150  #: flights with two effects (host/docs/gap.md, there)
+FLIGHTS_OF_TWO = 150  #: flights with two effects (host/docs/gap-relations.md, there)
 FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
 NUMBERS_OF_CLASS = 1000  #: numbers that each class has of its own
 RANGE_OF_TWO = 30.0  #: factor between the highest and the lowest strength of two effects that act together

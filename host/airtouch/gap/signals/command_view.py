@@ -19,12 +19,11 @@ import numpy as np
 from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, frequencies
+from airtouch.gap.loop.command_spectra import COMMAND_LENGTH, FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.channels import COMMAND
 from airtouch.gap.signals.floor_correction import correction_of, smooth_shapes
-from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
-from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
+from airtouch.gap.signals.spectra import AIR, LENGTH, OVERLAP_WEIGHT
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge
@@ -122,7 +121,8 @@ class CommandView:
             return gradient, information
         floor, ratio = self.loop.floor, self.loop.ratio(active)
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
-            up, down = (self._level(floor, ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
+            up, down = (self._log_likelihood(floor, ratio * np.exp(sign * SMALL * rise[i]), wide)
+                        for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
         for s in self.powers:
             correction = correction_of(s, floor, ratio, wide)
@@ -132,7 +132,7 @@ class CommandView:
                 information += correction.weight * slope @ slope.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
-    def _level(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> float:
+    def _log_likelihood(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> float:
         """Log likelihood of the spectra, less the costs of the floor's correction.
 
         floor, ratio (bins, AXES): power in nominal flights, and by what effects multiply it.
@@ -155,7 +155,7 @@ def view_of(loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[
     """
     if loop is None:
         return CommandView(None, _joined(()))
-    in_air = [(i, first[i][AIR] + AIR_LENGTH[AIR] // 2, chosen) for i, state, chosen in pieces
+    in_air = [(i, first[i][AIR] + LENGTH[AIR] // 2, chosen) for i, state, chosen in pieces
               if state == AIR and chosen.any()]
     by_flight = [(i, _chosen_spectra(loop, flights[i], middle, chosen)) for i, middle, chosen in in_air]
     by_flight = [(i, s) for i, s in by_flight if len(s)]
@@ -182,7 +182,7 @@ def _chosen_spectra(loop: ClosedLoop, flight: Flight, middle: np.ndarray, chosen
     begin, spectra = loop.levelled_spectra(flight)
     if not len(begin):
         return spectra
-    return spectra[chosen[[_nearest(middle, b + LENGTH // 2) for b in begin]]]
+    return spectra[chosen[[_nearest(middle, b + COMMAND_LENGTH // 2) for b in begin]]]
 
 
 def _of_blocks(loop: ClosedLoop, number: int, spectra: np.ndarray) -> CommandElements:
@@ -193,7 +193,7 @@ def _of_blocks(loop: ClosedLoop, number: int, spectra: np.ndarray) -> CommandEle
 
     return CommandElements(
         values=spectra.ravel(), floor=each(loop.floor), channel=each(COMMAND.start + np.arange(len(AXES))),
-        frequency=each(frequencies()[:, None]), flight=np.full(spectra.size, number),
+        frequency=each(command_frequencies()[:, None]), flight=np.full(spectra.size, number),
         freedom=np.full(spectra.size, FREEDOM))
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit
 
-from airtouch.gap.loop.command_spectra import FREEDOM, frequencies
+from airtouch.gap.loop.command_spectra import FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
@@ -61,7 +61,7 @@ def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, wide:
 @cache
 def smooth_shapes() -> np.ndarray:
     """Smooth shapes (SHAPES, bins) over the logarithm of frequency: level, slope, slow waves. Not to be changed."""
-    x = np.log(frequencies())
+    x = np.log(command_frequencies())
     x = (x - x[0]) / (x[-1] - x[0])
     return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])
 

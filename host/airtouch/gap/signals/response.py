@@ -36,7 +36,7 @@ from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: bins below it hold the means, which the Hann window spreads over two bins: there q is 1
-FEWEST = 8  #: blocks of nominal flights that a law needs; chosen
+FEWEST = 8  #: blocks of nominal flights that a response, and a law of stepped blocks, needs; chosen
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
@@ -47,6 +47,7 @@ ANSWER_DOUBT = 0.2
 #: of its own loop (host/docs/looks.md, 2026-11-24 03:20)
 SHARE_DOUBT = 0.2
 NOISE = 0.2  #: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; chosen
+FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a single one is 1, whatever is in it
 
 
 @dataclass(frozen=True)
@@ -82,13 +83,14 @@ class OutsideTorque(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """How the measured torque follows the modelled one in blocks of one kind, quiet or stepped; (bins, 3) each.
+    """How the measured torque follows the modelled one in blocks of one kind; (bins, 3) each, but the kind.
 
-    transfer: q, coherent: q~ (both in the module's equations), complex, without unit; outside: what the residual has of
-    a torque from outside; weight: rms floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww,
-    (rad/s^2)^2/Hz.
+    kind: of the blocks that it was measured in and holds for, QUIET or STEPPED. transfer: q, coherent: q~ (both in the
+    module's equations), complex, without unit; outside: what the residual has of a torque from outside; weight: rms
+    floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz.
     """
 
+    kind: int
     transfer: np.ndarray
     coherent: np.ndarray
     outside: OutsideTorque
@@ -100,15 +102,16 @@ class Law:
         """`coherent`, of a size of 1 at most (bins, 3): the part that is seen of what effects add by the commands."""
         return self.coherent / np.maximum(np.abs(self.coherent), 1.0)
 
-    def ratio(self, change: Change, kind: int) -> np.ndarray:
-        """Ratio c (bins, 3) of q with effects that change the loop to q without. kind: QUIET or STEPPED.
+    def ratio(self, change: Change) -> np.ndarray:
+        """Ratio c (bins, 3) of q with effects that change the loop to q without.
 
         A share a of the commands follows the loop model, the others turn the vehicle as they say: q = a before + 1 - a,
         with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, with a prior at 1
         of a spread SHARE_DOUBT in q. In yaw c becomes 1 + (c - 1) / max(|q~|, 1)^2: where |q~| exceeds 1 it is mostly
         noise of the gyro, which effects do not change.
         """
-        before, after = change.before[kind], change.motors * change.share[kind] * change.before[kind]
+        before = change.before[self.kind]
+        after = change.motors * change.share[self.kind] * before
         off_one = before - 1.0
         along = ((self.transfer * change.logged - 1.0) * off_one.conj()).real
         a = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(off_one) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
@@ -116,9 +119,9 @@ class Law:
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.coherent[:, 2]), 1.0) ** 2
         return out
 
-    def residual(self, torque: TorqueSpectra, change: Change | None, kind: int) -> np.ndarray:
-        """Weighted residual (blocks, bins, 3) of blocks of this law's kind. change, kind: see `ratio`."""
-        c = 1.0 if change is None else self.ratio(change, kind)
+    def residual(self, torque: TorqueSpectra, change: Change | None) -> np.ndarray:
+        """Weighted residual (blocks, bins, 3) of blocks of this law's kind. change: see `Response.with_residual`."""
+        c = 1.0 if change is None else self.ratio(change)
         modelled = torque.measured - torque.residual
         residual = torque.measured - self.coherent * c * modelled
         if torque.by_command is not None:
@@ -155,11 +158,11 @@ class Response:
         spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
         change: by effects that change the loop.
         """
-        residual = self.quiet_law.residual(torque, change, QUIET)
+        residual = self.quiet_law.residual(torque, change)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
         if len(with_step):
             stepped = np.full(residual[with_step].shape, np.nan) if self.stepped_law is None else \
-                self.stepped_law.residual(torque.of_blocks(with_step), change, STEPPED)
+                self.stepped_law.residual(torque.of_blocks(with_step), change)
             residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
         out = spectra.copy()
         out[:, FIRST_BIN:, TORQUE] = residual[:, FIRST_BIN:]
@@ -194,7 +197,9 @@ class Response:
 
 
 def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray], loop: Disturbed) -> Response | None:
-    """The response of nominal flights from their spectra (blocks, bins, 3); None for too few blocks.
+    """The response of nominal flights from their spectra (blocks, bins, 3); None for too few blocks, or too few quiet.
+
+    The latter are few on an axis where flights differ in strength so much that none is like the others.
 
     measured, residuals: angular acceleration, and measured minus modelled one, of each flight. loop: what it makes of a
     torque from outside.
@@ -205,16 +210,18 @@ def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray],
         return None
     modelled = [m - r for m, r in zip(measured, residuals, strict=True)]
     power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
-    quiet_law, floor = _law(y, w, quiet, loop, None)
+    if quiet.sum(axis=0).min() < FEWEST_QUIET:
+        return None
+    quiet_law, floor = _law(QUIET, y, w, quiet, loop, None)
     stepped_law = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
-        stepped_law, _ = _law(y, w, ~quiet, loop, floor)
+        stepped_law, _ = _law(STEPPED, y, w, ~quiet, loop, floor)
     return Response(QuietPower(_smooth(power.mean), power.calm), quiet_law, stepped_law)
 
 
-def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
+def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
          ) -> tuple[Law, np.ndarray]:
-    """Law of the chosen blocks (blocks, 3), and their floor (bins, 3).
+    """Law of the blocks of a kind, which are chosen for each axis, bool (blocks, 3), and their floor (bins, 3).
 
     y, w: measured and modelled torque of all blocks. floor: to which the law weights them; None for their own.
     """
@@ -235,7 +242,7 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floo
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
     remains = loop.measured - answer
     outside = OutsideTorque(remains, np.abs(remains) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2)
-    return Law(transfer, coherent, outside, weight, _smooth(power)), own_floor
+    return Law(kind, transfer, coherent, outside, weight, _smooth(power)), own_floor
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

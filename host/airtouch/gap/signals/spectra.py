@@ -108,12 +108,12 @@ class Floor:
     least_power: np.ndarray | float = 0.0
     offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
 
-    def level(self, flight: Flight, first: np.ndarray, state: str) -> np.ndarray:
+    def of_blocks(self, flight: Flight, first: np.ndarray, state: str) -> np.ndarray:
         """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
         power = self.power[state]
         if self.slopes is None or state != AIR:
             return np.broadcast_to(power, (len(first), *power.shape))
-        return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least_power)
+        return np.maximum(power * self.slopes.relative_power(hardness_of(flight, first, LENGTH[AIR])), self.least_power)
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _power_in_air(nominal: Sequence[NominalBlocks], power: np.ndarray) -> tuple[
     trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= TORQUE.start)
     slopes = slopes_of(power, hardness, frequencies(AIR), trim)
     own = np.maximum(power - np.concatenate([n.bridging for n in nominal]), LEAST_LEFT * power)
-    return own / slopes.level(hardness), slopes
+    return own / slopes.relative_power(hardness), slopes
 
 
 def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop.command_spectra import block_spectra, frequencies
+from airtouch.gap.loop.command_spectra import block_spectra, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.vehicle import Vehicle
 
@@ -43,7 +43,7 @@ class MeanSpectra:
 def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower]) -> MeanSpectra | None:
     """Mean spectra of some flights and of nominal ones; None without a steady stretch in flight."""
     of_flown, of_nominal = _mean_by_axis(flown), _mean_by_axis(nominal)
-    return MeanSpectra(frequencies(), of_flown, of_nominal) if of_flown else None
+    return MeanSpectra(command_frequencies(), of_flown, of_nominal) if of_flown else None
 
 
 def _mean_by_axis(powers: Sequence[CommandPower]) -> dict[str, np.ndarray]:
