@@ -12,6 +12,7 @@ from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.contradiction import contradicted, losses
+from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.selection import Contradiction
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import REST
@@ -38,7 +39,7 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     assert selection.contradicted == Contradiction(), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
     exact = replace(
-        selection, nominal=replace(selection.nominal, simulated=True, count=6), steps=(weaker,),
+        selection, policy=policy_of(replace(data.study, nominal_count=6), data.seconds), steps=(weaker,),
         nameless=replace(selection.nameless, over_last_step=1.0), contradicted=Contradiction(loss, worst))
     assert exact.against_over_limit == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5

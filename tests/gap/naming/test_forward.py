@@ -3,8 +3,8 @@
 import pytest
 
 from airtouch.gap.naming import forward as module
-from airtouch.gap.naming.forward import MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN, Search, forward
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN
+from airtouch.gap.naming.forward import Search, forward
+from airtouch.gap.naming.policy import FIRST_GAIN, LEAST_GAIN, MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN
 from airtouch.gap.naming.selection import Candidate
 
 

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
-from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing import gates, stretches
 from airtouch.gap.result import Cell

@@ -1,6 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
-from airtouch.gap.naming.judging import FIRST_GAIN
+from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.selection import Candidate, Selection, Step
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
@@ -71,7 +71,7 @@ def against(selection: Selection) -> str:
     lost, worst = selection.contradicted
     if selection.loss_over_chance == selection.against_over_limit:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
-                f"{selection.least_left:.0f} may be chance")
+                f"{selection.policy.unknown.least:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")
 
 

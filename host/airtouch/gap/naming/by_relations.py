@@ -7,9 +7,10 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
-from airtouch.gap.naming.judging import FIRST_GAIN, Trial
+from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, NamelessGain, NominalFlights, Selection, Step
+from airtouch.gap.naming.selection import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.term import Terms
@@ -46,7 +47,7 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
     return Selection(
         singles=alone, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
         least_gain=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
-        nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
+        policy=trial.policy)
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

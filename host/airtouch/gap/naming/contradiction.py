@@ -4,11 +4,8 @@ import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, cell_words, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
-from airtouch.gap.naming.selection import UNKNOWN_ASSUMED, Candidate, Contradiction
-
-#: nats that a right effect may lose in a cell by chance; chosen: by the bound in `losses` the chance of more is at most
-#: 37 %
-CHANCE_LOSS = 1.0
+from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
+from airtouch.gap.naming.selection import Candidate, Contradiction
 
 
 def contradicted(trial: Trial, chosen: Candidate | None) -> Contradiction:

@@ -3,19 +3,22 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
+from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.policy import (
+    CERTAIN,
+    FIRST_GAIN,
+    LEAST_GAIN,
+    MOST_DEVIATIONS,
+    MOST_EFFECTS,
+    TEMPERATURE,
+    WORTH_AGAIN,
+)
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import TEMPERATURE, Candidate, Step
+from airtouch.gap.naming.selection import Candidate, Step
 from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
-
-MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
-MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`_worth_adding`); chosen
-CERTAIN = 20.0  #: nats of evidence beyond which more does not rank a candidate higher (`_best_of`); chosen
-#: of FIRST_GAIN: candidates that gained less are not judged again beside a deviation; chosen, to save their fits
-WORTH_AGAIN = 0.25
 
 
 @dataclass(frozen=True)

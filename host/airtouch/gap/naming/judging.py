@@ -13,6 +13,7 @@ from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
+from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
@@ -21,12 +22,6 @@ from airtouch.gap.signatures.term import Term, Terms
 
 GROUP = 3  #: neighbouring blocks that stay in one half, which is 5 s; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
-#: nats of held-out data that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap.md)
-LEAST_GAIN = 12.0
-#: the same for the first effect, against a floor from nominal flights; chosen, after 6 nats had given 4 false alarms on
-#: 46 flights of a fresh set (2026-11-21)
-FIRST_GAIN = 8.0
-PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
 NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound; chosen: fits end just short of one
 
 
@@ -42,19 +37,23 @@ class PricedVariant(NamedTuple):
 class Trial:
     """What hypotheses are judged on.
 
-    parts: the two halves of the flights; base (2, 2): log likelihood of no effect, a row with the commands' floor as
-    certain as without random effects, one as with them, a column for each half.
+    parts: the two halves of the flights; policy: what they must show; none_certain, none_uncertain: log likelihood of
+    no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
+    them.
     """
 
     data: Data
     parts: tuple[BlockSet, BlockSet]
-    base: Sequence[Sequence[float]]
+    policy: NamingPolicy
+    none_certain: Sequence[float]
+    none_uncertain: Sequence[float]
 
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
     parts = halves(data)
-    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)])
+    none_certain, none_uncertain = ([judge(data, p, (), wide) for p in parts] for wide in (False, True))
+    return Trial(data, parts, policy_of(data.study, data.seconds), none_certain, none_uncertain)
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
@@ -148,7 +147,8 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) 
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
-    return judge(trial.data, trial.parts[half], terms, wide) - trial.base[wide or bool(random_of(terms))][half]
+    none = trial.none_uncertain if wide or random_of(terms) else trial.none_certain
+    return judge(trial.data, trial.parts[half], terms, wide) - none[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:

@@ -6,7 +6,8 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
-from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
+from airtouch.gap.naming.judging import Trial, gain_of
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.selection import Candidate, Charges, Step, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects

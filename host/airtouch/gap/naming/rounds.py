@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, PricedVariant, Trial, at_bound, cross_validated
+from airtouch.gap.naming.judging import PricedVariant, Trial, at_bound, cross_validated
+from airtouch.gap.naming.policy import FULL, LEAST_GAIN, PROMISING
 from airtouch.gap.naming.screening import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.second_process import map_on_two_cores
@@ -17,10 +18,6 @@ from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
 from airtouch.gap.signatures.term import Terms
-
-FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time
-#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time
-PROMISING = 0.5 * FIRST_GAIN
 
 
 def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,

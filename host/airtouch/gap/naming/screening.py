@@ -9,13 +9,12 @@ import numpy as np
 
 from airtouch.gap.naming.first_order import Remainder, judge_means, judge_random, remainder_of, shows
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
+from airtouch.gap.naming.policy import HOPELESS
 from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term, Terms
-
-HOPELESS = 0.5  #: nats that an effect must gain in screening to be fitted; chosen
 
 
 class ScreenedRandom(NamedTuple):

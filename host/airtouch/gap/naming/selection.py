@@ -8,24 +8,10 @@ import numpy as np
 
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import BlockSet
+from airtouch.gap.naming.policy import NamingPolicy
 from airtouch.gap.relations.inference import Against, Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Terms
-
-#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`: UNKNOWN_GAIN
-#: where two nominal flights or more gave the floor, UNKNOWN_ALONE where one or none did; both chosen
-#: (host/docs/gap.md, "What `unknown` means")
-UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
-#: share of what the effects named gain that the nameless model may gain as well, as no model is exact: UNKNOWN_ASSUMED
-#: where one of them is random or changes the loop of recorded flights, so that its spectrum is assumed, not measured;
-#: both chosen
-UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
-#: factor on these shares in flights of this project's simulator and firmware, whose models are exact; chosen, after the
-#: nameless model had gained at most 0.36 of what it may beside right names in 78 such flights (2026-11-23)
-SAME_MODELS = 0.5
-#: held-out nats that count as one where candidates are compared: log likelihoods of real flights are too sure of
-#: themselves; chosen
-TEMPERATURE = 6.0
 
 
 @dataclass(frozen=True)
@@ -120,20 +106,6 @@ class NamelessGain:
     of_times: float = 0.0
 
 
-@dataclass(frozen=True)
-class NominalFlights:
-    """The nominal flights that gave the floor, as far as they say how much the effects named may leave.
-
-    count: how many; nameless_gain: nats that the nameless model gains in nominal flights as long as those judged;
-    simulated, same_models: as the study has them.
-    """
-
-    count: int
-    nameless_gain: float
-    simulated: bool = False
-    same_models: bool = False
-
-
 class Contradiction(NamedTuple):
     """Over-prediction: held-out nats lost in cells where effects predict what flights do not show; the worst cell."""
 
@@ -154,9 +126,9 @@ class Selection:
 
     singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
     nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
-    candidate must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a
-    chosen effect is assumed, as it is random or changes the loop of recorded flights; contradicted: over-prediction of
-    the effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
+    candidate must gain as the first; policy: what the flights must show; assumed: whether the spectrum of a chosen
+    effect is assumed, as it is random or changes the loop of recorded flights; contradicted: over-prediction of the
+    effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
     flights name no more.
     """
 
@@ -165,7 +137,7 @@ class Selection:
     nameless: NamelessGain
     parts: tuple[BlockSet, BlockSet]
     least_gain: Mapping[str, float]
-    nominal: NominalFlights
+    policy: NamingPolicy
     assumed: bool
     contradicted: Contradiction = Contradiction()
     inference: Inference | None = None
@@ -203,25 +175,9 @@ class Selection:
         """
         if self.inference is not None:
             return self.inference.against
-        return Against(self.nameless.over_last_step, self._most_nameless_gain, of_distance=False)
-
-    @property
-    def _most_nameless_gain(self) -> float:
-        """Nats that the nameless model may gain beside the effects named where they are right.
-
-        The fewer nominal flights there are, the farther off may another one lie.
-        """
-        nominal = self.nominal
-        if nominal.count < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.over_none, nominal.nameless_gain)
-        gained = self.last_step.gain if self.last_step else 0.0
-        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if nominal.same_models else 1.0)
-        return max(self.least_left, share * gained, 0.0 if nominal.simulated else nominal.nameless_gain)
-
-    @property
-    def least_left(self) -> float:
-        """Nats that are no news however little the effects named gain, with two nominal flights or more."""
-        return UNKNOWN_GAIN * (self.nominal.count + 1) / (self.nominal.count - 1)
+        gain = self.last_step.gain if self.last_step else 0.0
+        limit = self.policy.unknown.nats(gain, self.nameless.over_none, self.assumed)
+        return Against(self.nameless.over_last_step, limit, of_distance=False)
 
     @property
     def against_over_limit(self) -> float:
@@ -233,7 +189,7 @@ class Selection:
     @property
     def loss_over_chance(self) -> float:
         """Nats of over-prediction over those that may be chance."""
-        return self.contradicted.nats / self.least_left if self.contradicted.nats else 0.0
+        return self.contradicted.nats / self.policy.unknown.least if self.contradicted.nats else 0.0
 
     @property
     def explained(self) -> bool:
