@@ -23,7 +23,7 @@ def selection(chosen, named, recorded=True):
 def named(name, gate=(), key=None, recorded=True):
     """A selection that names one effect."""
     term = replace(terms(name)[0], gate=gate)
-    return selection(SimpleNamespace(terms=(term,)), (SimpleNamespace(name=name, key=key),), recorded)
+    return selection(SimpleNamespace(terms=(term,)), (SimpleNamespace(name=name, passing_key=key),), recorded)
 
 
 OVER = STANDS_OUT + 0.1

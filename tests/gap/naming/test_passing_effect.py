@@ -70,8 +70,9 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
     selection, data = select_from(flights, ("mass",), scattered(), ())
     wake, mass = selection.steps
-    assert (wake.name, mass.name) == ("downwash", "mass") and mass.share < wake.share < 0.9 * wake.gain
-    rates = (nats / data.seconds for nats in (mass.share, wake.share, wake.gain))
+    of_wake, of_mass = wake.leave_one_out_gain, mass.leave_one_out_gain
+    assert (wake.name, mass.name) == ("downwash", "mass") and of_mass < of_wake < 0.9 * wake.gain
+    rates = (nats / data.seconds for nats in (of_mass, of_wake, wake.gain))
     least, share, gain = (size_of(rate, wake.strength.mean) for rate in rates)
 
     def names_where_nominal_flights_have(size):
@@ -92,5 +93,5 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     study = replace(scattered(), overhead=(("pushed", *overhead),))
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
-    assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
+    assert step.passing_key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
     assert (step.charges.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)

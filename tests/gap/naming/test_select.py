@@ -107,7 +107,7 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
     assert {s.name for s in selection.named} == set(names) and selection.named[-1].name == "packet_loss"
     share = next(t for t in selection.last_step.terms if t.name == "packet_loss").values["share"]
     assert share == pytest.approx(lost.mean(), rel=0.1)
-    by_name = {s.name: s.share for s in selection.named}
+    by_name = {s.name: s.leave_one_out_gain for s in selection.named}
     lost_alone = clock_gain(data, candidates_of(["packet_loss"])["packet_loss"][0][0])[1]
     assert by_name["packet_loss"] == pytest.approx(lost_alone, rel=1e-3)
     gains = [s.gain for s in selection.steps]

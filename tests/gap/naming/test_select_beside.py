@@ -172,7 +172,7 @@ def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named(
 
 def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():
     selection, data = select_from([hover(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
-    shares = {s.name: s.share for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named}
     (bias,) = (t for t in selection.last_step.terms if t.name == "imu_bias")
     bias_gain = own_gain(data, [bias]) - 5 * policy.PRICE
     assert shares["imu_noise"] == pytest.approx(selection.last_step.gain - bias_gain, abs=0.3)
@@ -218,7 +218,7 @@ def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, los
     """One of four rotors is chosen, whether it is the first effect found or the second."""
     selection, data = select_from([weak(louder=louder, r2=loss)], ("weak_motor", "imu_noise"))
     assert selection.steps[0].name == first
-    shares = {s.name: s.share for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named}
     assert set(shares) == {"weak_motor", "imu_noise"}
     of = {t.name: t for t in selection.last_step.terms}
     assert selection.last_step.gain == pytest.approx(own_gain(data, selection.last_step.terms) - np.log(4.0), abs=0.3)
@@ -232,7 +232,7 @@ def test_what_an_effect_adds_includes_its_companion():
     flight = swaying(drag=0.02, gust_mps2=0.1)
     pushed = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN])
     selection, data = select_from([pushed], ("gust", "mass"), scattered(exact=True))
-    shares, (gust, drag, mass) = {s.name: s.share for s in selection.named}, selection.last_step.terms
+    shares, (gust, drag, mass) = {s.name: s.leave_one_out_gain for s in selection.named}, selection.last_step.terms
     assert (gust.name, drag.name, mass.name) == ("gust", "rotor_drag", "mass") and drag.companion
     assert shares["gust"] == pytest.approx(selection.last_step.gain - own_gain(data, [mass]), abs=0.3)
     of_gust = own_gain(data, [gust, drag]) - policy.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
@@ -244,7 +244,7 @@ def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
     without_companion = all_candidates(without=("rotor_drag",))["gust"]
     data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)])
     selection = select(data, {**candidates_of(["rotor_drag"]), "gust": without_companion}, without=ALWAYS)
-    shares = {s.name: s.share for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named}
     assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.last_step.terms)
     drag = [t for t in selection.last_step.terms if t.name == "rotor_drag"]
     of_drag = own_gain(data, drag) - policy.PRICE  # a second axis of drag
@@ -256,7 +256,7 @@ def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
     lost = np.random.default_rng(0).random(3000) < 0.1
     selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
                                   scattered(exact=True))
-    shares = {s.name: s.share for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named}
     mass = [t for t in selection.last_step.terms if t.name == "mass"]
     assert shares == {"mass": pytest.approx(own_gain(data, mass)), "packet_loss": pytest.approx(loss(data)[1])}
 

@@ -27,16 +27,16 @@ class Remainder:
     """What a hypothesis, fitted on the other half of the flights, leaves of this one.
 
     problem: how likely the n flattened values of this half are; values (n,): what is left of them, complex; residual
-    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power; level:
-    log likelihood of the residual; cost: nats that the offsets cost.
+    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power;
+    log_likelihood: of the residual; offset_cost: nats that the offsets cost.
     """
 
     problem: Problem
     values: np.ndarray
     residual: np.ndarray
     extra_power: np.ndarray
-    level: float
-    cost: float
+    log_likelihood: float
+    offset_cost: float
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,8 @@ def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
         held_out = halves[test]
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
         after, cost = without_offsets(held_out.problem, held_out.values + moved, held_out.extra_power)
-        gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.level + held_out.cost
+        gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
+            + held_out.offset_cost
         fitted.append(x[:k])
         variances.append(variance[:k])
     return FirstOrder(gain, fitted, variances)

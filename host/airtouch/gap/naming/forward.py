@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.policy import (
     CERTAIN,
     FIRST_GAIN,
@@ -15,7 +16,6 @@ from airtouch.gap.naming.policy import (
 )
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import Candidate, Step
-from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
@@ -68,7 +68,7 @@ class State:
 
 
 def forward(search: Search, passing: Candidate | None) -> State:
-    """The state in which a forward selection ends, its steps with their shares.
+    """The state in which a forward selection ends, its steps with their leave-one-out gains.
 
     passing: an effect that comes and goes, which is the first step; None for none.
     """
@@ -78,7 +78,7 @@ def forward(search: Search, passing: Candidate | None) -> State:
         if best is None:
             break
         state = _added(search, state, best)
-    return replace(state, steps=tuple(with_shares(search.trial, state.steps)))
+    return replace(state, steps=tuple(with_leave_one_out_gains(search.trial, state.steps)))
 
 
 def _begun(search: Search, passing: Candidate | None) -> State:

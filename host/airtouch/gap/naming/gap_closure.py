@@ -24,7 +24,8 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     one whose seconds are known from another vehicle's log, need close nothing.
     """
     chosen = selection.chosen
-    if not selection.policy.must_close_gap or chosen is None or any(s.key == KNOWN_OVERHEAD for s in selection.named):
+    of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named)
+    if not selection.policy.must_close_gap or chosen is None or of_known_seconds:
         return None
     if names_one_of_the_loop(data, selection):
         return LEAST_CLOSED

@@ -1,6 +1,12 @@
 """One hypothesis judged: fitted on one half of the flights and judged on the other, and the other way round.
 
-Of a few flights each half has some blocks of every flight.
+Of a few flights each half has some blocks of every flight. A hypothesis gains, in nats over no effect,
+
+    gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
+           + clock_gains                        log likelihood of the logged times, by effects that show there alone
+           - price_of                           PRICE of each parameter beyond an effect's first
+           - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
+           + gained_while_certain               what effects lose beside the first random one, given back (`Charges`)
 """
 
 from collections.abc import Sequence

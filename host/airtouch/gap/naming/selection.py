@@ -56,7 +56,8 @@ class Candidate:
     `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only screened;
     full: whether it was fitted to the end, not screened or fitted briefly. Of the newest effect: strength; evidence:
     nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
-    flights; key: where it comes and goes, the entry of `Scatter.passing` that it is compared with, else "".
+    flights; passing_key: where it comes and goes, the entry of `Scatter.passing` that it is compared with,
+    else None.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Candidate:
     charges: Charges = Charges()
     strength: Strength = field(default_factory=Strength)
     evidence: float = 0.0
-    key: str = ""
+    passing_key: str | None = None
 
     @property
     def of_the_log(self) -> bool:
@@ -80,12 +81,12 @@ class Step(Candidate):
     """A candidate that a selection has added to the steps before it.
 
     named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights have
-    as well, and stands beside the effects named. share: where several effects are named, the leave-one-out gain of the
-    newest, nats; infinite where it is named alone.
+    as well, and stands beside the effects named. leave_one_out_gain: where several effects are named, what the newest
+    adds to the others, nats; None where it is named alone.
     """
 
     named: bool = True
-    share: float = np.inf
+    leave_one_out_gain: float | None = None
 
     @classmethod
     def of(cls, candidate: Candidate, named: bool = True) -> "Step":
@@ -150,8 +151,9 @@ class Selection:
 
     @property
     def named(self) -> tuple[Step, ...]:
-        """The steps whose effects are named, the largest share first, faults of the log's own times last."""
-        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
+        """The steps whose effects are named: what adds most to the others first, faults of the log's own times last."""
+        named = (s for s in self.steps if s.named)
+        return tuple(sorted(named, key=lambda s: (s.of_the_log, -(s.leave_one_out_gain or 0.0))))
 
     @property
     def chosen(self) -> Candidate | None:

@@ -1,4 +1,4 @@
-"""The share of each of several effects: its leave-one-out gain.
+"""What each of several effects adds to the others: its leave-one-out gain.
 
 The gains of all effects and of all but one are those of `judging.cross_validated`: effects before the first random one
 are not charged with what they gain less once the commands' floor is less certain.
@@ -17,11 +17,11 @@ from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(trial: Trial, steps: Sequence[Step]) -> list[Step]:
-    """The steps of a selection, those that are named with their `share`, nats, where there are several."""
+def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
+    """The steps of a selection, those that are named with their leave-one-out gain where there are several."""
     if sum(s.named for s in steps) < 2:
         return list(steps)
-    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place)) if s.named else s
+    return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place)) if s.named else s
             for place, s in enumerate(steps)]
 
 
