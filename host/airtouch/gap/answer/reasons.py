@@ -68,7 +68,7 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 def against(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
-    lost, worst = selection.contradicted
+    lost, worst = selection.contradiction
     if selection.loss_over_chance == selection.against_over_limit:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")

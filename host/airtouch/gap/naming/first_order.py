@@ -63,7 +63,7 @@ def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
                 ) -> FirstOrder:
     """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
 
-    beside: effects chosen before, free to change.
+    beside: effects of the base, free to change.
     """
     mean, mean_beside = _in_the_replay(terms), _in_the_replay(beside)
     tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_beside) for i in range(len(t.free))]
@@ -89,9 +89,9 @@ def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
 
 
 def judge_random(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
-    """Held-out nats of a random effect beside what is chosen, and its scaled strength (k,), the mean of both halves.
+    """Held-out nats of a random effect beside a base, and its scaled strength (k,), the mean of both halves.
 
-    What is chosen stays as it is.
+    The base stays as it is.
     """
     gain, strengths = 0.0, []
     for train, test in ROUND_TRIP:

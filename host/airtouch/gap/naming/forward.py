@@ -25,13 +25,13 @@ from airtouch.gap.signatures.term import Terms
 class Search:
     """The flights, and the candidates among which effects are searched.
 
-    candidates: variants of each effect by name; alone: every candidate judged alone; least_gain: nats that each must
+    candidates: variants of each effect by name; singles: every candidate judged alone; least_gain: nats that each must
     gain as the first effect; progress: called with each name that is judged.
     """
 
     trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
-    alone: Mapping[str, Candidate]
+    singles: Mapping[str, Candidate]
     least_gain: Mapping[str, float]
     progress: Callable[[str], None]
 
@@ -40,14 +40,14 @@ class Search:
 class State:
     """Where a forward selection stands.
 
-    steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last
-    step, by name; need: nats that each of these must gain over it; singles: the best variant of every candidate, as
-    judged before an effect was named; least_gain: nats that each must gain as the first effect.
+    steps: the hypotheses so far, each with the effects of those before it; extensions: candidates judged beside the
+    last step, by name; least_further_gain: nats that each of these must gain over it; singles: the best variant of
+    every candidate, as judged before an effect was named; least_gain: nats that each must gain as the first effect.
     """
 
     steps: tuple[Step, ...]
-    tried: Mapping[str, Candidate]
-    need: Mapping[str, float]
+    extensions: Mapping[str, Candidate]
+    least_further_gain: Mapping[str, float]
     singles: Mapping[str, Candidate]
     least_gain: Mapping[str, float]
 
@@ -84,16 +84,16 @@ def forward(search: Search, passing: Candidate | None) -> State:
 def _begun(search: Search, passing: Candidate | None) -> State:
     """The state before the first effect is added, with an effect that comes and goes as a step already."""
     if passing is None:
-        return State((), search.alone, search.least_gain, search.alone, search.least_gain)
-    singles = {**search.alone, passing.name: passing}
+        return State((), search.singles, search.least_gain, search.singles, search.least_gain)
+    singles = {**search.singles, passing.name: passing}
     steps = (Step.of(passing),)
-    tried, need = _beside(search, steps, singles)
-    return State(steps, tried, need, singles, {**search.least_gain, passing.name: LEAST_GAIN})
+    extensions, least_further = _beside(search, steps, singles)
+    return State(steps, extensions, least_further, singles, {**search.least_gain, passing.name: LEAST_GAIN})
 
 
 def _worth_adding(state: State) -> dict[str, Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = {n: c for n, c in state.tried.items() if c.gain - state.gain >= state.need[n]}
+    enough = {n: c for n, c in state.extensions.items() if c.gain - state.gain >= state.least_further_gain[n]}
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
         enough = {n: c for n, c in enough.items() if c.evidence >= FIRST_GAIN}
     return enough
@@ -114,15 +114,15 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     singles = state.singles
     if not state.named:  # what nominal flights have as well stands beside every candidate
         added = {s.name for s in state.steps}
-        singles = {**singles, **{n: c for n, c in state.tried.items() if n not in added}}
+        singles = {**singles, **{n: c for n, c in state.extensions.items() if n not in added}}
     left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
     steps = (*state.steps, Step.of(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.tried.items()}
-    tried, need = _beside(search, steps, over_before)
-    return replace(after, tried=tried, need=need)
+    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.extensions.items()}
+    extensions, least_further = _beside(search, steps, over_before)
+    return replace(after, extensions=extensions, least_further_gain=least_further)
 
 
 def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate],
@@ -137,5 +137,6 @@ def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidat
     gained = {n for n, c in before.items() if c.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
     sure = {n for n, c in before.items() if c.full and c.evidence >= LEAST_GAIN and not is_random(n)}
-    tried = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return tried, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN for n, c in tried.items()}
+    extensions = round_of(trial, worth, steps[-1], search.progress, promising=sure)
+    return extensions, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN
+                        for n, c in extensions.items()}

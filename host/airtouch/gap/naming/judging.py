@@ -83,27 +83,19 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
     return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
 
-def price_of(terms: Sequence[Term]) -> float:
-    """Held-out nats that parameters beyond an effect's first must earn."""
-    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
+def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None, brief: bool = False) -> Candidate:
+    """The hypothesis that adds a variant to those effects of a base, fitted on each half and judged on the other.
 
-
-def cross_validated(trial: Trial, variant: PricedVariant, chosen: Candidate | None, brief: bool = False) -> Candidate:
-    """The hypothesis of a variant beside the effects that are chosen, fitted on each half and judged on the other.
-
-    brief: the fits are cut short, to see whether whole ones promise anything. The gain is that of all effects over
-    none, less what their parameters and the choice of their variants cost. Effects that are seen in the commands alone
-    gain less beside the first random one; it is not charged with that (`_lost_to_uncertainty`).
+    base: None for no effect; brief: the fits are cut short, to see whether whole ones promise anything.
     """
-    terms, before, charged = variant.terms, chosen.terms if chosen else (), chosen.charges if chosen else Charges()
-    charges = Charges(variant.choice_cost + charged.choice_cost,
-                      charged.gained_while_certain + _lost_to_uncertainty(trial, terms, chosen))
-    if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
-        gain, fits = chosen.gain, chosen.fits
+    terms, before = variant.terms, base.terms if base else ()
+    charges = _charges(trial, variant, base)
+    if base and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
+        gain, fits = base.gain, base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
-        fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
-        gain = _gain_in_spectra(trial, fits, charges, clock_gains(trial.data, before))
+        fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
+        gain = _charged_gain(trial, fits, charges, clock_gains(trial.data, before))
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
@@ -111,41 +103,50 @@ def cross_validated(trial: Trial, variant: PricedVariant, chosen: Candidate | No
     return Candidate(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
 
 
-def _gain_in_spectra(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
-    """Held-out nats of effects that were fitted to each half, with those of effects on the clock before them.
+def _charges(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Charges:
+    """The charges of a base and a variant.
 
-    charges: of all effects; of_clock: nats of those on the clock.
+    Beside the first random effect the commands' floor is less certain, so that the effects before it gain less. It is
+    not charged with that.
+    """
+    if base is None:
+        return Charges(variant.choice_cost)
+    lost = 0.0
+    if base.fits and random_of(variant.terms) and not random_of(base.terms):
+        lost = lost_beside_random(trial, base.fits)
+    return Charges(variant.choice_cost + base.charges.choice_cost, base.charges.gained_while_certain + lost)
+
+
+def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
+    """Nats that effects gain in the spectra after their charges, with those of effects on the clock before them.
+
+    fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
     held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP), of_clock)
     return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
 
 
-def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
-    """Nats that the effects chosen lose where these terms bring the first random one; else 0.
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | None, brief: bool) -> FittedTerms:
+    """Effects fitted on a half, from where those of a base ended there.
 
-    Beside a random effect the commands' floor is less certain.
+    The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
+    fewer effects.
     """
-    if chosen is None or not chosen.fits or random_of(chosen.terms) or not random_of(terms):
-        return 0.0
-    return lost_beside_random(trial, chosen.fits)
+    start, part = _start(base, terms, half), trial.parts[half]
+    key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
+    return trial.data.workspace.cached(
+        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
+
+
+def price_of(terms: Sequence[Term]) -> float:
+    """Held-out nats that parameters beyond an effect's first must earn."""
+    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
 def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
     """Held-out nats that effects, fitted on each half, lose where the commands' floor is as beside a random effect."""
     return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, True)
                for train, test in ROUND_TRIP)
-
-
-def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None, brief: bool) -> FittedTerms:
-    """Effects fitted on a half, from where those that are chosen ended there.
-
-    The fit is cached: an effect of the clock beside those that are chosen changes nothing of it, nor does a second
-    search among fewer effects.
-    """
-    start, part = _start(chosen, terms, half), trial.parts[half]
-    key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
-    return trial.data.workspace.cached(
-        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
 
 
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
@@ -203,10 +204,10 @@ def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
     return fit(data, part, terms, mean_parameters(terms))
 
 
-def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+def _start(base: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
     """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit."""
-    if chosen is None or not chosen.fits:
+    if base is None or not base.fits:
         return None
-    known = chosen.fits[half].scaled
+    known = base.fits[half].scaled
     size = sum(len(t.free) for t in terms if t.shows_in == MEAN)
     return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -1,4 +1,4 @@
-"""Screening: every variant of every candidate beside what is chosen, at a small part of what its fit would cost."""
+"""Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,21 +27,21 @@ class ScreenedRandom(NamedTuple):
 
 @dataclass(frozen=True)
 class RoundStart:
-    """What a round begins from: the hypothesis that is chosen, None for no effect, and what it leaves of each half."""
+    """What a round begins from: its base, None for no effect, and what that leaves of each half."""
 
     trial: Trial
-    chosen: Candidate | None
+    base: Candidate | None
     halves: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
-        """Held-out nats of the hypothesis over no effect."""
-        return self.chosen.gain if self.chosen else 0.0
+        """Held-out nats of the base over no effect."""
+        return self.base.gain if self.base else 0.0
 
     @property
     def terms(self) -> Terms:
-        """The terms of the hypothesis that is chosen."""
-        return self.chosen.terms if self.chosen else ()
+        """The terms of the base."""
+        return self.base.terms if self.base else ()
 
 
 @dataclass
@@ -57,11 +57,11 @@ class Screened:
     unseen: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(trial: Trial, chosen: Candidate | None) -> RoundStart:
+def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
-    fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     halves = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.parts)]
-    return RoundStart(trial, chosen, halves)
+    return RoundStart(trial, base, halves)
 
 
 def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
@@ -85,14 +85,14 @@ def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]]
     return screened
 
 
-def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
-    """The variants of an effect that may stand beside those that are chosen.
+def addable(name: str, variants: Sequence[Terms], base: Terms) -> list[PricedVariant]:
+    """The variants of an effect that may stand beside the terms of a base.
 
-    None may where another name for the same thing is chosen, and a variant may not of which a term is chosen already
+    None may where the base has another name for the same thing, and a variant may not of which the base has a term
     (the same effect of another rotor is another term). Each costs log n nats for the choice among the n variants with
     as many terms: else many variants would gain more than one by chance.
     """
-    without_companions = [t for t in chosen if not t.companion]
+    without_companions = [t for t in base if not t.companion]
     if any(t.name != name and interchangeable(name, t.name) for t in without_companions):
         return []
     identities = {t.identity for t in without_companions}

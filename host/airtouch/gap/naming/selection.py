@@ -128,7 +128,7 @@ class Selection:
     singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
     nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
     candidate must gain as the first; policy: what the flights must show; assumed: whether the spectrum of a chosen
-    effect is assumed, as it is random or changes the loop of recorded flights; contradicted: over-prediction of the
+    effect is assumed, as it is random or changes the loop of recorded flights; contradiction: over-prediction of the
     effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
     flights name no more.
     """
@@ -140,7 +140,7 @@ class Selection:
     least_gain: Mapping[str, float]
     policy: NamingPolicy
     assumed: bool
-    contradicted: Contradiction = Contradiction()
+    contradiction: Contradiction = Contradiction()
     inference: Inference | None = None
     taken_back: TakenBack = TakenBack()
 
@@ -191,7 +191,7 @@ class Selection:
     @property
     def loss_over_chance(self) -> float:
         """Nats of over-prediction over those that may be chance."""
-        return self.contradicted.nats / self.policy.unknown.least if self.contradicted.nats else 0.0
+        return self.contradiction.nats / self.policy.unknown.least if self.contradiction.nats else 0.0
 
     @property
     def explained(self) -> bool:
