@@ -93,6 +93,7 @@ def _why_beside(selection: Selection, step: Step) -> str:
     first = selection.named[0].name
     if selection.inference is not None:
         return f"named beside {first}: the probability is that it acts alone"
+    assert step.leave_one_out_gain is not None  # several are named
     return (f"named beside {first}: adds {step.leave_one_out_gain:.0f} nats to the others; the probability is that it "
             "acts alone")
 
