@@ -38,8 +38,8 @@ import swarm_cuts
 from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
-from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.naming.passing_effect import passing_evidence
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing import gates, overhead

@@ -7,18 +7,20 @@ import pytest
 
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
+from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.selection import (
     Candidate,
     Contradiction,
     NamelessGain,
-    NominalFlights,
     Selection,
     Step,
     TakenBack,
 )
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
+from hovers import FLOOR
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
+POLICY = policy_of(replace(FLOOR, nominal_count=5), 30.0)  #: of flights compared with five nominal ones
 TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
 
 
@@ -35,10 +37,10 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
-        steps.append(replace(Step.of(judged(n, total)), share=0.25 * EVIDENCE[n]))
+        steps.append(replace(Step.of(judged(n, total)), leave_one_out_gain=0.25 * EVIDENCE[n]))
     related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
     return Selection(singles, tuple(steps), NamelessGain(150.0, beside), (None, None), dict.fromkeys(EVIDENCE, 8.0),
-                     NominalFlights(5, 0.0), assumed=False, contradicted=Contradiction(*lost), inference=related)
+                     POLICY, assumed=False, contradiction=Contradiction(*lost), inference=related)
 
 
 def test_the_answer_needs_no_reason():

@@ -15,7 +15,7 @@ from airtouch.gap.loop import command_spectra, controller, identify, loop_model,
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.command_response import acceleration_per_command
 from airtouch.gap.loop.set_point_steps import NO_STEP
-from airtouch.gap.naming import judging
+from airtouch.gap.naming import judging, policy
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import terms
 from airtouch.simulation import scenario
@@ -124,7 +124,7 @@ def test_flow_scale_is_found_at_edges(study):
 @pytest.mark.parametrize("name", ["sensor_latency", "controller_gain", "range_step", "flow_scale"])
 def test_nominal_flights_give_nothing(study, name):
     for k in range(3):
-        assert held_out_gain(study, fly("paper-mixed", 1, seed=20 + k), name)[0] < judging.FIRST_GAIN
+        assert held_out_gain(study, fly("paper-mixed", 1, seed=20 + k), name)[0] < policy.FIRST_GAIN
 
 
 def test_without_edges_range_step_changes_nothing(study):

@@ -11,7 +11,8 @@ from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.contradiction import contradicted, losses
+from airtouch.gap.naming.contradiction import contradiction_of, losses
+from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.selection import Contradiction
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import REST
@@ -29,17 +30,17 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
     selection, data = select_from([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
     (step,) = selection.steps
     on = judging.trial_of(data)
-    loss, worst = contradicted(on, selection.chosen)
+    loss, worst = contradiction_of(on, selection.chosen)
     assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
     resting = [BlockSet(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
     by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
                   for train, test in ((0, 1), (1, 0)))
     assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0
-    assert selection.contradicted == Contradiction(), "recorded flights are not asked"
+    assert selection.contradiction == Contradiction(), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
     exact = replace(
-        selection, nominal=replace(selection.nominal, simulated=True, count=6), steps=(weaker,),
-        nameless=replace(selection.nameless, over_last_step=1.0), contradicted=Contradiction(loss, worst))
+        selection, policy=policy_of(replace(data.study, nominal_count=6), data.seconds), steps=(weaker,),
+        nameless=replace(selection.nameless, over_last_step=1.0), contradiction=Contradiction(loss, worst))
     assert exact.against_over_limit == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
     assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
@@ -48,7 +49,7 @@ def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there(
 
 def test_a_right_effect_is_not_contradicted():
     selection, data = select_from([pushed_in_the_air_alone(7)], ("mass", "thrust_coefficient"), scattered(mass=[1e-3]))
-    assert contradicted(judging.trial_of(data), selection.chosen).nats < 2.0 < 100.0 < selection.chosen.gain
+    assert contradiction_of(judging.trial_of(data), selection.chosen).nats < 2.0 < 100.0 < selection.chosen.gain
 
 
 def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():

@@ -3,8 +3,8 @@
 import pytest
 
 from airtouch.gap.naming import forward as module
-from airtouch.gap.naming.forward import MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN, Search, forward
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN
+from airtouch.gap.naming.forward import Search, forward
+from airtouch.gap.naming.policy import FIRST_GAIN, LEAST_GAIN, MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN
 from airtouch.gap.naming.selection import Candidate
 
 
@@ -35,7 +35,7 @@ def select(monkeypatch):
         monkeypatch.setattr(module, "_best_of", best_of)
         monkeypatch.setattr(module, "least_further_gain", lambda trial, last, candidate: LEAST_GAIN)
         monkeypatch.setattr(module, "is_random_misfit", lambda trial, last, candidate: candidate.name in left)
-        monkeypatch.setattr(module, "with_shares", lambda on, steps: steps)
+        monkeypatch.setattr(module, "with_leave_one_out_gains", lambda on, steps: steps)
         alone = {n: judged(n) for n in candidates}
         search = Search(None, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, FIRST_GAIN),
                         lambda _: None)

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.naming import judging
+from airtouch.gap.naming import policy
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
 from airtouch.gap.signatures.scatter import FALSE_SHARE, size_of
 from hovers import ALWAYS, FLOOR, scattered, select_from, with_a_push
@@ -20,11 +20,11 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     assert [s.name for s in selection.named] == ["downwash"]
     ((name, since, until),) = selection.steps[0].terms[0].gate
     assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
-    assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
+    assert selection.steps[0].evidence > 2.0 * policy.FIRST_GAIN and "downwash" in selection.singles
     single = selection.singles["downwash"]
     without_price = judge(data, whole_of(data), single.terms) - judge(data, whole_of(data), (), True)
     assert single.charges.choice_cost > 0.0 and single.gain == pytest.approx(without_price - single.charges.choice_cost)
-    assert selection.least_gain["downwash"] == judging.LEAST_GAIN
+    assert selection.least_gain["downwash"] == policy.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
         assert "downwash" not in other.singles
@@ -39,7 +39,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
     assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
     for step in selection.steps:
         beyond = study.scatter.unusual({"downwash": size_of(step.gain / data.seconds, step.strength.mean)})
-        assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
+        assert step.evidence == pytest.approx(policy.LEAST_GAIN + beyond, rel=0.01)
 
 
 @pytest.mark.parametrize(("names", "nominal_sizes", "mps2", "named"), [
@@ -55,7 +55,7 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
     assert ("downwash" in selection.singles) == ("downwash" in named)
 
 
-@pytest.mark.parametrize(("less", "named"), [(judging.LEAST_GAIN - 1.0, []), (judging.LEAST_GAIN + 1.0, ["downwash"])])
+@pytest.mark.parametrize(("less", "named"), [(policy.LEAST_GAIN - 1.0, []), (policy.LEAST_GAIN + 1.0, ["downwash"])])
 def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
@@ -74,11 +74,10 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
     flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
     selection, data = select_from(flights, ("mass",), scattered(**nominal_sizes), ())
     wake, mass = selection.steps
+    of_wake, of_mass = wake.leave_one_out_gain, mass.leave_one_out_gain or 0.0
     assert (wake.name, mass.name) == ("downwash", "mass") and mass.named != bool(nominal_sizes)
-    assert wake.share < 0.9 * wake.gain
-    of_mass = 0.0 if nominal_sizes else mass.share
-    assert of_mass < wake.share
-    rates = (nats / data.seconds for nats in (of_mass, wake.share, wake.gain))
+    assert of_mass < of_wake < 0.9 * wake.gain
+    rates = (nats / data.seconds for nats in (of_mass, of_wake, wake.gain))
     least, share, gain = (size_of(rate, wake.strength.mean) for rate in rates)
 
     def names_where_nominal_flights_have(size):
@@ -99,5 +98,5 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     study = replace(scattered(), overhead=(("pushed", *overhead),))
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     (step,) = selection.named
-    assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
+    assert step.passing_key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
     assert (step.charges.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)

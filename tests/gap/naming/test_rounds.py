@@ -8,9 +8,9 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds, select
-from airtouch.gap.naming.judging import LEAST_GAIN, PricedVariant, covariance_among_all, cross_validated
+from airtouch.gap.naming.judging import PricedVariant, covariance_among_all, cross_validated
+from airtouch.gap.naming.policy import HOPELESS, LEAST_GAIN
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.screening import HOPELESS
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE

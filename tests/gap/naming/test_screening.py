@@ -5,7 +5,8 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import trial_of
-from airtouch.gap.naming.screening import ALIKE, addable, screen_random, start_of
+from airtouch.gap.naming.policy import ABOUT_AS_GOOD
+from airtouch.gap.naming.screening import addable, screen_random, start_of
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, random_of
 from hovers import FLOOR, hover
@@ -48,7 +49,7 @@ def test_mean_terms_that_screening_cannot_tell_apart_are_all_fitted_with_a_rando
     start = start_of(trial_of(Data(FLOOR, [hover(7, length_s=10.0)])), None)
     variants = addable("ground_effect", CANDIDATES["ground_effect"], ())
     shapes = [v.terms for v in variants if not random_of(v.terms)][:3]
-    gains = (20.0, 20.0 - 0.9 * ALIKE, 20.0 - 1.1 * ALIKE)
+    gains = (20.0, 20.0 - 0.9 * ABOUT_AS_GOOD, 20.0 - 1.1 * ABOUT_AS_GOOD)
     means = [Candidate("ground_effect", terms, gain) for terms, gain in zip(shapes, gains, strict=True)]
     _, fitted = screen_random(start, [v for v in variants if random_of(v.terms)], means, every_random=False)
     shape_of = {i: terms[0].values for i, terms in enumerate(shapes)}

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.evidence.cells import CELLS, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.naming import thresholds
-from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signals.channels import CHANNELS
 
@@ -57,10 +57,9 @@ def test_gains_of_the_axes_are_added_and_a_cell_counts_from_a_gain_of_one_nat():
     assert thresholds.gain_in_improved_cells(held, held + gains((x, 3.0), (z, -2.0), (other, 5.0))) == 0.0
 
 
-def trial(recorded=False, same_models=True):
-    """What a hypothesis is judged on, without a loop and without flights."""
-    return SimpleNamespace(data=SimpleNamespace(
-        study=SimpleNamespace(recorded=recorded, same_models=same_models, controller=None)))
+def trial(recorded=False):
+    """What a hypothesis is judged on, without flights."""
+    return SimpleNamespace(data=None, policy=SimpleNamespace(misfit_by_cell=not recorded))
 
 
 def fitted(gain, full=True):

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
-from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing import gates, stretches
 from airtouch.gap.result import Cell
@@ -92,7 +92,7 @@ def test_what_adds_most_to_the_others_is_told_first(study, nominal_flight):
     both = pushed(nominal_flight, 0.06)
     both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
     selection = select(Data(study, [both]), candidates.all_candidates(LOOP))
-    shares = {s.name: s.share for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named}
     assert set(shares) == {"downwash", "imu_bias"}
     assert [s.name for s in selection.named] == sorted(shares, key=lambda n: -shares[n])
     assert all(share > 12.0 for share in shares.values())

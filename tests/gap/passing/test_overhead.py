@@ -14,7 +14,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.passing import gates, overhead
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD

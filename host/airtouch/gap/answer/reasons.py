@@ -1,6 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
-from airtouch.gap.naming.judging import FIRST_GAIN
+from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.selection import Candidate, Selection, Step
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
@@ -68,10 +68,10 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 def against(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
-    lost, worst = selection.contradicted
+    lost, worst = selection.contradiction
     if selection.loss_over_chance == selection.against_over_limit:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
-                f"{selection.least_left:.0f} may be chance")
+                f"{selection.policy.unknown.least:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")
 
 
@@ -93,7 +93,9 @@ def _why_beside(selection: Selection, step: Step) -> str:
     first = selection.named[0].name
     if selection.inference is not None:
         return f"named beside {first}: the probability is that it acts alone"
-    return f"named beside {first}: adds {step.share:.0f} nats to the others; the probability is that it acts alone"
+    assert step.leave_one_out_gain is not None  # several are named
+    return (f"named beside {first}: adds {step.leave_one_out_gain:.0f} nats to the others; the probability is that it "
+            "acts alone")
 
 
 def _why_not_unknown(selection: Selection) -> str:

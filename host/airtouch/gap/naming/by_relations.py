@@ -7,9 +7,10 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
-from airtouch.gap.naming.judging import FIRST_GAIN, Trial
+from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, NamelessGain, NominalFlights, Selection, Step
+from airtouch.gap.naming.selection import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.term import Terms
@@ -30,11 +31,11 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
-def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], alone: Mapping[str, Candidate],
+def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], singles: Mapping[str, Candidate],
                            inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
-    candidates: variants by name; alone: every candidate judged alone; progress: called with every name.
+    candidates: variants by name; singles: every candidate judged alone; progress: called with every name.
     """
     steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
@@ -44,9 +45,9 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
-        singles=alone, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
-        least_gain=dict.fromkeys(alone, FIRST_GAIN), assumed=False, inference=inference,
-        nominal=NominalFlights(trial.data.study.nominal_count, 0.0, simulated=True, same_models=True))
+        singles=singles, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
+        least_gain=dict.fromkeys(singles, FIRST_GAIN), assumed=False, inference=inference,
+        policy=trial.policy)
 
 
 def signs_not_shown(selection: Selection) -> list[str]:
@@ -60,9 +61,9 @@ def signs_not_shown(selection: Selection) -> list[str]:
 
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
-    alone = effect_class.name.partition(" ")[2]
-    if alone:
-        return [v for v in variants if v[0].free == (alone,)]
+    parameter = effect_class.name.partition(" ")[2]
+    if parameter:
+        return [v for v in variants if v[0].free == (parameter,)]
     if effect_class.shape is None:
         return list(variants)
     return [v for v in variants if v[0].values[v[0].signature.class_by] == effect_class.shape]

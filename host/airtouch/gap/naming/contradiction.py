@@ -4,18 +4,18 @@ import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, cell_words, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
-from airtouch.gap.naming.selection import UNKNOWN_ASSUMED, Candidate, Contradiction
-
-#: nats that a right effect may lose in a cell by chance; chosen: by the bound in `losses` the chance of more is at most
-#: 37 %
-CHANCE_LOSS = 1.0
+from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
+from airtouch.gap.naming.selection import Candidate, Contradiction
 
 
-def contradicted(trial: Trial, chosen: Candidate | None) -> Contradiction:
-    """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing."""
-    if chosen is None or not chosen.fits:
+def contradiction_of(trial: Trial, named: Candidate | None) -> Contradiction:
+    """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing.
+
+    named: these effects as one hypothesis, None where none is named.
+    """
+    if named is None or not named.fits:
         return Contradiction()
-    gains = held_out_cell_gains(trial, chosen)
+    gains = held_out_cell_gains(trial, named)
     lost = losses(gains)
     if not lost.any():
         return Contradiction()

@@ -27,16 +27,16 @@ class Remainder:
     """What a hypothesis, fitted on the other half of the flights, leaves of this one.
 
     problem: how likely the n flattened values of this half are; values (n,): what is left of them, complex; residual
-    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power; level:
-    log likelihood of the residual; cost: nats that the offsets cost.
+    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power;
+    log_likelihood: of the residual; offset_cost: nats that the offsets cost.
     """
 
     problem: Problem
     values: np.ndarray
     residual: np.ndarray
     extra_power: np.ndarray
-    level: float
-    cost: float
+    log_likelihood: float
+    offset_cost: float
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
                 ) -> FirstOrder:
     """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
 
-    beside: effects chosen before, free to change.
+    beside: effects of the base, free to change.
     """
     mean, mean_beside = _in_the_replay(terms), _in_the_replay(beside)
     tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_beside) for i in range(len(t.free))]
@@ -76,7 +76,8 @@ def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], 
         held_out = halves[test]
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
         after, cost = without_offsets(held_out.problem, held_out.values + moved, held_out.extra_power)
-        gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.level + held_out.cost
+        gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
+            + held_out.offset_cost
         fitted.append(x[:k])
         variances.append(variance[:k])
     return FirstOrder(gain, fitted, variances)
@@ -88,9 +89,9 @@ def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
 
 
 def judge_random(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
-    """Held-out nats of a random effect beside what is chosen, and its scaled strength (k,), the mean of both halves.
+    """Held-out nats of a random effect beside a base, and its scaled strength (k,), the mean of both halves.
 
-    What is chosen stays as it is.
+    The base stays as it is.
     """
     gain, strengths = 0.0, []
     for train, test in ROUND_TRIP:

@@ -3,32 +3,35 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial
+from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
+from airtouch.gap.naming.policy import (
+    CERTAIN,
+    FIRST_GAIN,
+    LEAST_GAIN,
+    MOST_DEVIATIONS,
+    MOST_EFFECTS,
+    TEMPERATURE,
+    WORTH_AGAIN,
+)
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import TEMPERATURE, Candidate, Step
-from airtouch.gap.naming.shares import with_shares
+from airtouch.gap.naming.selection import Candidate, Step
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
-
-MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
-MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`_worth_adding`); chosen
-CERTAIN = 20.0  #: nats of evidence beyond which more does not rank a candidate higher (`_best_of`); chosen
-#: of FIRST_GAIN: candidates that gained less are not judged again beside a deviation; chosen, to save their fits
-WORTH_AGAIN = 0.25
 
 
 @dataclass(frozen=True)
 class Search:
     """The flights, and the candidates among which effects are searched.
 
-    candidates: variants of each effect by name; alone: every candidate judged alone; least_gain: nats that each must
+    candidates: variants of each effect by name; singles: every candidate judged alone; least_gain: nats that each must
     gain as the first effect; progress: called with each name that is judged.
     """
 
     trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
-    alone: Mapping[str, Candidate]
+    singles: Mapping[str, Candidate]
     least_gain: Mapping[str, float]
     progress: Callable[[str], None]
 
@@ -37,14 +40,14 @@ class Search:
 class State:
     """Where a forward selection stands.
 
-    steps: the hypotheses so far, each with the effects of those before it; tried: candidates judged beside the last
-    step, by name; need: nats that each of these must gain over it; singles: the best variant of every candidate, as
-    judged before an effect was named; least_gain: nats that each must gain as the first effect.
+    steps: the hypotheses so far, each with the effects of those before it; extensions: candidates judged beside the
+    last step, by name; least_further_gain: nats that each of these must gain over it; singles: the best variant of
+    every candidate, as judged before an effect was named; least_gain: nats that each must gain as the first effect.
     """
 
     steps: tuple[Step, ...]
-    tried: Mapping[str, Candidate]
-    need: Mapping[str, float]
+    extensions: Mapping[str, Candidate]
+    least_further_gain: Mapping[str, float]
     singles: Mapping[str, Candidate]
     least_gain: Mapping[str, float]
 
@@ -65,7 +68,7 @@ class State:
 
 
 def forward(search: Search, passing: Candidate | None) -> State:
-    """The state in which a forward selection ends, its steps with their shares.
+    """The state in which a forward selection ends, its steps with their leave-one-out gains.
 
     passing: an effect that comes and goes, which is the first step; None for none.
     """
@@ -75,22 +78,22 @@ def forward(search: Search, passing: Candidate | None) -> State:
         if best is None:
             break
         state = _added(search, state, best)
-    return replace(state, steps=tuple(with_shares(search.trial, state.steps)))
+    return replace(state, steps=tuple(with_leave_one_out_gains(search.trial, state.steps)))
 
 
 def _begun(search: Search, passing: Candidate | None) -> State:
     """The state before the first effect is added, with an effect that comes and goes as a step already."""
     if passing is None:
-        return State((), search.alone, search.least_gain, search.alone, search.least_gain)
-    singles = {**search.alone, passing.name: passing}
+        return State((), search.singles, search.least_gain, search.singles, search.least_gain)
+    singles = {**search.singles, passing.name: passing}
     steps = (Step.of(passing),)
-    tried, need = _beside(search, steps, singles)
-    return State(steps, tried, need, singles, {**search.least_gain, passing.name: LEAST_GAIN})
+    extensions, least_further = _beside(search, steps, singles)
+    return State(steps, extensions, least_further, singles, {**search.least_gain, passing.name: LEAST_GAIN})
 
 
 def _worth_adding(state: State) -> dict[str, Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = {n: c for n, c in state.tried.items() if c.gain - state.gain >= state.need[n]}
+    enough = {n: c for n, c in state.extensions.items() if c.gain - state.gain >= state.least_further_gain[n]}
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
         enough = {n: c for n, c in enough.items() if c.evidence >= FIRST_GAIN}
     return enough
@@ -111,15 +114,15 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     singles = state.singles
     if not state.named:  # what nominal flights have as well stands beside every candidate
         added = {s.name for s in state.steps}
-        singles = {**singles, **{n: c for n, c in state.tried.items() if n not in added}}
+        singles = {**singles, **{n: c for n, c in state.extensions.items() if n not in added}}
     left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
     steps = (*state.steps, Step.of(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.tried.items()}
-    tried, need = _beside(search, steps, over_before)
-    return replace(after, tried=tried, need=need)
+    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.extensions.items()}
+    extensions, least_further = _beside(search, steps, over_before)
+    return replace(after, extensions=extensions, least_further_gain=least_further)
 
 
 def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate],
@@ -134,5 +137,6 @@ def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidat
     gained = {n for n, c in before.items() if c.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
     sure = {n for n, c in before.items() if c.full and c.evidence >= LEAST_GAIN and not is_random(n)}
-    tried = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return tried, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN for n, c in tried.items()}
+    extensions = round_of(trial, worth, steps[-1], search.progress, promising=sure)
+    return extensions, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN
+                        for n, c in extensions.items()}

@@ -8,17 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.naming.selection import Selection, TakenBack
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
-
-#: share of the gap that an effect of the loop, or one that passes, must close: as much as the loop model may be wrong
-#: by, `torque_power.TORQUE_DOUBT`; chosen
-LEAST_CLOSED = 0.25
-#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing; chosen. An effect that
-#: passes may leave so small a gap, as the two halves of the data seldom share its seconds
-STANDS_OUT = 1.1
 
 
 def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
@@ -30,7 +24,8 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     one whose seconds are known from another vehicle's log, need close nothing.
     """
     chosen = selection.chosen
-    if not data.study.recorded or chosen is None or any(s.key == KNOWN_OVERHEAD for s in selection.named):
+    of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named)
+    if not selection.policy.must_close_gap or chosen is None or of_known_seconds:
         return None
     if names_one_of_the_loop(data, selection):
         return LEAST_CLOSED
@@ -76,7 +71,7 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
     None where no effect of the loop is named, or nothing else.
     """
     chosen = selection.chosen
-    if not data.study.recorded or chosen is None:
+    if not selection.policy.must_close_gap or chosen is None:
         return []
     names = [s.name for s in selection.named]
     others = [n for n in names if not _of_the_loop(data, [t for t in chosen.terms if t.name == n])]

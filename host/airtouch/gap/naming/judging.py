@@ -1,6 +1,12 @@
 """One hypothesis judged: fitted on one half of the flights and judged on the other, and the other way round.
 
-Of a few flights each half has some blocks of every flight.
+Of a few flights each half has some blocks of every flight. A hypothesis gains, in nats over no effect,
+
+    gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
+           + clock_gains                        log likelihood of the logged times, by effects that show there alone
+           - price_of                           PRICE of each parameter beyond an effect's first
+           - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
+           + gained_while_certain               what effects lose beside the first random one, given back (`Charges`)
 """
 
 from collections.abc import Sequence
@@ -13,6 +19,7 @@ from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
+from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
@@ -21,12 +28,6 @@ from airtouch.gap.signatures.term import Term, Terms
 
 GROUP = 3  #: neighbouring blocks that stay in one half, which is 5 s; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
-#: nats of held-out data that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap.md)
-LEAST_GAIN = 12.0
-#: the same for the first effect, against a floor from nominal flights; chosen, after 6 nats had given 4 false alarms on
-#: 46 flights of a fresh set (2026-11-21)
-FIRST_GAIN = 8.0
-PRICE = 0.9  #: nats, of each further parameter of an effect; chosen, near Akaike's 1 (1974)
 NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound; chosen: fits end just short of one
 
 
@@ -42,19 +43,23 @@ class PricedVariant(NamedTuple):
 class Trial:
     """What hypotheses are judged on.
 
-    parts: the two halves of the flights; base (2, 2): log likelihood of no effect, a row with the commands' floor as
-    certain as without random effects, one as with them, a column for each half.
+    parts: the two halves of the flights; policy: what they must show; none_certain, none_uncertain: log likelihood of
+    no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
+    them.
     """
 
     data: Data
     parts: tuple[BlockSet, BlockSet]
-    base: Sequence[Sequence[float]]
+    policy: NamingPolicy
+    none_certain: Sequence[float]
+    none_uncertain: Sequence[float]
 
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
     parts = halves(data)
-    return Trial(data, parts, [[judge(data, p, (), wide) for p in parts] for wide in (False, True)])
+    none_certain, none_uncertain = ([judge(data, p, (), wide) for p in parts] for wide in (False, True))
+    return Trial(data, parts, policy_of(data.study, data.seconds), none_certain, none_uncertain)
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
@@ -78,27 +83,19 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
     return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
 
-def price_of(terms: Sequence[Term]) -> float:
-    """Held-out nats that parameters beyond an effect's first must earn."""
-    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
+def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None, brief: bool = False) -> Candidate:
+    """The hypothesis that adds a variant to those effects of a base, fitted on each half and judged on the other.
 
-
-def cross_validated(trial: Trial, variant: PricedVariant, chosen: Candidate | None, brief: bool = False) -> Candidate:
-    """The hypothesis of a variant beside the effects that are chosen, fitted on each half and judged on the other.
-
-    brief: the fits are cut short, to see whether whole ones promise anything. The gain is that of all effects over
-    none, less what their parameters and the choice of their variants cost. Effects that are seen in the commands alone
-    gain less beside the first random one; it is not charged with that (`_lost_to_uncertainty`).
+    base: None for no effect; brief: the fits are cut short, to see whether whole ones promise anything.
     """
-    terms, before, charged = variant.terms, chosen.terms if chosen else (), chosen.charges if chosen else Charges()
-    charges = Charges(variant.choice_cost + charged.choice_cost,
-                      charged.gained_while_certain + _lost_to_uncertainty(trial, terms, chosen))
-    if chosen and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
-        gain, fits = chosen.gain, chosen.fits
+    terms, before = variant.terms, base.terms if base else ()
+    charges = _charges(trial, variant, base)
+    if base and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
+        gain, fits = base.gain, base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
-        fits = tuple(_fit_on(trial, half, spectral, chosen, brief) for half in (0, 1))
-        gain = _gain_in_spectra(trial, fits, charges, clock_gains(trial.data, before))
+        fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
+        gain = _charged_gain(trial, fits, charges, clock_gains(trial.data, before))
     of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
@@ -106,23 +103,44 @@ def cross_validated(trial: Trial, variant: PricedVariant, chosen: Candidate | No
     return Candidate(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
 
 
-def _gain_in_spectra(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
-    """Held-out nats of effects that were fitted to each half, with those of effects on the clock before them.
+def _charges(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Charges:
+    """The charges of a base and a variant.
 
-    charges: of all effects; of_clock: nats of those on the clock.
+    Beside the first random effect the commands' floor is less certain, so that the effects before it gain less. It is
+    not charged with that.
+    """
+    if base is None:
+        return Charges(variant.choice_cost)
+    lost = 0.0
+    if base.fits and random_of(variant.terms) and not random_of(base.terms):
+        lost = lost_beside_random(trial, base.fits)
+    return Charges(variant.choice_cost + base.charges.choice_cost, base.charges.gained_while_certain + lost)
+
+
+def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
+    """Nats that effects gain in the spectra after their charges, with those of effects on the clock before them.
+
+    fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
     held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP), of_clock)
     return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
 
 
-def _lost_to_uncertainty(trial: Trial, terms: Terms, chosen: Candidate | None) -> float:
-    """Nats that the effects chosen lose where these terms bring the first random one; else 0.
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | None, brief: bool) -> FittedTerms:
+    """Effects fitted on a half, from where those of a base ended there.
 
-    Beside a random effect the commands' floor is less certain.
+    The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
+    fewer effects.
     """
-    if chosen is None or not chosen.fits or random_of(chosen.terms) or not random_of(terms):
-        return 0.0
-    return lost_beside_random(trial, chosen.fits)
+    start, part = _start(base, terms, half), trial.parts[half]
+    key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
+    return trial.data.workspace.cached(
+        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
+
+
+def price_of(terms: Sequence[Term]) -> float:
+    """Held-out nats that parameters beyond an effect's first must earn."""
+    return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
 def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
@@ -131,24 +149,13 @@ def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
                for train, test in ROUND_TRIP)
 
 
-def _fit_on(trial: Trial, half: int, terms: Sequence[Term], chosen: Candidate | None, brief: bool) -> FittedTerms:
-    """Effects fitted on a half, from where those that are chosen ended there.
-
-    The fit is cached: an effect of the clock beside those that are chosen changes nothing of it, nor does a second
-    search among fewer effects.
-    """
-    start, part = _start(chosen, terms, half), trial.parts[half]
-    key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
-    return trial.data.workspace.cached(
-        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
-
-
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
     """Nats that fitted effects add on a half, over no effect with a commands' floor as certain.
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
-    return judge(trial.data, trial.parts[half], terms, wide) - trial.base[wide or bool(random_of(terms))][half]
+    none = trial.none_uncertain if wide or random_of(terms) else trial.none_certain
+    return judge(trial.data, trial.parts[half], terms, wide) - none[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
@@ -197,10 +204,10 @@ def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
     return fit(data, part, terms, mean_parameters(terms))
 
 
-def _start(chosen: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+def _start(base: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
     """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit."""
-    if chosen is None or not chosen.fits:
+    if base is None or not base.fits:
         return None
-    known = chosen.fits[half].scaled
+    known = base.fits[half].scaled
     size = sum(len(t.free) for t in terms if t.shows_in == MEAN)
     return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -6,7 +6,8 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
-from airtouch.gap.naming.judging import LEAST_GAIN, Trial, gain_of
+from airtouch.gap.naming.judging import Trial, gain_of
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.selection import Candidate, Charges, Step, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
@@ -43,13 +44,15 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
     return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), charges=Charges(effect.cost),
-                     strength=Strength(effect.strength), evidence=evidence, key=effect.key)
+                     strength=Strength(effect.strength), evidence=evidence, passing_key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step]) -> bool:
-    """Whether an effect that comes and goes adds no more to the effects named after it than in nominal flights."""
-    return any(s.named and s.name == passing.name
-               and passing_evidence(data, passing.key, s.share, passing.strength.mean) < LEAST_GAIN for s in steps)
+    """Whether an effect that comes and goes adds no more to the effects beside it than in nominal flights."""
+    key = passing.passing_key
+    assert key is not None  # it comes and goes
+    return any(passing_evidence(data, key, s.leave_one_out_gain, passing.strength.mean) < LEAST_GAIN
+               for s in steps if s.name == passing.name and s.named and s.leave_one_out_gain is not None)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""One round of the selection: every candidate beside the effects that are chosen already.
+"""One round of the selection: every candidate beside the hypothesis so far, its base.
 
 Screening every candidate costs little; the most promising are fitted in full.
 """
@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, PricedVariant, Trial, at_bound, cross_validated
+from airtouch.gap.naming.judging import PricedVariant, Trial, at_bound, cross_validated
+from airtouch.gap.naming.policy import FULL, LEAST_GAIN, PROMISING
 from airtouch.gap.naming.screening import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.naming.selection import Candidate, Strength
 from airtouch.gap.second_process import map_on_two_cores
@@ -18,21 +19,17 @@ from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import COMPANIONS, MEAN
 from airtouch.gap.signatures.term import Terms
 
-FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time
-#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time
-PROMISING = 0.5 * FIRST_GAIN
 
-
-def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], chosen: Candidate | None,
+def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Candidate | None,
              progress: Callable[[str], None] = lambda _: None, promising: Container[str] = ()) -> dict[str, Candidate]:
-    """The best hypothesis of every candidate beside what is chosen, by name, with its evidence.
+    """The best hypothesis of every candidate beside a base, by name, with its evidence.
 
-    candidates: variants by name; progress: called with every name; promising: names that are judged in full whatever
-    screening says.
+    candidates: variants by name; base: None for no effect; progress: called with every name; promising: names that are
+    judged in full whatever screening says.
     """
-    start = start_of(trial, chosen)
+    start = start_of(trial, base)
     variants, not_fitted = _screened(start, candidates, progress, promising)
-    fitted = map_on_two_cores(lambda v: _fitted(trial, v, chosen), variants)
+    fitted = map_on_two_cores(lambda v: _fitted(trial, v, base), variants)
     best = best_of_each([*fitted, *not_fitted], len(start.terms))
     return _with_evidence(trial.data.study.scatter, best, start.gain)
 
@@ -67,16 +64,16 @@ def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     return [*screened.unseen, *random, *means_to_fit], not_fitted
 
 
-def _fitted(trial: Trial, variant: PricedVariant, chosen: Candidate | None) -> Candidate:
-    """A variant fitted beside what is chosen.
+def _fitted(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Candidate:
+    """A variant fitted beside a base.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
     where that promises something.
     """
-    fit = partial(cross_validated, trial, variant, chosen)
+    fit = partial(cross_validated, trial, variant, base)
     if not all(t.signature.loop_only for t in variant.terms):
         return fit()
-    briefly, before = fit(brief=True), chosen.gain if chosen else 0.0
+    briefly, before = fit(brief=True), base.gain if base else 0.0
     return fit() if briefly.gain - before > PROMISING else briefly
 
 
@@ -93,7 +90,7 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
     """The hypotheses that are worth a full fit, and the others.
 
     screened: to first order, those of mean effects first, the best first: of the first FULL those are worth a fit
-    that gain PROMISING over the gain of what is chosen, nats; promising: names that are worth one at any gain.
+    that gain PROMISING over the gain of the base, nats; promising: names that are worth one at any gain.
     """
     worth_a_fit, others = [], []
     for place, candidate in enumerate(screened):
@@ -105,7 +102,7 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
 def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
     """The best hypothesis of each candidate, by name.
 
-    before: number of terms that were chosen before.
+    before: number of terms of the base.
     """
     best: dict[str, Candidate] = {}
     for new in sorted(judged, key=lambda c: len(c.terms)):

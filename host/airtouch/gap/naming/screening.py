@@ -1,4 +1,4 @@
-"""Screening: every variant of every candidate beside what is chosen, at a small part of what its fit would cost."""
+"""Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,16 +9,12 @@ import numpy as np
 
 from airtouch.gap.naming.first_order import Remainder, judge_means, judge_random, remainder_of, shows
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
+from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.selection import Candidate, Charges, Strength
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term, Terms
-
-HOPELESS = 0.5  #: nats that an effect must gain in screening to be fitted; chosen
-#: nats by which variants of an effect must differ in screening for the worse not to be fitted with its random part;
-#: chosen: odds of 20, as between candidates (`answer.ranking.CLOSE`)
-ALIKE = 3.0
 
 
 class ScreenedRandom(NamedTuple):
@@ -31,21 +27,21 @@ class ScreenedRandom(NamedTuple):
 
 @dataclass(frozen=True)
 class RoundStart:
-    """What a round begins from: the hypothesis that is chosen, None for no effect, and what it leaves of each half."""
+    """What a round begins from: its base, None for no effect, and what that leaves of each half."""
 
     trial: Trial
-    chosen: Candidate | None
+    base: Candidate | None
     halves: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
-        """Held-out nats of the hypothesis over no effect."""
-        return self.chosen.gain if self.chosen else 0.0
+        """Held-out nats of the base over no effect."""
+        return self.base.gain if self.base else 0.0
 
     @property
     def terms(self) -> Terms:
-        """The terms of the hypothesis that is chosen."""
-        return self.chosen.terms if self.chosen else ()
+        """The terms of the base."""
+        return self.base.terms if self.base else ()
 
 
 @dataclass
@@ -61,11 +57,11 @@ class Screened:
     unseen: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(trial: Trial, chosen: Candidate | None) -> RoundStart:
+def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
-    fitted = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     halves = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.parts)]
-    return RoundStart(trial, chosen, halves)
+    return RoundStart(trial, base, halves)
 
 
 def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
@@ -89,14 +85,14 @@ def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]]
     return screened
 
 
-def addable(name: str, variants: Sequence[Terms], chosen: Terms) -> list[PricedVariant]:
-    """The variants of an effect that may stand beside those that are chosen.
+def addable(name: str, variants: Sequence[Terms], base: Terms) -> list[PricedVariant]:
+    """The variants of an effect that may stand beside the terms of a base.
 
-    None may where another name for the same thing is chosen, and a variant may not of which a term is chosen already
+    None may where the base has another name for the same thing, and a variant may not of which the base has a term
     (the same effect of another rotor is another term). Each costs log n nats for the choice among the n variants with
     as many terms: else many variants would gain more than one by chance.
     """
-    without_companions = [t for t in chosen if not t.companion]
+    without_companions = [t for t in base if not t.companion]
     if any(t.name != name and interchangeable(name, t.name) for t in without_companions):
         return []
     identities = {t.identity for t in without_companions}
@@ -165,7 +161,7 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
 
 
 def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Candidate]]:
-    """By name, the best hypothesis of so many terms, and those of the same effect less than ALIKE nats behind it.
+    """By name, the best hypothesis of so many terms, and those of the same effect about as good (ABOUT_AS_GOOD).
 
     means: best first.
     """
@@ -173,7 +169,7 @@ def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Ca
     for mean in means:
         if len(mean.terms) == length:
             best = out.setdefault(mean.name, [])
-            if not best or best[0].gain - mean.gain < ALIKE:
+            if not best or best[0].gain - mean.gain < ABOUT_AS_GOOD:
                 best.append(mean)
     return out
 

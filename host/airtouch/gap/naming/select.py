@@ -14,12 +14,13 @@ from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
-from airtouch.gap.naming.contradiction import contradicted
+from airtouch.gap.naming.contradiction import contradiction_of
 from airtouch.gap.naming.forward import Search, State, forward
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, trial_of
+from airtouch.gap.naming.judging import Trial, trial_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
+from airtouch.gap.naming.policy import WAKE_SHARE
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import UNKNOWN_GAIN, Candidate, NamelessGain, NominalFlights, Selection
+from airtouch.gap.naming.selection import Candidate, NamelessGain, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
@@ -27,10 +28,6 @@ from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
 from airtouch.gap.signatures.term import Terms
 from airtouch.simulation import effects
 
-#: fraction of the evidence for the likeliest effect that a wake must have for the replay to name it, as its shape may
-#: differ from that of its class; chosen: three simulated wakes that fill a flight have 0.09 to 0.10, four motor noises
-#: that the replay took for a wake 0.01 to 0.02 (host/docs/looks.md, 2026-11-25 11:53)
-WAKE_SHARE = 0.05
 PACKAGE_EFFECTS = frozenset(effects.NAMES)  #: names of the package's effects; others are a user's own
 
 
@@ -47,14 +44,13 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     without: effects that are not searched for as ones that come and go.
     """
     trial = trial_of(data)
-    alone = round_of(trial, candidates, None, progress)
-    # without a model of the loop the first effect must gain as much as a further one; of evidence, FIRST_GAIN is enough
-    least = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
-    search = Search(trial, candidates, alone, least, progress)
+    singles = round_of(trial, candidates, None, progress)
+    least = dict.fromkeys(singles, trial.policy.first_gain)
+    search = Search(trial, candidates, singles, least, progress)
     inference = inference_of(data, list(candidates))
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without)
-    passing = passing_effect(trial, alone, least, without)
+    passing = passing_effect(trial, singles, least, without)
     answer = _by_replay(search, forward(search, passing), passing)
     own_effect_explains = answer.explained and bool(answer.named) and answer.named[0].name not in PACKAGE_EFFECTS
     if inference is None or own_effect_explains:
@@ -68,10 +64,10 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake or
     another effect of ALWAYS_RANDOM, or the likeliest by the relations.
     """
-    answer = selection_by_relations(search.trial, search.candidates, search.alone, inference, search.progress)
+    answer = selection_by_relations(search.trial, search.candidates, search.singles, inference, search.progress)
     if answer.explained:
         return answer
-    passing = passing_effect(search.trial, search.alone, search.least_gain, without)
+    passing = passing_effect(search.trial, search.singles, search.least_gain, without)
     if not replay_may_name(passing, inference):
         return answer
     state = forward(search, passing)
@@ -102,29 +98,24 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     passing: the effect that comes and goes, its first step; the search is done again without it where beside the other
     effects it is no more than nominal flights have.
     """
-    trial, study = search.trial, search.trial.data.study
+    trial, policy = search.trial, search.trial.policy
     if passing is not None and as_in_nominal_flights(trial.data, passing, state.steps):
         state = forward(search, None)
     last = state.steps[-1].terms if state.steps else ()
-    alone = nameless_nats(trial, None)
-    beside = nameless_nats(trial, state.steps[-1]) if state.steps else alone
+    over_none = nameless_nats(trial, None)
+    over_last_step = nameless_nats(trial, state.steps[-1]) if state.steps else over_none
     selection = Selection(
         singles=state.singles, steps=state.steps, parts=trial.parts, least_gain=state.least_gain,
-        nameless=NamelessGain(alone, beside, clock_left(trial.data, last)),
-        nominal=NominalFlights(study.nominal_count, _nameless_gain_of_nominal_flights(trial.data), study.simulated,
-                               study.same_models),
-        assumed=bool(random_of(last)) if study.simulated else assumes(trial.data, last))
-    return replace(selection, contradicted=contradicted(trial, selection.chosen)) if study.simulated else selection
+        nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
+        policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
+    if not policy.judges_over_prediction:
+        return selection
+    return replace(selection, contradiction=contradiction_of(trial, selection.chosen))
 
 
-def nameless_nats(trial: Trial, chosen: Candidate | None) -> float:
+def nameless_nats(trial: Trial, base: Candidate | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
-    fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.parts, fits)), 0.0)
-    return of_spectra + clock_left(trial.data, chosen.terms if chosen else ())
+    return of_spectra + clock_left(trial.data, base.terms if base else ())
 
-
-def _nameless_gain_of_nominal_flights(data: Data) -> float:
-    """Nats that the nameless model gains in nominal flights as long as these; 0 where no scatter says."""
-    scatter = data.study.scatter
-    return scatter.allowed(data.seconds, UNKNOWN_GAIN) if scatter else 0.0

@@ -8,24 +8,10 @@ import numpy as np
 
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import BlockSet
+from airtouch.gap.naming.policy import NamingPolicy
 from airtouch.gap.relations.inference import Against, Inference
 from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
 from airtouch.gap.signatures.term import Terms
-
-#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`: UNKNOWN_GAIN
-#: where two nominal flights or more gave the floor, UNKNOWN_ALONE where one or none did; both chosen
-#: (host/docs/gap.md, "What `unknown` means")
-UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
-#: share of what the effects named gain that the nameless model may gain as well, as no model is exact: UNKNOWN_ASSUMED
-#: where one of them is random or changes the loop of recorded flights, so that its spectrum is assumed, not measured;
-#: both chosen
-UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
-#: factor on these shares in flights of this project's simulator and firmware, whose models are exact; chosen, after the
-#: nameless model had gained at most 0.36 of what it may beside right names in 78 such flights (2026-11-23)
-SAME_MODELS = 0.5
-#: held-out nats that count as one where candidates are compared: log likelihoods of real flights are too sure of
-#: themselves; chosen
-TEMPERATURE = 6.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +56,8 @@ class Candidate:
     `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only screened;
     full: whether it was fitted to the end, not screened or fitted briefly. Of the newest effect: strength; evidence:
     nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
-    flights; key: where it comes and goes, the entry of `Scatter.passing` that it is compared with, else "".
+    flights; passing_key: where it comes and goes, the entry of `Scatter.passing` that it is compared with,
+    else None.
     """
 
     name: str
@@ -81,7 +68,7 @@ class Candidate:
     charges: Charges = Charges()
     strength: Strength = field(default_factory=Strength)
     evidence: float = 0.0
-    key: str = ""
+    passing_key: str | None = None
 
     @property
     def of_the_log(self) -> bool:
@@ -94,12 +81,13 @@ class Step(Candidate):
     """A candidate that a selection has added to the steps before it.
 
     named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights have
-    as well, and stands beside the effects named. share: where several effects are named, the leave-one-out gain of the
-    newest, nats; infinite where it is named alone.
+    as well, and stands beside the effects named. leave_one_out_gain: what the newest adds to the
+    others, nats: of effects that are named where there are several, and of one that comes and goes beside any step;
+    else None.
     """
 
     named: bool = True
-    share: float = np.inf
+    leave_one_out_gain: float | None = None
 
     @classmethod
     def of(cls, candidate: Candidate, named: bool = True) -> "Step":
@@ -118,20 +106,6 @@ class NamelessGain:
     over_none: float = 0.0
     over_last_step: float = 0.0
     of_times: float = 0.0
-
-
-@dataclass(frozen=True)
-class NominalFlights:
-    """The nominal flights that gave the floor, as far as they say how much the effects named may leave.
-
-    count: how many; nameless_gain: nats that the nameless model gains in nominal flights as long as those judged;
-    simulated, same_models: as the study has them.
-    """
-
-    count: int
-    nameless_gain: float
-    simulated: bool = False
-    same_models: bool = False
 
 
 class Contradiction(NamedTuple):
@@ -154,9 +128,9 @@ class Selection:
 
     singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
     nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
-    candidate must gain as the first; nominal: the flights that gave the floor; assumed: whether the spectrum of a
-    chosen effect is assumed, as it is random or changes the loop of recorded flights; contradicted: over-prediction of
-    the effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
+    candidate must gain as the first; policy: what the flights must show; assumed: whether the spectrum of a chosen
+    effect is assumed, as it is random or changes the loop of recorded flights; contradiction: over-prediction of the
+    effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
     flights name no more.
     """
 
@@ -165,9 +139,9 @@ class Selection:
     nameless: NamelessGain
     parts: tuple[BlockSet, BlockSet]
     least_gain: Mapping[str, float]
-    nominal: NominalFlights
+    policy: NamingPolicy
     assumed: bool
-    contradicted: Contradiction = Contradiction()
+    contradiction: Contradiction = Contradiction()
     inference: Inference | None = None
     taken_back: TakenBack = TakenBack()
 
@@ -178,8 +152,9 @@ class Selection:
 
     @property
     def named(self) -> tuple[Step, ...]:
-        """The steps whose effects are named, the largest share first, faults of the log's own times last."""
-        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
+        """The steps whose effects are named: what adds most to the others first, faults of the log's own times last."""
+        named = (s for s in self.steps if s.named)
+        return tuple(sorted(named, key=lambda s: (s.of_the_log, -(s.leave_one_out_gain or 0.0))))
 
     @property
     def chosen(self) -> Candidate | None:
@@ -203,25 +178,9 @@ class Selection:
         """
         if self.inference is not None:
             return self.inference.against
-        return Against(self.nameless.over_last_step, self._most_nameless_gain, of_distance=False)
-
-    @property
-    def _most_nameless_gain(self) -> float:
-        """Nats that the nameless model may gain beside the effects named where they are right.
-
-        The fewer nominal flights there are, the farther off may another one lie.
-        """
-        nominal = self.nominal
-        if nominal.count < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.nameless.over_none, nominal.nameless_gain)
-        gained = self.last_step.gain if self.last_step else 0.0
-        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if nominal.same_models else 1.0)
-        return max(self.least_left, share * gained, 0.0 if nominal.simulated else nominal.nameless_gain)
-
-    @property
-    def least_left(self) -> float:
-        """Nats that are no news however little the effects named gain, with two nominal flights or more."""
-        return UNKNOWN_GAIN * (self.nominal.count + 1) / (self.nominal.count - 1)
+        gain = self.last_step.gain if self.last_step else 0.0
+        limit = self.policy.unknown.nats(gain, self.nameless.over_none, self.assumed)
+        return Against(self.nameless.over_last_step, limit, of_distance=False)
 
     @property
     def against_over_limit(self) -> float:
@@ -233,7 +192,7 @@ class Selection:
     @property
     def loss_over_chance(self) -> float:
         """Nats of over-prediction over those that may be chance."""
-        return self.contradicted.nats / self.least_left if self.contradicted.nats else 0.0
+        return self.contradiction.nats / self.policy.unknown.least if self.contradiction.nats else 0.0
 
     @property
     def explained(self) -> bool:

@@ -11,24 +11,11 @@ from airtouch.gap.evidence.cells import CELLS, sensor_cells
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
-from airtouch.gap.naming.judging import LEAST_GAIN, Trial, held_out_cell_gains
+from airtouch.gap.naming.judging import Trial, held_out_cell_gains
+from airtouch.gap.naming.policy import LEAST_GAIN, RANDOM_SHARE
 from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
-
-# The shares below are fractions of the nats that the effects of a hypothesis gain. A further effect must gain as much
-# beside them, since what their models are wrong by may look like it.
-LEAST_SHARE = 0.01  #: in simulated flights, of what is gained in the cells that the further effect improves; chosen
-RECORDED_SHARE = 0.1  #: in recorded flights, of the whole gain, as no model of air is exact; chosen
-#: for an effect that changes the loop, beside one that is random or changes it too, with this project's own firmware;
-#: chosen: twice the 5 % that wrong ones gained at most beside right ones in 43 simulated flights (2026-11-23)
-ASSUMED_SHARE = 0.1
-#: the same with any other firmware; chosen, as large as the error of the loop model `torque_power.TORQUE_DOUBT`
-LOOP_SHARE = 0.25
-#: for a random effect, to be named; chosen. Beside weak motors and offset masses, motor noise that was not there gained
-#: 3 to 16 % in simulated flights (host/docs/looks.md, 2026-11-23 19:09): the yaw command of the logged instant is not
-#: that of the 10 ms around it
-RANDOM_SHARE = 0.25
 
 
 def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> float:
@@ -38,9 +25,8 @@ def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> fl
     """
     names = {t.name for t in base.terms}
     new = [t for t in extended.terms if t.name not in names]
-    share = RECORDED_SHARE if trial.data.study.recorded else LEAST_SHARE
-    if assumes(trial.data, base.terms) and changes_loop(trial.data, new):
-        share = ASSUMED_SHARE if trial.data.study.same_models else LOOP_SHARE
+    looks_alike = assumes(trial.data, base.terms) and changes_loop(trial.data, new)
+    share = trial.policy.loop_misfit_share if looks_alike else trial.policy.misfit_share
     return misfit(trial, base, extended, share, everywhere=is_random(extended.name))
 
 
@@ -53,13 +39,13 @@ def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, eve
     """Nats that a further effect may gain because the models of those before it are wrong by a share of their gain.
 
     It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects on the logged times gain does
-    not count, as these are no models. In simulated flights a model is wrong where it acts, so that only its gain in
-    cells counts in which the further effect gains (`gain_in_improved_cells`), unless `everywhere`. These cells are not
-    worked out for a further effect that gains more than the share of the whole.
+    not count, as these are no models. With `NamingPolicy.misfit_by_cell`, and unless `everywhere`, only the gain in
+    cells in which the further effect gains counts (`gain_in_improved_cells`). These cells are not worked out for a
+    further effect that gains more than the share of the whole.
     """
     whole = max(LEAST_GAIN, share * (base.gain - clock_gains(trial.data, base.terms)))
     fitted = extended.full and extended.fits and base.fits
-    if everywhere or trial.data.study.recorded or not fitted or extended.gain - base.gain >= whole:
+    if everywhere or not trial.policy.misfit_by_cell or not fitted or extended.gain - base.gain >= whole:
         return whole
     there = gain_in_improved_cells(held_out_cell_gains(trial, base), held_out_cell_gains(trial, extended))
     return max(LEAST_GAIN, share * there)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.naming.judging import FIRST_GAIN
+from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import SEEN

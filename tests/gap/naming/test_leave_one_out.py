@@ -6,8 +6,8 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging
+from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.selection import Step
-from airtouch.gap.naming.shares import with_shares
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import VEHICLE, fly
@@ -44,18 +44,18 @@ def test_each_adds_the_gain_of_all_less_that_of_the_others(late, effects):
     """Late sensors gain more while no noise has made the commands' floor uncertain: nobody else adds that."""
     steps = added(late, *effects)
     assert steps[-1].charges.gained_while_certain > 400.0
-    for place, step in enumerate(with_shares(late, steps)):
-        assert step.share == pytest.approx(steps[-1].gain - gain_of_all_but(late, effects, place), abs=0.5)
+    for place, step in enumerate(with_leave_one_out_gains(late, steps)):
+        assert step.leave_one_out_gain == pytest.approx(steps[-1].gain - gain_of_all_but(late, effects, place), abs=0.5)
 
 
 def test_of_two_weak_rotors_one_is_left_without_the_other():
     on, effects = judging.trial_of(Data(FLOOR, [weak(r2=0.01, r3=0.02)])), (("weak_motor", 1), ("weak_motor", 2))
     steps = added(on, *effects)
-    for place, step in enumerate(with_shares(on, steps)):
-        assert step.share == pytest.approx(steps[-1].gain - gain_of_all_but(on, effects, place), abs=0.3)
-        assert step.share < 0.9 * steps[-1].gain
+    for place, step in enumerate(with_leave_one_out_gains(on, steps)):
+        assert step.leave_one_out_gain == pytest.approx(steps[-1].gain - gain_of_all_but(on, effects, place), abs=0.3)
+        assert step.leave_one_out_gain < 0.9 * steps[-1].gain
 
 
-def test_an_effect_that_is_named_alone_and_a_deviation_have_no_share(late):
+def test_an_effect_that_is_named_alone_and_a_deviation_have_none(late):
     latency, bias = added(late, LATE, BIAS)
-    assert with_shares(late, [latency, replace(bias, named=False)])[0].share == float("inf")
+    assert with_leave_one_out_gains(late, [latency, replace(bias, named=False)])[0].leave_one_out_gain is None

@@ -1,4 +1,4 @@
-"""The share of each of several effects: its leave-one-out gain.
+"""What each of several effects adds to the others: its leave-one-out gain.
 
 The gains of all effects and of all but one are those of `judging.cross_validated`: effects before the first random one
 are not charged with what they gain less once the commands' floor is less certain.
@@ -17,15 +17,16 @@ from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
 
-def with_shares(trial: Trial, steps: Sequence[Step]) -> list[Step]:
-    """The steps of a selection, with the `share`, nats, of those that stand beside others.
+def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
+    """The steps of a selection, with the leave-one-out gain of those that stand beside others.
 
     These are all that are named, where there are several, and one that comes and goes beside any other: what is as
     strong as in nominal flights may have its seconds as well.
     """
     several = sum(s.named for s in steps) > 1
-    return [replace(s, share=steps[-1].gain - _gain_without(trial, steps, place))
-            if s.named and (several or (s.key and len(steps) > 1)) else s for place, s in enumerate(steps)]
+    return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
+            if s.named and (several or (s.passing_key is not None and len(steps) > 1)) else s
+            for place, s in enumerate(steps)]
 
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:

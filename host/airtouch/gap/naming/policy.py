@@ -1,0 +1,159 @@
+"""Every number that was chosen for the decision which effects are named, and how it depends on the flights.
+
+A constant holds for all flights. What depends on the study that they are compared with stands in `NamingPolicy`, and
+`policy_of` alone makes it of the study.
+"""
+
+from dataclasses import dataclass
+
+from airtouch.gap.signals.study import Study
+
+# -- Gains required, nats of held-out data --
+
+#: that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap-method.md)
+LEAST_GAIN = 12.0
+#: the same for the first effect, against a floor from nominal flights; chosen, after 6 nats had given 4 false alarms on
+#: 46 flights of a fresh set (2026-11-21)
+FIRST_GAIN = 8.0
+PRICE = 0.9  #: of each further parameter of an effect; chosen, near Akaike's 1 (1974)
+#: that count as one where candidates are compared: log likelihoods of real flights are too sure of themselves; chosen
+TEMPERATURE = 6.0
+
+# -- Search --
+
+#: nats that an effect must gain in screening to be fitted; chosen
+HOPELESS = 0.5
+#: nats that a variant's mean term may be behind the best in screening and still be fitted with its random part; chosen:
+#: odds of 20, as between candidates (`answer.ranking.CLOSE`)
+ABOUT_AS_GOOD = 3.0
+#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time
+PROMISING = 0.5 * FIRST_GAIN
+FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time
+MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
+MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`forward`); chosen
+CERTAIN = 20.0  #: nats of evidence beyond which more does not rank a candidate higher (`forward`); chosen
+#: of FIRST_GAIN: candidates that gained less are not judged again beside a deviation; chosen, to save their fits
+WORTH_AGAIN = 0.25
+#: fraction of the evidence for the likeliest effect that a wake must have for the replay to name it, as its shape may
+#: differ from that of its class; chosen: three simulated wakes that fill a flight have 0.09 to 0.10, four motor noises
+#: that the replay took for a wake 0.01 to 0.02 (host/docs/looks.md, 2026-11-25 11:53)
+WAKE_SHARE = 0.05
+
+# -- Misfit: fractions of the nats that the effects of a hypothesis gain --
+# No model of an effect is exact. A further effect must gain as much beside them, since what their models are wrong by
+# may look like it.
+
+LEAST_SHARE = 0.01  #: in simulated flights, of what is gained in the cells that the further effect improves; chosen
+RECORDED_SHARE = 0.1  #: in recorded flights, of the whole gain, as no model of air is exact; chosen
+#: for an effect that changes the loop, beside one that is random or changes it too, with this project's own firmware;
+#: chosen: twice the 5 % that wrong ones gained at most beside right ones in 43 simulated flights (2026-11-23)
+ASSUMED_SHARE = 0.1
+#: the same with any other firmware; chosen, as large as the error of the loop model `torque_power.TORQUE_DOUBT`
+LOOP_SHARE = 0.25
+#: for a random effect, to be named; chosen. Beside weak motors and offset masses, motor noise that was not there gained
+#: 3 to 16 % in simulated flights (host/docs/looks.md, 2026-11-23 19:09): the yaw command of the logged instant is not
+#: that of the 10 ms around it
+RANDOM_SHARE = 0.25
+
+# -- `unknown` and over-prediction --
+
+#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`: UNKNOWN_GAIN
+#: where two nominal flights or more gave the floor, UNKNOWN_ALONE where one or none did; both chosen
+#: (host/docs/gap-method.md, "What `unknown` means")
+UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
+#: share of what the effects named gain that the nameless model may gain as well, as no model is exact: UNKNOWN_ASSUMED
+#: where one of them is random or changes the loop of recorded flights, so that its spectrum is assumed, not measured;
+#: both chosen
+UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
+#: factor on these shares in flights of this project's simulator and firmware, whose models are exact; chosen, after the
+#: nameless model had gained at most 0.36 of what it may beside right names in 78 such flights (2026-11-23)
+SAME_MODELS = 0.5
+#: nats that a right effect may lose in a cell by chance; chosen: by the bound in `contradiction.losses` the chance of
+#: more is at most 37 %
+CHANCE_LOSS = 1.0
+
+# -- What names must close of the gap of recorded flights --
+
+#: share of the gap that an effect of the loop, or one that passes, must close: as much as the loop model may be wrong
+#: by, `torque_power.TORQUE_DOUBT`; chosen
+LEAST_CLOSED = 0.25
+#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing; chosen. An effect that
+#: passes may leave so small a gap, as the two halves of the data seldom share its seconds
+STANDS_OUT = 1.1
+
+
+@dataclass(frozen=True)
+class UnknownLimit:
+    """What the nameless model may gain beside the effects named where these are right.
+
+    least: nats that are no news however little the effects gain; share, assumed_share: fraction of what they gain,
+    where their spectra are measured, and where one is assumed; share_over_none: fraction of what the model gains over
+    no effect; nominal_gain: nats that it gains in nominal flights as long as these, 0 where that does not count.
+    """
+
+    least: float
+    share: float = 0.0
+    assumed_share: float = 0.0
+    share_over_none: float = 0.0
+    nominal_gain: float = 0.0
+
+    def nats(self, gain: float, over_none: float, assumed: bool) -> float:
+        """The limit, nats: the largest of what each field allows.
+
+        gain: of the effects named; over_none: of the nameless model over no effect; assumed: whether the spectrum of
+        one effect is assumed.
+        """
+        share = self.assumed_share if assumed else self.share
+        return max(self.least, share * gain, self.share_over_none * over_none, self.nominal_gain)
+
+
+@dataclass(frozen=True)
+class NamingPolicy:
+    """What flights must show for effects to be named, as far as that depends on their study.
+
+    first_gain: nats that the first effect must gain; of its evidence FIRST_GAIN is always enough.
+
+    misfit_share: fraction of their gain that the models of effects may be wrong by; loop_misfit_share: the same for an
+    effect that changes the loop, beside one whose spectrum is assumed; misfit_by_cell: whether a model is wrong only
+    where it acts, so that the gain in improved cells alone counts.
+
+    loop_is_assumed: whether the spectrum of an effect that changes the loop is assumed, not measured;
+    judges_over_prediction: whether effects are held against what the flights do not show; must_close_gap: whether
+    names must close a part of the gap; unknown: what the nameless model may gain.
+    """
+
+    first_gain: float
+    misfit_share: float
+    loop_misfit_share: float
+    misfit_by_cell: bool
+    loop_is_assumed: bool
+    judges_over_prediction: bool
+    must_close_gap: bool
+    unknown: UnknownLimit
+
+
+def policy_of(study: Study, seconds: float) -> NamingPolicy:
+    """The policy for flights of so many seconds that are compared with a study."""
+    return NamingPolicy(
+        first_gain=LEAST_GAIN if study.controller is None else FIRST_GAIN,
+        misfit_share=RECORDED_SHARE if study.recorded else LEAST_SHARE,
+        loop_misfit_share=ASSUMED_SHARE if study.same_models else LOOP_SHARE,
+        misfit_by_cell=not study.recorded,
+        loop_is_assumed=not study.simulated,
+        judges_over_prediction=study.simulated,
+        must_close_gap=study.recorded,
+        unknown=unknown_limit(study, seconds))
+
+
+def unknown_limit(study: Study, seconds: float) -> UnknownLimit:
+    """What the nameless model may gain in flights of so many seconds that are compared with a study.
+
+    The fewer nominal flights there are, the farther off may another one lie.
+    """
+    n = study.nominal_count
+    nominal_gain = 0.0 if study.scatter is None else study.scatter.allowed(seconds, UNKNOWN_GAIN)
+    if n < 2:
+        return UnknownLimit(UNKNOWN_ALONE, share_over_none=UNKNOWN_ASSUMED, nominal_gain=nominal_gain)
+    exactness = SAME_MODELS if study.same_models else 1.0
+    return UnknownLimit(UNKNOWN_GAIN * (n + 1) / (n - 1), UNKNOWN_SHARE * exactness, UNKNOWN_ASSUMED * exactness,
+                        nominal_gain=0.0 if study.simulated else nominal_gain)
