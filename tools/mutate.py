@@ -43,8 +43,8 @@ GROUPS = {
         "reference/networks", "kernels/test_network.py", "kernels/test_stream.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/evidence/cells.py", *(f"gap/naming/{name}.py" for name in (
-        "contradiction", "forward", "judging", "leave_one_out", "passing_effect", "policy", "rounds", "screening",
-        "select", "thresholds"))), tuple(f"gap/naming/test_{name}.py" for name in (
+        "forward", "judging", "leave_one_out", "over_prediction", "passing_effect", "policy", "rounds",
+        "screening/screen", "select", "thresholds"))), tuple(f"gap/naming/test_{name}.py" for name in (
             "forward", "policy", "rounds", "screening", "select", "select_beside", "thresholds"))),
 }
 #: mutmut's exit codes, by what they say

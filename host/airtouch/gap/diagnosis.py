@@ -20,9 +20,8 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.by_relations import signs_not_shown
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.policy import LEAST_CLOSED
+from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.select import select
-from airtouch.gap.naming.selection import Selection
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
@@ -211,7 +210,7 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
         gap_of_rest = gap_of(data, rest.parts, rest.chosen)
-        if gap.named.share.value - gap_of_rest.named.share.value < LEAST_CLOSED:
+        if gap_closure.loop_closes_too_little(gap.named.share.value, gap_of_rest.named.share.value):
             selection = replace(rest, singles={**selection.singles, **rest.singles}, least_gain=selection.least_gain)
             gap = gap_of_rest
     closed = gap.named.share.value

@@ -8,10 +8,10 @@ import pytest
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
 from airtouch.gap.naming.policy import policy_of
-from airtouch.gap.naming.selection import (
+from airtouch.gap.naming.records import (
     Candidate,
-    Contradiction,
     NamelessGain,
+    OverPrediction,
     Selection,
     Step,
     TakenBack,
@@ -40,7 +40,7 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
         steps.append(replace(Step.of(judged(n, total)), leave_one_out_gain=0.25 * EVIDENCE[n]))
     related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
     return Selection(singles, tuple(steps), NamelessGain(150.0, beside), (None, None), dict.fromkeys(EVIDENCE, 8.0),
-                     POLICY, assumed=False, contradiction=Contradiction(*lost), inference=related)
+                     POLICY, assumed=False, over_prediction=OverPrediction(*lost), inference=related)
 
 
 def test_the_answer_needs_no_reason():
@@ -113,8 +113,8 @@ def test_what_is_named_and_not_enough_is_held_against_itself():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
     open_gap = selection(beside=70.0)
     assert why_not(open_gap, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
-    contradicted = selection(lost=(60.0, "yaw torque"))
-    assert why_not(contradicted, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
+    over_predicting = selection(lost=(60.0, "yaw torque"))
+    assert why_not(over_predicting, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
                                                         "most in yaw torque; 18 may be chance")
 
 

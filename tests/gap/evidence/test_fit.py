@@ -8,7 +8,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signatures import candidates
 from gap_flights import fly
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming.first_order import judge_means, remainder_of
 from airtouch.gap.naming.judging import trial_of
+from airtouch.gap.naming.screening.first_order import judge_means, remainder_of
 from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signatures.candidates import terms
 from hovers import DOWN, FLOOR, hover

@@ -5,7 +5,7 @@ import pytest
 from airtouch.gap.naming import forward as module
 from airtouch.gap.naming.forward import Search, forward
 from airtouch.gap.naming.policy import FIRST_GAIN, LEAST_GAIN, MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.records import Candidate
 
 
 @pytest.fixture

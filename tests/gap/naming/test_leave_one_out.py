@@ -7,7 +7,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
-from airtouch.gap.naming.selection import Step
+from airtouch.gap.naming.records import Step
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import VEHICLE, fly

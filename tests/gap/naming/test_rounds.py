@@ -10,8 +10,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds, select
 from airtouch.gap.naming.judging import PricedVariant, covariance_among_all, cross_validated
 from airtouch.gap.naming.policy import HOPELESS, LEAST_GAIN
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, with_a_push

@@ -6,8 +6,8 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD
-from airtouch.gap.naming.screening import addable, screen_random, start_of
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.screening.screen import addable, screen_random, start_of
 from airtouch.gap.signatures.candidates import all_candidates, random_of
 from hovers import FLOOR, hover
 

@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.evidence.cells import CELLS, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.naming import thresholds
 from airtouch.gap.naming.policy import LEAST_GAIN
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signals.channels import CHANNELS
 
 FORCE_X, FORCE_Z, TORQUE_X, RATE_Y = (

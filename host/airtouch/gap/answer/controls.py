@@ -8,7 +8,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.selection import Candidate, Selection
+from airtouch.gap.naming.records import Candidate, Selection
 from airtouch.gap.result import Control, Diagnosis, Shrink
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates

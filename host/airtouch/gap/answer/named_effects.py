@@ -12,7 +12,7 @@ from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.judging import at_bound
-from airtouch.gap.naming.selection import Candidate, Selection
+from airtouch.gap.naming.records import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.candidates import term_of

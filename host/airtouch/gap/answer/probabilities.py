@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.naming.policy import TEMPERATURE
-from airtouch.gap.naming.selection import Selection
+from airtouch.gap.naming.records import Selection
 
 LEAD = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
 #: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAD

@@ -7,7 +7,7 @@ from airtouch.gap.answer.reasons import why_not
 from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
-from airtouch.gap.naming.selection import Selection
+from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK

@@ -1,7 +1,7 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
 from airtouch.gap.naming.policy import FIRST_GAIN
-from airtouch.gap.naming.selection import Candidate, Selection, Step
+from airtouch.gap.naming.records import Candidate, Selection, Step
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
@@ -68,8 +68,8 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 def against(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
-    lost, worst = selection.contradiction
-    if selection.loss_over_chance == selection.against_over_limit:
+    lost, worst = selection.over_prediction
+    if selection.over_prediction_ratio == selection.against_over_limit:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")

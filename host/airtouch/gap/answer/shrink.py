@@ -16,7 +16,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.flights.clock import LEAST_JITTER_S
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.signature import CLOCK

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.naming.selection import Selection
+from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts

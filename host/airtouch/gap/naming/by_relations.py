@@ -9,8 +9,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import Trial
 from airtouch.gap.naming.policy import FIRST_GAIN
+from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.term import Terms

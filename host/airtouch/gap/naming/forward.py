@@ -8,14 +8,15 @@ from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.policy import (
     CERTAIN,
     FIRST_GAIN,
-    LEAST_GAIN,
     MOST_DEVIATIONS,
     MOST_EFFECTS,
+    PASSING_GAIN,
+    SURE_EVIDENCE,
     TEMPERATURE,
     WORTH_AGAIN,
 )
+from airtouch.gap.naming.records import Candidate, Step
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, Step
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
@@ -87,8 +88,8 @@ def _begun(search: Search, passing: Candidate | None) -> State:
         return State((), search.singles, search.least_gain, search.singles, search.least_gain)
     singles = {**search.singles, passing.name: passing}
     steps = (Step.of(passing),)
-    extensions, least_further = _beside(search, steps, singles)
-    return State(steps, extensions, least_further, singles, {**search.least_gain, passing.name: LEAST_GAIN})
+    extensions, least_further = _beside(search, steps, singles, {n: c.gain for n, c in singles.items()})
+    return State(steps, extensions, least_further, singles, {**search.least_gain, passing.name: PASSING_GAIN})
 
 
 def _worth_adding(state: State) -> dict[str, Candidate]:
@@ -120,23 +121,23 @@ def _added(search: Search, state: State, best: Candidate) -> State:
     after = replace(state, steps=steps, singles=singles)
     if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    over_before = {n: replace(c, gain=c.gain - state.gain) for n, c in state.extensions.items()}
-    extensions, least_further = _beside(search, steps, over_before)
+    further_gains = {n: c.gain - state.gain for n, c in state.extensions.items()}
+    extensions, least_further = _beside(search, steps, state.extensions, further_gains)
     return replace(after, extensions=extensions, least_further_gain=least_further)
 
 
-def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate],
+def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate], further_gains: Mapping[str, float],
             ) -> tuple[dict[str, Candidate], dict[str, float]]:
     """Candidates judged beside the steps so far, and the nats that each must gain.
 
-    before: candidates as judged before the newest step, with their gain over the steps then. Beside a deviation of
-    nominal flights only those are judged again that gained something without it, as a deviation takes gain from others
-    and seldom adds any.
+    before: candidates as judged before the newest step; further_gains: nats that each of them gained over the steps
+    then. Beside a deviation of nominal flights only those are judged again that gained something without it, as a
+    deviation takes gain from others and seldom adds any.
     """
     trial, named = search.trial, any(s.named for s in steps)
-    gained = {n for n, c in before.items() if c.gain > WORTH_AGAIN * FIRST_GAIN}
+    gained = {n for n, gain in further_gains.items() if gain > WORTH_AGAIN * FIRST_GAIN}
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
-    sure = {n for n, c in before.items() if c.full and c.evidence >= LEAST_GAIN and not is_random(n)}
+    sure = {n for n, c in before.items() if c.full and c.evidence >= SURE_EVIDENCE and not is_random(n)}
     extensions = round_of(trial, worth, steps[-1], search.progress, promising=sure)
     return extensions, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN
                         for n, c in extensions.items()}

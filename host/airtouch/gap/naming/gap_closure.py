@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
-from airtouch.gap.naming.selection import Selection, TakenBack
+from airtouch.gap.naming.records import Selection, TakenBack
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
@@ -66,9 +66,9 @@ def names_one_of_the_loop(data: Data, selection: Selection) -> bool:
 
 
 def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
-    """Effects that recorded flights name beside some of the control loop, which must close LEAST_CLOSED more.
+    """Effects that recorded flights name beside some of the control loop; empty where not both kinds are named.
 
-    None where no effect of the loop is named, or nothing else.
+    Whether those of the loop stay beside them: `loop_closes_too_little`.
     """
     chosen = selection.chosen
     if not selection.policy.must_close_gap or chosen is None:
@@ -76,6 +76,14 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
     names = [s.name for s in selection.named]
     others = [n for n in names if not _of_the_loop(data, [t for t in chosen.terms if t.name == n])]
     return others if len(others) < len(names) else []
+
+
+def loop_closes_too_little(closed: float, closed_by_others: float) -> bool:
+    """Whether effects of the control loop close less than LEAST_CLOSED beyond what those beside them close alone.
+
+    closed: share of the gap that all take away; closed_by_others: that the others take away, judged without them.
+    """
+    return closed - closed_by_others < LEAST_CLOSED
 
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:

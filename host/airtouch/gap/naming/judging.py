@@ -20,7 +20,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
-from airtouch.gap.naming.selection import Candidate, Charges, Strength
+from airtouch.gap.naming.records import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
-from airtouch.gap.naming.selection import Step
+from airtouch.gap.naming.records import Step
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
@@ -44,8 +44,14 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
 
 
 def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:
-    """`Charges.gained_while_certain` of the last step's hypothesis without the effect of the step at a place."""
-    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_new_terms(steps, i))), 0)
+    """`Charges.gained_while_certain` of the last step's hypothesis without the effect of the step at a place.
+
+    It is 0 where no other effect stands before the first random one, or none is random: nothing lost certainty. It is
+    that of the last step where the dropped effect came after the first random one, which it did not change. Else the
+    effects before the first random one are fitted anew by themselves, without the dropped one, for what they lose.
+    """
+    none_before = 0  # as the place of the first random effect, where there is none
+    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_new_terms(steps, i))), none_before)
     earlier = [i for i in range(first_random) if i != place]
     if not earlier:
         return 0.0

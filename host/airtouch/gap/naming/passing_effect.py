@@ -7,8 +7,8 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.judging import Trial, gain_of
-from airtouch.gap.naming.policy import LEAST_GAIN
-from airtouch.gap.naming.selection import Candidate, Charges, Step, Strength
+from airtouch.gap.naming.policy import PASSING_GAIN
+from airtouch.gap.naming.records import Candidate, Charges, Step, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
@@ -20,10 +20,11 @@ def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least_gain: M
                    without: Sequence[str]) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
-    It must gain LEAST_GAIN more than every effect that always acts and has enough evidence, LEAST_GAIN more than what
-    follows the flight's own height, which needs no other vehicle, and as much more than it gains in nominal flights.
-    Seconds in which another vehicle is known to be overhead go before others, which are only likely. singles:
-    candidates judged alone; least_gain: nats of evidence that each needs; without: names that are left out.
+    It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
+    what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
+    (`passing_evidence`). Seconds in which another vehicle is known to be overhead go before others, which are only
+    likely. singles: candidates judged alone; least_gain: nats of evidence that each needs; without: names that are
+    left out.
     """
     if trial.data.study.scatter is None:
         return None
@@ -31,7 +32,7 @@ def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least_gain: M
     of_steady_effects = [c.gain for name, c in singles.items() if c.evidence >= least_gain[name]]
     steady = max([height_gain(data, trial.parts), *of_steady_effects])
     passing = [g for g in gated_effects(data, without).values()
-               if g.gain >= steady + LEAST_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= LEAST_GAIN]
+               if g.gain >= steady + PASSING_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
@@ -51,12 +52,14 @@ def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step])
     """Whether an effect that comes and goes adds no more to the effects beside it than in nominal flights."""
     key = passing.passing_key
     assert key is not None  # it comes and goes
-    return any(passing_evidence(data, key, s.leave_one_out_gain, passing.strength.mean) < LEAST_GAIN
+    return any(passing_evidence(data, key, s.leave_one_out_gain, passing.strength.mean) < PASSING_GAIN
                for s in steps if s.name == passing.name and s.named and s.leave_one_out_gain is not None)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
-    """Evidence, nats, for an effect that comes and goes: its gain, up to LEAST_GAIN and what is beyond nominal flights.
+    """Evidence, nats, for an effect that comes and goes: its gain, but no more than nominal flights leave it.
+
+    They leave it PASSING_GAIN and the nats by which its size is beyond theirs.
 
     key: `GatedEffect.key`; gain: nats; strength (k,): its scaled parameters.
     """
@@ -65,4 +68,4 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
     if key == OVERHEAD:
         of_wakes = {UNSTEADY_YAW: unsteady_yaw, DOWNWARD: downward}
         sizes |= {name: measure(data) for name, measure in of_wakes.items() if name in data.study.scatter.passing}
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(sizes))
+    return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))

@@ -1,7 +1,8 @@
-"""Every number that was chosen for the decision which effects are named, and how it depends on the flights.
+"""The numbers by which effects are named: what they must gain, share and close, and how that depends on the flights.
 
 A constant holds for all flights. What depends on the study that they are compared with stands in `NamingPolicy`, and
-`policy_of` alone makes it of the study.
+`policy_of` alone makes it of the study. Numbers of a computation stand beside it: how halves are made and when a
+parameter is at its bound in `judging`, steps and iterations in `screening.first_order`.
 """
 
 from dataclasses import dataclass
@@ -10,28 +11,47 @@ from airtouch.gap.signals.study import Study
 
 # -- Gains required, nats of held-out data --
 
-#: that an effect must add: chosen; a gain of 12 by chance has odds of e^-12 (host/docs/gap-method.md)
+#: that a further effect must add, and the first one where no loop is modelled; chosen 2026-11-21: a likelihood ratio
+#: of 12 nats has by chance at most the probability e^-12 (Markov's bound), if the models of noise are right
 LEAST_GAIN = 12.0
-#: the same for the first effect, against a floor from nominal flights; chosen, after 6 nats had given 4 false alarms on
+#: that a variant with a random part or a companion must gain over the same effect without (`rounds`)
+LONGER_GAIN = LEAST_GAIN
+#: that an effect with its companion must gain over the companion alone, else it is put as far behind (`rounds`)
+COMPANION_GAIN = LEAST_GAIN
+#: that an effect which comes and goes must gain over those that always act, and have as evidence; what it gains up to
+#: here counts whatever nominal flights show (`passing_effect`)
+PASSING_GAIN = LEAST_GAIN
+#: evidence of a mean effect in one round from which the next fits it in full, whatever screening says (`forward`)
+SURE_EVIDENCE = LEAST_GAIN
+#: that the first effect must gain, where nominal flights gave a loop; chosen, after 6 nats had given 4 false alarms on
 #: 46 flights of a fresh set (2026-11-21)
 FIRST_GAIN = 8.0
 PRICE = 0.9  #: of each further parameter of an effect; chosen, near Akaike's 1 (1974)
-#: that count as one where candidates are compared: log likelihoods of real flights are too sure of themselves; chosen
+#: that count as one where candidates are compared, as log likelihoods of real flights are too sure of themselves;
+#: chosen 2026-11-21. With a larger number the rarer strength outweighs the gain, and probabilities are nearer to one
+#: another
 TEMPERATURE = 6.0
 
 # -- Search --
 
-#: nats that an effect must gain in screening to be fitted; chosen
+#: nats that a random effect must gain in screening to be fitted; a mean effect that gains less is asked whether the
+#: commands alone show it. Chosen 2026-11-21: a larger number saves fits and loses weak random effects
 HOPELESS = 0.5
 #: nats that a variant's mean term may be behind the best in screening and still be fitted with its random part; chosen:
 #: odds of 20, as between candidates (`answer.ranking.CLOSE`)
 ABOUT_AS_GOOD = 3.0
-#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time
+#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time: less means
+#: more fits, more loses effects that screening takes for weaker than they are
 PROMISING = 0.5 * FIRST_GAIN
-FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time
-MOST_EFFECTS = 3  #: effects that are named of one set of flights; chosen
-MOST_DEVIATIONS = 3  #: deviations of nominal flights that are added freely (`forward`); chosen
-CERTAIN = 20.0  #: nats of evidence beyond which more does not rank a candidate higher (`forward`); chosen
+FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time, as PROMISING
+#: effects that are named of one set of flights; chosen 2026-11-21. A fourth would cost one more round of fits
+MOST_EFFECTS = 3
+#: deviations of nominal flights that are added freely (`forward`); chosen 2026-11-22. With fewer, what nominal flights
+#: have as well may be left to the effects named; each more costs a round of fits
+MOST_DEVIATIONS = 3
+#: nats of evidence beyond which more does not rank a candidate higher (`forward`); chosen 2026-11-22. A larger number
+#: lets a rare strength win over a larger gain, a smaller one lets the gain decide sooner
+CERTAIN = 20.0
 #: of FIRST_GAIN: candidates that gained less are not judged again beside a deviation; chosen, to save their fits
 WORTH_AGAIN = 0.25
 #: fraction of the evidence for the likeliest effect that a wake must have for the replay to name it, as its shape may
@@ -41,35 +61,39 @@ WAKE_SHARE = 0.05
 
 # -- Misfit: fractions of the nats that the effects of a hypothesis gain --
 # No model of an effect is exact. A further effect must gain as much beside them, since what their models are wrong by
-# may look like it.
+# may look like it. A larger share misses weak effects beside strong ones, a smaller one names a model's error.
 
-LEAST_SHARE = 0.01  #: in simulated flights, of what is gained in the cells that the further effect improves; chosen
-RECORDED_SHARE = 0.1  #: in recorded flights, of the whole gain, as no model of air is exact; chosen
+#: in simulated flights, of what is gained in the cells that the further effect improves; chosen
+MISFIT_SHARE_SIMULATED = 0.01
+MISFIT_SHARE_RECORDED = 0.1  #: in recorded flights, of the whole gain; chosen 2026-11-22, as no model of air is exact
 #: for an effect that changes the loop, beside one that is random or changes it too, with this project's own firmware;
 #: chosen: twice the 5 % that wrong ones gained at most beside right ones in 43 simulated flights (2026-11-23)
-ASSUMED_SHARE = 0.1
+MISFIT_SHARE_LOOP_OWN_FIRMWARE = 0.1
 #: the same with any other firmware; chosen, as large as the error of the loop model `torque_power.TORQUE_DOUBT`
-LOOP_SHARE = 0.25
+MISFIT_SHARE_LOOP_OTHER_FIRMWARE = 0.25
 #: for a random effect, to be named; chosen. Beside weak motors and offset masses, motor noise that was not there gained
 #: 3 to 16 % in simulated flights (host/docs/looks.md, 2026-11-23 19:09): the yaw command of the logged instant is not
 #: that of the 10 ms around it
-RANDOM_SHARE = 0.25
+MISFIT_SHARE_RANDOM = 0.25
 
 # -- `unknown` and over-prediction --
+# How these make a limit: host/docs/unknown.md, "Where the limit comes from". Larger numbers leave a wrong name, or
+# `none`, where an effect is missing; smaller ones call right names `unknown`.
 
-#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`: UNKNOWN_GAIN
-#: where two nominal flights or more gave the floor, UNKNOWN_ALONE where one or none did; both chosen
-#: (host/docs/gap-method.md, "What `unknown` means")
+#: held-out nats that the nameless model may gain beside the effects named before the answer is `unknown`, of n nominal
+#: flights: UNKNOWN_GAIN times (n + 1) / (n - 1) from two on, which is 36 nats with two and 24 with three; UNKNOWN_ALONE
+#: with one or none; both chosen
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
-#: share of what the effects named gain that the nameless model may gain as well, as no model is exact: UNKNOWN_ASSUMED
-#: where one of them is random or changes the loop of recorded flights, so that its spectrum is assumed, not measured;
-#: both chosen
+#: share of what the effects named gain that the nameless model may gain as well, as no model is exact; UNKNOWN_ASSUMED
+#: where one of them is random, or changes the loop of flights other than simulated ones, so that its spectrum is
+#: assumed, not measured; with one nominal flight or none, of what the nameless model gains over no effect. Chosen
+#: 2026-11-21, from 0.05 on, as much as models of effects usually left
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
 #: factor on these shares in flights of this project's simulator and firmware, whose models are exact; chosen, after the
 #: nameless model had gained at most 0.36 of what it may beside right names in 78 such flights (2026-11-23)
 SAME_MODELS = 0.5
-#: nats that a right effect may lose in a cell by chance; chosen: by the bound in `contradiction.losses` the chance of
-#: more is at most 37 %
+#: nats that a right effect may lose in a cell by chance; chosen: by the bound in
+#: `over_prediction.over_prediction_by_channel` the chance of more is at most 37 %
 CHANCE_LOSS = 1.0
 
 # -- What names must close of the gap of recorded flights --
@@ -117,7 +141,8 @@ class NamingPolicy:
     effect that changes the loop, beside one whose spectrum is assumed; misfit_by_cell: whether a model is wrong only
     where it acts, so that the gain in improved cells alone counts.
 
-    loop_is_assumed: whether the spectrum of an effect that changes the loop is assumed, not measured;
+    loop_is_assumed: whether the spectrum of an effect that changes the loop is assumed, not measured: in all flights
+    but simulated ones, those without a baseline among them;
     judges_over_prediction: whether effects are held against what the flights do not show; must_close_gap: whether
     names must close a part of the gap; unknown: what the nameless model may gain.
     """
@@ -136,8 +161,8 @@ def policy_of(study: Study, seconds: float) -> NamingPolicy:
     """The policy for flights of so many seconds that are compared with a study."""
     return NamingPolicy(
         first_gain=LEAST_GAIN if study.controller is None else FIRST_GAIN,
-        misfit_share=RECORDED_SHARE if study.recorded else LEAST_SHARE,
-        loop_misfit_share=ASSUMED_SHARE if study.same_models else LOOP_SHARE,
+        misfit_share=MISFIT_SHARE_RECORDED if study.recorded else MISFIT_SHARE_SIMULATED,
+        loop_misfit_share=MISFIT_SHARE_LOOP_OWN_FIRMWARE if study.same_models else MISFIT_SHARE_LOOP_OTHER_FIRMWARE,
         misfit_by_cell=not study.recorded,
         loop_is_assumed=not study.simulated,
         judges_over_prediction=study.simulated,
@@ -148,7 +173,9 @@ def policy_of(study: Study, seconds: float) -> NamingPolicy:
 def unknown_limit(study: Study, seconds: float) -> UnknownLimit:
     """What the nameless model may gain in flights of so many seconds that are compared with a study.
 
-    The fewer nominal flights there are, the farther off may another one lie.
+    From two nominal flights on it falls with their number n, as the factor (n + 1) / (n - 1) does: 36 nats with two, 24
+    with three. With one or none it is 25 nats, less than with two, but UNKNOWN_ASSUMED of what the nameless model gains
+    over no effect counts as well, and what it gains in nominal flights, though they are simulated.
     """
     n = study.nominal_count
     nominal_gain = 0.0 if study.scatter is None else study.scatter.allowed(seconds, UNKNOWN_GAIN)

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from airtouch.gap.naming.judging import PricedVariant, Trial, at_bound, cross_validated
-from airtouch.gap.naming.policy import FULL, LEAST_GAIN, PROMISING
-from airtouch.gap.naming.screening import RoundStart, screen_random, screen_variants, start_of
-from airtouch.gap.naming.selection import Candidate, Strength
+from airtouch.gap.naming.policy import COMPANION_GAIN, FULL, LONGER_GAIN, PROMISING
+from airtouch.gap.naming.records import Candidate, Strength
+from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.scatter import Scatter
@@ -100,7 +100,7 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
 
 
 def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
-    """The best hypothesis of each candidate, by name.
+    """The best hypothesis of each candidate, by name, those that only their companion carries put behind it.
 
     before: number of terms of the base.
     """
@@ -109,23 +109,32 @@ def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidat
         old = best.get(new.name)
         if old is None or _is_better(new, old):
             best[new.name] = new
-    # where the companion alone gains nearly as much as both, the effect itself explains nothing: it is put behind
+    return _behind_companion(best, before)
+
+
+def _behind_companion(best: Mapping[str, Candidate], before: int) -> dict[str, Candidate]:
+    """The best hypotheses by name, with the gain of an effect lowered where its companion alone gains nearly as much.
+
+    An effect that gains less than COMPANION_GAIN over its companion explains nothing itself. Its gain is put
+    COMPANION_GAIN behind that of the companion, so that the companion is taken. before: number of terms of the base.
+    """
+    out = dict(best)
     for name, other in COMPANIONS.items():
-        both, alone = best.get(name), best.get(other)
-        if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + LEAST_GAIN:
-            best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))
-    return best
+        both, alone = out.get(name), out.get(other)
+        if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + COMPANION_GAIN:
+            out[name] = replace(both, gain=min(both.gain, alone.gain - COMPANION_GAIN))
+    return out
 
 
 def _is_better(new: Candidate, old: Candidate) -> bool:
     """Whether a hypothesis of a candidate replaces another of no more terms.
 
-    One that is fitted in full replaces one that is not; else one that gains more, by LEAST_GAIN if it has more terms, a
-    random part or a companion.
+    One that is fitted in full replaces one that is not; else one that gains more, by LONGER_GAIN if it has more terms,
+    a random part or a companion.
     """
     if new.full != old.full:
         return new.full
-    need = LEAST_GAIN if len(new.terms) > len(old.terms) else 0.0
+    need = LONGER_GAIN if len(new.terms) > len(old.terms) else 0.0
     return new.gain > old.gain + need
 
 

@@ -14,13 +14,13 @@ from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
-from airtouch.gap.naming.contradiction import contradiction_of
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import Trial, trial_of
+from airtouch.gap.naming.over_prediction import over_prediction_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.policy import WAKE_SHARE
+from airtouch.gap.naming.records import Candidate, NamelessGain, Selection
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.naming.selection import Candidate, NamelessGain, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
@@ -61,8 +61,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
 def _by_relations(search: Search, inference: Inference, without: Sequence[str]) -> Selection:
     """What the relations of signals name; where these leave something unexplained, what the replay may name instead.
 
-    The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake or
-    another effect of ALWAYS_RANDOM, or the likeliest by the relations.
+    The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake
+    (ALWAYS_RANDOM holds `downwash` alone), or the likeliest by the relations.
     """
     answer = selection_by_relations(search.trial, search.candidates, search.singles, inference, search.progress)
     if answer.explained:
@@ -84,7 +84,8 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
 
     1. what comes and goes is a wake: the relations of a whole flight dilute its seconds;
     2. what comes and goes is the effect for which the relations have most evidence;
-    3. for a wake that fills the flight (ALWAYS_RANDOM) they have more than WAKE_SHARE of that evidence, nats.
+    3. for a wake that fills the flight (ALWAYS_RANDOM holds `downwash` alone) they have more than WAKE_SHARE of that
+       evidence, nats.
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True
@@ -110,7 +111,7 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
     if not policy.judges_over_prediction:
         return selection
-    return replace(selection, contradiction=contradiction_of(trial, selection.chosen))
+    return replace(selection, over_prediction=over_prediction_of(trial, selection.chosen))
 
 
 def nameless_nats(trial: Trial, base: Candidate | None) -> float:

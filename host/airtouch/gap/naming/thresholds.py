@@ -12,8 +12,8 @@ from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
-from airtouch.gap.naming.policy import LEAST_GAIN, RANDOM_SHARE
-from airtouch.gap.naming.selection import Candidate
+from airtouch.gap.naming.policy import LEAST_GAIN, MISFIT_SHARE_RANDOM
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
@@ -32,7 +32,7 @@ def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> fl
 
 def is_random_misfit(trial: Trial, base: Candidate, extended: Candidate) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
-    return is_random(extended.name) and extended.gain - base.gain < misfit(trial, base, extended, RANDOM_SHARE)
+    return is_random(extended.name) and extended.gain - base.gain < misfit(trial, base, extended, MISFIT_SHARE_RANDOM)
 
 
 def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:

@@ -11,9 +11,9 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.naming.rounds import every_strength
 from airtouch.gap.naming.select import nameless_nats
-from airtouch.gap.naming.selection import Candidate
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import gated_effects

@@ -11,9 +11,9 @@ from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.contradiction import contradiction_of, losses
+from airtouch.gap.naming.over_prediction import over_prediction_by_channel, over_prediction_of
 from airtouch.gap.naming.policy import policy_of
-from airtouch.gap.naming.selection import Contradiction
+from airtouch.gap.naming.records import OverPrediction
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import REST
 from hovers import DOWN, hover, scattered, select_from
@@ -25,31 +25,31 @@ def pushed_in_the_air_alone(seed):
     return hover(seed, push, resting_s=4.0)
 
 
-def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there():
+def test_an_effect_that_says_what_the_flights_do_not_show_over_predicts_there():
     """A bias of the accelerometer would stand at rest as well, and a push does not: its loss there is known."""
     selection, data = select_from([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
     (step,) = selection.steps
     on = judging.trial_of(data)
-    loss, worst = contradiction_of(on, selection.chosen)
+    loss, worst = over_prediction_of(on, selection.chosen)
     assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
     resting = [BlockSet(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
     by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
                   for train, test in ((0, 1), (1, 0)))
     assert loss == pytest.approx(by_hand, rel=0.1) and loss > 30.0
-    assert selection.contradiction == Contradiction(), "recorded flights are not asked"
+    assert selection.over_prediction == OverPrediction(), "recorded flights are not asked"
     weaker = replace(step, gain=100.0)
     exact = replace(
         selection, policy=policy_of(replace(data.study, nominal_count=6), data.seconds), steps=(weaker,),
-        nameless=replace(selection.nameless, over_last_step=1.0), contradiction=Contradiction(loss, worst))
+        nameless=replace(selection.nameless, over_last_step=1.0), over_prediction=OverPrediction(loss, worst))
     assert exact.against_over_limit == pytest.approx(loss / (12.0 * 7 / 5)), "with six flights 17 nats may be chance"
     assert not exact.explained and probabilities(exact)["unknown"] > 0.5
     assert shortfall(exact, selection.singles["imu_bias"]).startswith(f"it loses {loss:.0f} nats where") \
         and worst in shortfall(exact, selection.singles["imu_bias"])
 
 
-def test_a_right_effect_is_not_contradicted():
+def test_a_right_effect_does_not_over_predict():
     selection, data = select_from([pushed_in_the_air_alone(7)], ("mass", "thrust_coefficient"), scattered(mass=[1e-3]))
-    assert contradiction_of(judging.trial_of(data), selection.chosen).nats < 2.0 < 100.0 < selection.chosen.gain
+    assert over_prediction_of(judging.trial_of(data), selection.chosen).nats < 2.0 < 100.0 < selection.chosen.gain
 
 
 def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():
@@ -58,7 +58,7 @@ def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gain
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
     gains[at_rest + forward] = -8.0
-    loss = losses(gains)
+    loss = over_prediction_by_channel(gains)
     assert loss[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
     assert loss[forward] == pytest.approx(0.0 + 4.0 + 2.0) and loss[at_rest + forward] == pytest.approx(7.0)
     assert np.count_nonzero(loss) == 3

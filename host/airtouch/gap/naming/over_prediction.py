@@ -5,26 +5,26 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS, cell_words, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
-from airtouch.gap.naming.selection import Candidate, Contradiction
+from airtouch.gap.naming.records import Candidate, OverPrediction
 
 
-def contradiction_of(trial: Trial, named: Candidate | None) -> Contradiction:
+def over_prediction_of(trial: Trial, named: Candidate | None) -> OverPrediction:
     """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing.
 
     named: these effects as one hypothesis, None where none is named.
     """
     if named is None or not named.fits:
-        return Contradiction()
+        return OverPrediction()
     gains = held_out_cell_gains(trial, named)
-    lost = losses(gains)
+    lost = over_prediction_by_channel(gains)
     if not lost.any():
-        return Contradiction()
+        return OverPrediction()
     in_a_channel_that_loses = lost[channel_cells()] > 0.0
     worst = int(np.argmin(np.where(in_a_channel_that_loses, gains, np.inf)))
-    return Contradiction(float(lost.sum()), cell_words(worst))
+    return OverPrediction(float(lost.sum()), cell_words(worst))
 
 
-def losses(gains: np.ndarray) -> np.ndarray:
+def over_prediction_by_channel(gains: np.ndarray) -> np.ndarray:
     """Nats (CELLS,) that each channel of each view loses beyond chance, at its cell of the lowest band.
 
     gains (CELLS,): nats that a hypothesis gains in each cell, over none. Where it is right, the likelihood ratio of

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.naming.first_order import Remainder, judge_means, judge_random, remainder_of, shows
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
-from airtouch.gap.naming.selection import Candidate, Charges, Strength
+from airtouch.gap.naming.records import Candidate, Charges, Strength
+from airtouch.gap.naming.screening.first_order import Remainder, judge_means, judge_random, remainder_of, shows
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
@@ -142,10 +142,14 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
                  ) -> tuple[list[Candidate], list[PricedVariant]]:
     """Variants with a random effect: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    Of a candidate that promises more than HOPELESS nats, or of every one if `every_random`, the variant that gains most
-    in screening is fitted, with the longer ones that begin with the same term. Where it begins with a mean term, so is
-    the best with each other mean term that is about as good. means: mean effects judged to first order, best first; a
-    candidate that is among them says by that how little it promises.
+    1. A candidate is fitted that promises more than HOPELESS nats, by its best variant here or by its best mean effect;
+       every one is if `every_random`.
+    2. Of it the variant is fitted that gains most in screening; where that begins with a mean term, also the best
+       variant with each other mean term that is about as good (ABOUT_AS_GOOD).
+    3. With each of these are fitted the longer variants that begin with the same term.
+    4. Any other candidate is a hypothesis as screened, unless it is among `means`, where it has one already.
+
+    means: mean effects judged to first order, best first.
     """
     means_of = _about_as_good(means, len(start.terms) + 1)
     unpromising, to_fit = [], []

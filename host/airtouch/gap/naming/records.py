@@ -108,7 +108,7 @@ class NamelessGain:
     of_times: float = 0.0
 
 
-class Contradiction(NamedTuple):
+class OverPrediction(NamedTuple):
     """Over-prediction: held-out nats lost in cells where effects predict what flights do not show; the worst cell."""
 
     nats: float = 0.0
@@ -129,7 +129,7 @@ class Selection:
     singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
     nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
     candidate must gain as the first; policy: what the flights must show; assumed: whether the spectrum of a chosen
-    effect is assumed, as it is random or changes the loop of recorded flights; contradiction: over-prediction of the
+    effect is assumed, as it is random or changes the loop of recorded flights; over_prediction: over-prediction of the
     effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
     flights name no more.
     """
@@ -141,7 +141,7 @@ class Selection:
     least_gain: Mapping[str, float]
     policy: NamingPolicy
     assumed: bool
-    contradiction: Contradiction = Contradiction()
+    over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
     taken_back: TakenBack = TakenBack()
 
@@ -187,12 +187,12 @@ class Selection:
         """How much speaks against the effects named over its limit: by `against`, or by over-prediction."""
         against = self.against
         never_negative = float(np.logaddexp(against.nats, 0.0))  # softplus: the nats where these are many, else above 0
-        return max(never_negative / against.limit, self.loss_over_chance)
+        return max(never_negative / against.limit, self.over_prediction_ratio)
 
     @property
-    def loss_over_chance(self) -> float:
+    def over_prediction_ratio(self) -> float:
         """Nats of over-prediction over those that may be chance."""
-        return self.contradiction.nats / self.policy.unknown.least if self.contradiction.nats else 0.0
+        return self.over_prediction.nats / self.policy.unknown.least if self.over_prediction.nats else 0.0
 
     @property
     def explained(self) -> bool:
