@@ -39,7 +39,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.naming.passing_effect import passing_evidence
-from airtouch.gap.naming.policy import LEAST_GAIN
+from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing import gates, overhead
@@ -148,7 +148,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
             data = Data(overhead.with_overhead(study, flight, seconds), [flight])
             wake = gates.gated_effects(data).get(gates.KNOWN_OVERHEAD)
             trials += 1
-            if wake is not None and passing_evidence(data, wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
+            if wake is not None and passing_evidence(data, wake.key, wake.gain, wake.strength) >= PASSING_GAIN:
                 alarms.append(name)
         print(f"{name}: {alarms.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
     share = wilson(len(alarms), trials)

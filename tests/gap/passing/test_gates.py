@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
-from airtouch.gap.naming.policy import LEAST_GAIN
+from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing import gates, stretches
 from airtouch.gap.result import Cell
@@ -54,7 +54,7 @@ def test_a_wake_is_found_with_its_seconds(study, nominal_flight):
 def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight):
     for name, gated in gates.gated_effects(Data(study, [nominal_flight])).items():
         rate = gated.gain / (len(nominal_flight) * flight.PERIOD_S)
-        assert gated.gain < LEAST_GAIN or study.scatter.unusual({name: size_of(rate, gated.strength)}) < 0.0
+        assert gated.gain < PASSING_GAIN or study.scatter.unusual({name: size_of(rate, gated.strength)}) < 0.0
 
 
 def test_the_diagnosis_says_when(study, nominal_flight):
