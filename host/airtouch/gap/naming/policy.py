@@ -65,6 +65,9 @@ WAKE_SHARE = 0.05
 
 #: in simulated flights, of what is gained in the cells that the further effect improves; chosen
 MISFIT_SHARE_SIMULATED = 0.01
+#: of its own gain, in all flights: by which a deviation that nominal flights have as well must gain more than an effect
+#: with evidence to be added before it (`forward`)
+MISFIT_SHARE_DEVIATION = MISFIT_SHARE_SIMULATED
 MISFIT_SHARE_RECORDED = 0.1  #: in recorded flights, of the whole gain; chosen 2026-11-22, as no model of air is exact
 #: for an effect that changes the loop, beside one that is random or changes it too, with this project's own firmware;
 #: chosen: twice the 5 % that wrong ones gained at most beside right ones in 43 simulated flights (2026-11-23)
