@@ -80,7 +80,7 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether terms that always act change the control loop."""
-    loop, mean = data.study.controller, [t for t in terms if t.shows_in == MEAN and not t.gate]
+    loop, mean = data.study.loop, [t for t in terms if t.shows_in == MEAN and not t.gate]
     if loop is None or not mean:
         return False
     return loop.changes_loop([t.active() for t in mean]) or any(t.signature.loop_only for t in mean)

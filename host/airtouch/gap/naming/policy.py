@@ -135,7 +135,7 @@ class NamingPolicy:
 def policy_of(study: Study, seconds: float) -> NamingPolicy:
     """The policy for flights of so many seconds that are compared with a study."""
     return NamingPolicy(
-        first_gain=LEAST_GAIN if study.controller is None else FIRST_GAIN,
+        first_gain=LEAST_GAIN if study.loop is None else FIRST_GAIN,
         misfit_share=RECORDED_SHARE if study.recorded else LEAST_SHARE,
         loop_misfit_share=ASSUMED_SHARE if study.same_models else LOOP_SHARE,
         misfit_by_cell=not study.recorded,
