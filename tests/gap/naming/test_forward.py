@@ -4,7 +4,7 @@ import pytest
 
 from airtouch.gap.naming import forward as module
 from airtouch.gap.naming.forward import Search, forward
-from airtouch.gap.naming.policy import FIRST_GAIN, LEAST_GAIN, MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN
+from airtouch.gap.naming.policy import FIRST_GAIN, LEAST_GAIN, LEAST_SHARE, MOST_DEVIATIONS, MOST_EFFECTS, WORTH_AGAIN
 from airtouch.gap.naming.selection import Candidate
 
 
@@ -24,8 +24,8 @@ def select(monkeypatch):
             rounds.append(names)
             return {n: judged(n, chosen.gain) for n in names}
 
-        def best_of(worth):
-            best = original(worth)
+        def best_of(worth, before):
+            best = original(worth, before)
             if best is not None:
                 added.append(best.name)
             return best
@@ -94,3 +94,11 @@ def test_an_effect_that_comes_and_goes_is_the_first_step(select):
     state, _ = select({"a": (100.0, 20.0)}, passing)
     assert names(state) == [("wake", True), ("a", True)]
     assert state.singles["wake"] is passing and state.least_gain["wake"] == LEAST_GAIN
+
+
+@pytest.mark.parametrize(("closer", "first"), [(0.9, ("named", True)), (1.1, ("deviation", False))])
+def test_a_deviation_goes_before_a_name_only_where_it_gains_more_than_models_may_be_wrong_by(select, closer, first):
+    """Two of thousands of nats; the deviation gains `closer` LEAST_SHARE more than what nominal flights do not have."""
+    named = 20_000.0 * (1.0 - closer * LEAST_SHARE)
+    state, _ = select({"deviation": (20_000.0, FIRST_GAIN - 0.1), "named": (named, FIRST_GAIN)})
+    assert names(state)[0] == first

@@ -100,3 +100,13 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     (step,) = selection.named
     assert step.passing_key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
     assert (step.charges.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
+
+
+def test_known_seconds_are_not_held_against_what_nominal_flights_have_as_well():
+    """The harder half of a push that goes on all along, in the seconds under another vehicle, beside its mass."""
+    harder = with_a_push(8.0, 23.0, mps2=0.35)
+    flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]
+    study = replace(scattered(mass=[3.0]), overhead=(("pushed", 8.0, 23.0),))
+    wake, mass = select_from(flights, ("mass",), study, ())[0].steps
+    assert (wake.passing_key, wake.named, mass.name, mass.named) == (KNOWN_OVERHEAD, True, "mass", False)
+    assert wake.leave_one_out_gain is None

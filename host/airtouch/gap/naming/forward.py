@@ -9,6 +9,7 @@ from airtouch.gap.naming.policy import (
     CERTAIN,
     FIRST_GAIN,
     LEAST_GAIN,
+    LEAST_SHARE,
     MOST_DEVIATIONS,
     MOST_EFFECTS,
     TEMPERATURE,
@@ -74,7 +75,7 @@ def forward(search: Search, passing: Candidate | None) -> State:
     """
     state = _begun(search, passing)
     while len(state.named) < MOST_EFFECTS:
-        best = _best_of(_worth_adding(state))
+        best = _best_of(_worth_adding(state), state.gain)
         if best is None:
             break
         state = _added(search, state, best)
@@ -99,14 +100,25 @@ def _worth_adding(state: State) -> dict[str, Candidate]:
     return enough
 
 
-def _best_of(judged: Mapping[str, Candidate]) -> Candidate | None:
+def _best_of(judged: Mapping[str, Candidate], before: float) -> Candidate | None:
     """The best of the candidates that were fitted in full; None where there is none.
 
     Likelihoods of real flights are too sure of themselves (TEMPERATURE). So of two that gain nearly as much the one is
-    better whose strength is the rarer in nominal flights.
+    better whose strength is the rarer in nominal flights. A deviation that nominal flights have as well, too, is better
+    than one with evidence only where it gains more by a share LEAST_SHARE, as no model is exact. before: nats that the
+    effects gain to which one is added.
     """
-    return max((c for c in judged.values() if c.full), default=None,
-               key=lambda c: c.gain / TEMPERATURE + min(c.evidence, CERTAIN))
+    full = [c for c in judged.values() if c.full]
+
+    def merit(candidate: Candidate) -> float:
+        return candidate.gain / TEMPERATURE + min(candidate.evidence, CERTAIN)
+
+    best = max(full, key=merit, default=None)
+    if best is None or best.evidence >= FIRST_GAIN:
+        return best
+    least = before + (1.0 - LEAST_SHARE) * (best.gain - before)
+    as_good = [c for c in full if c.evidence >= FIRST_GAIN and c.gain >= least]
+    return max(as_good, key=merit, default=best)
 
 
 def _added(search: Search, state: State, best: Candidate) -> State:

@@ -12,6 +12,7 @@ from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
 from airtouch.gap.naming.selection import Step
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
@@ -21,12 +22,12 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     """The steps of a selection, with the leave-one-out gain of those that stand beside others.
 
     These are all that are named, where there are several, and one that comes and goes beside any other: what is as
-    strong as in nominal flights may have its seconds as well.
+    strong as in nominal flights may have its seconds as well. Seconds that another vehicle's log tells are sure.
     """
     several = sum(s.named for s in steps) > 1
+    searched = {s.name for s in steps if s.passing_key not in (None, KNOWN_OVERHEAD)} if len(steps) > 1 else set()
     return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
-            if s.named and (several or (s.passing_key is not None and len(steps) > 1)) else s
-            for place, s in enumerate(steps)]
+            if s.named and (several or s.name in searched) else s for place, s in enumerate(steps)]
 
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
