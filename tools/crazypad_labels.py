@@ -14,7 +14,7 @@ VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
 #: families of conditions, in the order of the tables
 FAMILIES = ("normal", "rotor damage", "added weight", "slung load")
 #: mm cut off a rotor, both blades together, from which its flights must not be called normal; a goal of
-#: host/docs/gap-real.md
+#: host/docs/gap-crazypad.md
 LEAST_MM = 1.5
 BLADE_MM = 20.0  #: mm; a longer length in a condition's name is that of the blade, 40 mm and more, not of a cut
 BUILDING = 4  #: each fourth condition with a defect is kept for looking, the other three are to build on

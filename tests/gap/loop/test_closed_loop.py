@@ -135,7 +135,7 @@ def test_without_edges_range_step_changes_nothing(study):
 
 
 def test_the_controller_of_the_firmware_is_recognised(study):
-    assert study.controller.by_firmware
+    assert study.loop.by_firmware
 
 
 def test_a_loop_that_would_not_fly_is_recognised():
@@ -154,7 +154,7 @@ def test_ratio_and_share_follow_whatever_an_effect_sets_in_the_plant(study, fiel
     base = activate({"inertia": {"fraction": 0.0}})[0].effect
     factor = replace(base.parameters[0], name="factor", default=1.5, low=0.5, high=2.0, neutral=1.0)
     own = replace(base, name="own", parameters=(factor,), settings=settings, wrench=None)
-    law = study.controller
+    law = study.loop
     assert law.ratio(()) == pytest.approx(1.0)
     assert np.abs(np.log(law.ratio((Active(own, {"factor": 1.5}),)))).max() > 0.01
     assert law.ratio((Active(own, {"factor": 1.0}),)) == pytest.approx(1.0)

@@ -96,7 +96,7 @@ def in_bands(x):
 def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
     f = frequencies(AIR)
     law = (nominal().response.quiet_law, nominal().response.stepped_law)[stepped]
-    predicted = law.ratio(nominal().controller.torque_change(active_effects(name), f))[:, 1]
+    predicted = law.ratio(nominal().loop.torque_change(active_effects(name), f))[:, 1]
     simulated = shares(name)[stepped] / shares(None)[stepped]
     band = (f > low) & (f < high)
     predicted, simulated = (in_bands(x[band]) for x in (predicted, simulated))
@@ -108,7 +108,7 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
 def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flights(name):
     """Once taken for the same in every loop: late sensors then left noise that no effect explained."""
     f = frequencies(AIR)
-    before, after = nominal().controller.torque_change(active_effects(name), f).incoherent[:, :, 1]
+    before, after = nominal().loop.torque_change(active_effects(name), f).incoherent[:, :, 1]
     band = (f > 2.0) & (f < 45.0)
     predicted, simulated = (in_bands(x[band]) for x in (after / before, beside(name) / beside(None)))
     np.testing.assert_allclose(predicted, simulated, rtol=0.2)
@@ -116,7 +116,7 @@ def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flight
 
 def test_what_the_commands_do_not_tell_of_the_torque_is_noise_of_the_loop():
     f = frequencies(AIR)
-    predicted = nominal().controller.torque_change(active_effects("late sensors"), f).incoherent[0, :, 1]
+    predicted = nominal().loop.torque_change(active_effects("late sensors"), f).incoherent[0, :, 1]
     band = (f > 2.0) & (f < 25.0)
     predicted, simulated = (in_bands(x[band]) for x in (predicted, beside(None)))
     np.testing.assert_allclose(predicted, simulated, rtol=0.25)
@@ -129,7 +129,7 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in fly([], BASELINE, v)])
                for v in (vehicle, gyro_only)]
     all_sensors, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
-    law, row = nominal().controller, prepare(vehicle, ())[0][0]
+    law, row = nominal().loop, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
     fine = command_spectra.fine_frequencies()
     by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, axis_plant(row, "roll"), fine))

@@ -12,7 +12,7 @@ from airtouch.gap.signatures.candidates import terms
 
 LAW = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator_delay" for a in active))
 #: its loop model knows that this delay changes the loop
-DATA = SimpleNamespace(study=SimpleNamespace(controller=LAW))
+DATA = SimpleNamespace(study=SimpleNamespace(loop=LAW))
 
 
 def selection(chosen, named, recorded=True):

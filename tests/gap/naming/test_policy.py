@@ -15,7 +15,7 @@ def policy(kind, count=6, same_models=False, nominal_gain=20.0, loop=True):
     """The policy for flights of 30 s. nominal_gain: nats that the nameless model gains in nominal ones as long."""
     allowed = lambda seconds, least: nominal_gain if (seconds, least) == (30.0, 12.0) else None  # noqa: E731
     return policy_of(SimpleNamespace(
-        **kind, nominal_count=count, same_models=same_models, controller=SimpleNamespace() if loop else None,
+        **kind, nominal_count=count, same_models=same_models, loop=SimpleNamespace() if loop else None,
         scatter=None if kind is UNKNOWN else SimpleNamespace(allowed=allowed)), 30.0)
 
 

@@ -181,8 +181,8 @@ def simulated(**rms):
                          [(True, True, True), (True, False, False), (False, True, False)])
 def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_ours(exact, by_firmware, same):
     """Other simulators' flights scatter as little, but their models of the air are their own."""
-    study = replace(FLOOR, scatter=SimpleNamespace(exact=exact), controller=SimpleNamespace(by_firmware=by_firmware))
-    assert study.same_models is same and not replace(study, controller=None).same_models
+    study = replace(FLOOR, scatter=SimpleNamespace(exact=exact), loop=SimpleNamespace(by_firmware=by_firmware))
+    assert study.same_models is same and not replace(study, loop=None).same_models
 
 
 def test_in_flights_of_a_simulator_calm_is_a_gap():

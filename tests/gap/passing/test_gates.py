@@ -69,7 +69,7 @@ def test_the_diagnosis_says_when(study, nominal_flight):
 
 def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and_goes(study, nominal_flight):
     """Its random force cannot be seen in the commands, so nothing may be gained by being less sure of their floor."""
-    calm = replace(study, controller=replace(study.controller, floor=0.2 * study.controller.floor))
+    calm = replace(study, loop=replace(study.loop, floor=0.2 * study.loop.floor))
     t = np.arange(len(nominal_flight)) * flight.PERIOD_S
     burst = ((t >= FROM_S) & (t < FROM_S + 2.0)) * np.random.default_rng(4).normal(size=len(t))
     acceleration = nominal_flight.acceleration + burst[:, None] * [0.0, 0.0, 0.5]

@@ -13,10 +13,10 @@ from airtouch.gap.relations.learning import drawings
 def test_the_scatter_of_distances_is_found_in_flights_of_which_some_hit_something():
     rng = np.random.default_rng(1)
     evidence = np.exp(rng.uniform(3.0, 10.0, 4000))
-    excess = np.hypot(19.0, 0.02 * evidence) * rng.standard_t(calibration.FREEDOM, 4000)
+    excess = np.hypot(19.0, 0.02 * evidence) * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000)
     excess[:40] += 5000.0
     assert likeliest_scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
-    assert likeliest_scatter(19.0 * rng.standard_t(calibration.FREEDOM, 4000), evidence, 19.0) < 0.002
+    assert likeliest_scatter(19.0 * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000), evidence, 19.0) < 0.002
 
 
 def test_four_of_five_flights_gain_a_smaller_share_than_the_stored_one():

@@ -84,7 +84,7 @@ def _in_spectra(data: Data, hypothesis: Candidate, fitted: FittedTerms, term: Te
         x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)
     of_halves = [t.scaled(t.values) for f in hypothesis.fits for t in f.terms if t.identity == term.identity]
     apart = 0.5 * (of_halves[0] - of_halves[1]) if len(of_halves) == 2 else np.zeros(len(x))
-    error = _model_error(data.study.controller, term, term.name in readings and len(x) == 1)
+    error = _model_error(data.study.loop, term, term.name in readings and len(x) == 1)
     return x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2)
 
 

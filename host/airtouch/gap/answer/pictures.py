@@ -12,7 +12,8 @@ from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, angular_acceleration
-from airtouch.gap.signals.spectra import AIR, frequencies, sensor_power, short_time_spectra, starts
+from airtouch.gap.signals.floor import sensor_power
+from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
 from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term

@@ -18,5 +18,5 @@ likelihood of the powers (Bayes factors: MacKay, Information Theory, Inference, 
 28). The evidences of all hypotheses of one name over the sum of all is the probability of that name, and the samples
 weighted by their likelihood give its parameters (`hover_posterior`). `balance_result` fills the diagnosis.
 
-Figures on recorded flights: host/docs/gap-real.md, "CrazyPAD: real defects, no gyro".
+Figures on recorded flights: host/docs/gap-crazypad.md.
 """

@@ -18,7 +18,7 @@ from airtouch.logs.segments import runs
 from airtouch.vehicle import Vehicle
 
 #: thrust at a PWM grows with voltage to this power: 1.2 between the nominal flights of CrazyPAD, 1.0 within one
-#: (host/docs/gap-real.md)
+#: (host/docs/gap-crazypad.md)
 VOLTAGE_EXPONENT = 1.2
 VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
 SETTLE_S = 0.8  #: s after take-off and before landing that are no hover yet; chosen

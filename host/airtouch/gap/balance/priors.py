@@ -1,6 +1,6 @@
 """What the judgement of a hover takes as known beforehand, of vehicles and of defects.
 
-The values without another source were chosen with CrazyPAD's conditions in view (host/docs/gap-real.md). What the
+The values without another source were chosen with CrazyPAD's conditions in view (host/docs/gap-crazypad.md). What the
 answer loses where some of them are chosen anew without the condition judged: `python tools/gap_crazypad.py FLIGHTS
 --leave-one-out`.
 """

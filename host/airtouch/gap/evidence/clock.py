@@ -39,7 +39,7 @@ def jitter(data: Data) -> TimesFault:
 def loss(data: Data) -> TimesFault:
     """Loss of rows: its size is the share of lost samples."""
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
-    least = LEAST_LOST if data.study.controller is None else LEAST_LOST_OF_LOOP
+    least = LEAST_LOST if data.study.loop is None else LEAST_LOST_OF_LOOP
     share, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if share <= nominal:
         return TimesFault(share, 0.0)

@@ -16,7 +16,7 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 #: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
-KEPT, KEPT_SAMPLES = 96, 20000
+KEPT_SPECTRA, KEPT_SAMPLES = 96, 20000
 
 
 @dataclass
@@ -80,7 +80,7 @@ def _by_response(data: Data, response: Response, active: Sequence[Active], repla
     replayed: the effects that do not show in the commands alone.
     """
     with_all = _replay_spectra(data, replayed)
-    law = data.study.controller
+    law = data.study.loop
     assert law is not None  # a response is known of nominal flights, and so is their loop
     not_loop = [a for a in replayed if not law.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
@@ -119,7 +119,7 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
 
     None where they change nothing of it.
     """
-    response, law = data.study.response, data.study.controller
+    response, law = data.study.response, data.study.loop
     change = law.torque_change(active, frequencies(AIR)) if response is not None and law is not None else None
     if response is None or change is None or not change.cut.any():
         return None
@@ -165,9 +165,9 @@ def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np
 
 def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
             ) -> list[dict[str, np.ndarray]]:
-    """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
+    """Spectra under a hypothesis, made once while it is among the KEPT_SPECTRA last used; those of no effect always."""
     if not active:
         return data.workspace.cached(f"{name} of no effect", (), make)
     if sum(len(f) for f in data.flights) > KEPT_SAMPLES:
         return make()
-    return data.workspace.cached(name, tuple(a.key for a in active), make, KEPT)
+    return data.workspace.cached(name, tuple(a.key for a in active), make, KEPT_SPECTRA)

@@ -16,7 +16,7 @@ from scipy.special import exp1
 
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 
-FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
+REPLAY_FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 _COLUMN = float64[::1]
 LEAST, MOST = 1e-100, 1e100  #: of a product of values before its logarithm is taken
 

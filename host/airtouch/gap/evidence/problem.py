@@ -11,7 +11,7 @@ from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data, gap_spectra
 from airtouch.gap.evidence.layout import Layout, Piece
-from airtouch.gap.evidence.likelihood import FREEDOM, Likelihood, tail
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail
 from airtouch.gap.evidence.torque_power import TorquePower, beside_edges
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
@@ -73,7 +73,7 @@ class Problem:
         # the data keeps its problems: no cycle, no garbage to wait for
         self.data, self.workspace = weakref.proxy(data), Workspace()
         self.layout = Layout(part.pieces, _counted(data.means_only))
-        self.commands = view_of(data.study.controller, data.flights, data.first, part.pieces)
+        self.commands = view_of(data.study.loop, data.flights, data.first, part.pieces)
         noise = self.layout.gather([{r: data.study.floor.of_blocks(f, b[r], r) for r in b}
                                     for f, b in zip(data.flights, data.first, strict=True)]).real
         replay = _of_replay(data, self.layout, noise)
@@ -176,7 +176,8 @@ def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
     known = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
                                    for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real
-    freedom = layout.per_piece(lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, FREEDOM))
+    freedom = layout.per_piece(
+        lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, REPLAY_FREEDOM))
     return Elements(np.where(known, base, 0.0), np.where(known, power, 1.0), known, layout.channels(),
                     layout.per_piece(lambda flight, _: flight), freedom, tail(freedom))
 

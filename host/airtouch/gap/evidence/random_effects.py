@@ -169,7 +169,7 @@ def _gyro_share(study: Study) -> np.ndarray:
     """
     f = frequencies(AIR)
     share = np.zeros((len(f), 3))
-    loop = study.controller
+    loop = study.loop
     if loop is None:
         return share
     row = prepare(study.vehicle, study.calibration)[0][0]

@@ -39,7 +39,7 @@ class TorquePower:
 
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
-        law = self.data.study.controller
+        law = self.data.study.loop
         loop = beside_edges(active) if law and len(self.base) else []
         of_loop = law.torque_change(loop, frequencies(AIR)) if law and loop else None
         if of_loop is None:
@@ -61,7 +61,7 @@ class TorquePower:
 
 def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) -> bool:
     """Whether the loops of roll and pitch differ between two hypotheses."""
-    law = data.study.controller
+    law = data.study.loop
     return law is not None and not law.same_loop(before, after)
 
 

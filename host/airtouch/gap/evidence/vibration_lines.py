@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.likelihood import FREEDOM, tailed
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH
@@ -148,7 +148,7 @@ def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """
     strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
-    tail, falls, known = (np.full(len(size), x) for x in (FREEDOM, FREEDOM + 1.0, True))
+    tail, falls, known = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
         """Twice the log likelihood of lines of a strength (power), but for a constant."""

@@ -23,7 +23,7 @@ PLATFORM = KINDS.index("over platform")
 START_S = (0.8, 0.2)
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
 FINE, REACH = 4, 2  #: points a bin; bins that a window's leakage is followed, its main lobe; chosen
-FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
+COMMAND_FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
 #: power of a block's commands over the median of its flight's blocks, above which a set-point stepped in it; chosen
 STEPPED_COMMAND = 5.0
 FEWEST = 3  #: blocks of a flight of which one can be unlike the others
@@ -92,7 +92,7 @@ def typical(power: np.ndarray) -> np.ndarray:
     estimate = power.mean(axis=0)
     for _ in range(STEPS):
         e = power / estimate
-        estimate = estimate * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
+        estimate = estimate * ((COMMAND_FREEDOM + 1.0) * e / (COMMAND_FREEDOM + e)).mean(axis=0)
     return estimate
 
 

@@ -144,7 +144,7 @@ def allowed_columns(data: Data, terms: Sequence[Term], channel: int) -> np.ndarr
     """
     out = np.ones(WIDEST, bool)
     out[len(BASIS):] = data.study.same_models
-    law, yaw = data.study.controller, TORQUE.stop - 1
+    law, yaw = data.study.loop, TORQUE.stop - 1
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
         out[len(BASIS):] = False

@@ -88,7 +88,7 @@ def loop_closes_too_little(closed: float, closed_by_others: float) -> bool:
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether terms that always act change the control loop."""
-    loop, mean = data.study.controller, [t for t in terms if t.shows_in == MEAN and not t.gate]
+    loop, mean = data.study.loop, [t for t in terms if t.shows_in == MEAN and not t.gate]
     if loop is None or not mean:
         return False
     return loop.changes_loop([t.active() for t in mean]) or any(t.signature.loop_only for t in mean)

@@ -163,7 +163,7 @@ class NamingPolicy:
 def policy_of(study: Study, seconds: float) -> NamingPolicy:
     """The policy for flights of so many seconds that are compared with a study."""
     return NamingPolicy(
-        first_gain=LEAST_GAIN if study.controller is None else FIRST_GAIN,
+        first_gain=LEAST_GAIN if study.loop is None else FIRST_GAIN,
         misfit_share=MISFIT_SHARE_RECORDED if study.recorded else MISFIT_SHARE_SIMULATED,
         loop_misfit_share=MISFIT_SHARE_LOOP_OWN_FIRMWARE if study.same_models else MISFIT_SHARE_LOOP_OTHER_FIRMWARE,
         misfit_by_cell=not study.recorded,

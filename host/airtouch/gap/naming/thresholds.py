@@ -69,5 +69,5 @@ def assumes(data: Data, terms: Sequence[Term]) -> bool:
 
 def changes_loop(data: Data, terms: Sequence[Term]) -> bool:
     """Whether one of the mean effects, at its values, changes the control loop; False where no loop is modelled."""
-    loop = data.study.controller
+    loop = data.study.loop
     return loop is not None and any(loop.changes_loop((t.active(),)) for t in mean_of(terms))

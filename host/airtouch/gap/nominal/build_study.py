@@ -13,19 +13,10 @@ from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
+from airtouch.gap.signals.floor import Floor, NominalBlocks, floor_of, sensor_power
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
-from airtouch.gap.signals.spectra import (
-    AIR,
-    REST,
-    Floor,
-    NominalBlocks,
-    floor_of,
-    frequencies,
-    sensor_power,
-    short_time_spectra,
-    starts,
-)
+from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
 from airtouch.gap.signals.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare

@@ -103,7 +103,7 @@ def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, 
     chosen, prior = _terms_and_priors()
     study = declared
     for _ in range(ROUNDS):
-        data = Data(replace(study, calibration=(), controller=None, response=None), flights)
+        data = Data(replace(study, calibration=(), loop=None, response=None), flights)
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
         fitted = fit(data, whole_of(data), chosen, start, prior)
         study = study_of(declared.vehicle, tuple(t.active() for t in fitted.terms), flights)

@@ -35,7 +35,7 @@ HALVINGS = 12  #: of the highest strength, at most, down to that which hardly sh
 HIGHEST_START = 0.5  #: of the highest strength, from which a class's flights begin at most
 TRIED, SHOWN = 3, 0.5  #: flights at each of these strengths, and the share of them that shows an effect which shows
 QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
-FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
+DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
 LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
 LEAST_GAIN = 10.0  #: nats that chance may gain beside any class, as many as `inference.LEAST_NAMELESS`
 LEAST_FLIGHTS = 12  #: calibration flights that show the effect; with fewer a class gives no parameters
@@ -187,7 +187,8 @@ def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndar
     """
     def against(logarithm: float) -> float:
         """Minus the log likelihood of a scatter."""
-        return -float(student.logpdf(excess, FREEDOM, 0.0, np.hypot(nominal, np.exp(logarithm) * evidence)).sum())
+        scatter = np.hypot(nominal, np.exp(logarithm) * evidence)
+        return -float(student.logpdf(excess, DISTANCE_FREEDOM, 0.0, scatter).sum())
 
     return float(np.exp(minimize_scalar(against, bounds=(np.log(LEAST_SCATTER), 0.0), method="bounded").x))
 

@@ -1,4 +1,4 @@
-"""The gap's channels: what was measured minus what the model says, sample by sample.
+"""The gap's channels: what each is, and what a flight's residual is in them, sample by sample.
 
 Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3), judged below 0.3 Hz. Command view:
 the controller's command (4), divided by the change of its spectrum that the effects in the model predict, so that a
@@ -52,7 +52,7 @@ CHANNEL_WORDS = {
 }
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)  #: of a table with a column for each channel
-KEPT = 12  #: residuals of one flight that are cached for gates to be put together from; chosen
+KEPT_RESIDUALS = 12  #: residuals of one flight that are cached for gates to be put together from; chosen
 
 
 def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
@@ -65,24 +65,28 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             controller: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
-    """Measured minus modelled, (n, COUNT), in the channels' units; NaN in channels that this flight cannot have.
+             loop: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
+    """What a flight has beyond the model, (n, COUNT), in the channels' units; NaN in channels that it cannot have.
 
-    active: effects that the model has; controller: of the loop that makes the commands, without which these are NaN;
-    seed: of the noise that effects draw. In the phase GROUND the model is a vehicle at rest, whether the motors run or
+    - force and torque: measured minus modelled, where the logged commands drive the model;
+    - rates: measured minus the bias of the gyro that the model has;
+    - commands: as logged, over the ratio by which the effects change their spectra (`ClosedLoop.commands_without`).
+
+    active: effects that the model has; loop: makes the commands, which are NaN without it; seed: of the noise that
+    effects draw. In the phase GROUND the model is a vehicle at rest, whether the motors run or
     not: samples there with running motors are never usable (`contact.near_ground`). Without a gyro the angular
     acceleration is taken as zero, which holds at low frequency (the floor says how low). workspace: keeps the residuals
     that gates are put together from, for the next gate of the same effects in this flight.
     """
     gated = [a for a in active if a.gate]
     if not gated:
-        return _ungated_residual(flight, vehicle, active, controller, seed)
+        return _ungated_residual(flight, vehicle, active, loop, seed)
     always, cache = [a for a in active if not a.gate], workspace or Workspace()
 
     def cached_residual(effects: Sequence[Active]) -> np.ndarray:
         """Residual (n, COUNT) of effects that always act."""
         return cache.cached("residual", tuple(a.key for a in effects),
-                            lambda: _ungated_residual(flight, vehicle, effects, controller, seed), KEPT)
+                            lambda: _ungated_residual(flight, vehicle, effects, loop, seed), KEPT_RESIDUALS)
 
     out = cached_residual(always).copy()
     for a in gated:
@@ -92,7 +96,7 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     return out
 
 
-def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: ClosedLoop | None,
+def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], loop: ClosedLoop | None,
                       seed: int) -> np.ndarray:
     """`residual` of effects that always act."""
     out = np.full((len(flight), COUNT), np.nan)
@@ -116,8 +120,8 @@ def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]
     if flight.rates is not None:
         out[-1, TORQUE] = 0.0  # no sample follows the last one, so that it has no measured acceleration
         out[:, RATE] = flight.rates - row["gyro_bias"]
-    if controller is not None:
-        out[:, COMMAND] = controller.commands_without(flight, active)
+    if loop is not None:
+        out[:, COMMAND] = loop.commands_without(flight, active)
     return out
 
 

@@ -5,7 +5,7 @@ flight: the power e of a value against p = floor x ratio x correction, (bins, AX
 hypothesis over none (`ClosedLoop.ratio`), of this flight (`floor_correction`). Then the whitened responses at edges
 (edges, COUNT): each value less what effects add to it, of power 1. The log likelihood of a value of a spectrum is
 
-    -log p - (nu + 1) log(1 + e / (nu p))            Student-like tails of nu = FREEDOM degrees of freedom
+    -log p - (nu + 1) log(1 + e / (nu p))            Student-like tails of nu = COMMAND_FREEDOM degrees of freedom
 
 less the correction's cost; each block is counted half, as half overlapping blocks hold every sample twice.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.loop.command_spectra import COMMAND_LENGTH, FREEDOM, command_frequencies
+from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, COMMAND_LENGTH, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.channels import COMMAND
 from airtouch.gap.signals.floor_correction import correction_of, smooth_shapes
@@ -30,7 +30,7 @@ from airtouch.logs.edges import Edge
 from airtouch.simulation.effects import Active
 
 EDGE_FREEDOM = 6.0  #: degrees of freedom of the Student-like tails of responses at edges; chosen
-KEPT = 300  #: hypotheses whose expected power is cached; chosen
+KEPT_POWERS = 300  #: hypotheses whose expected power is cached; chosen
 SMALL = 1e-3  #: change of a scaled parameter, in natural steps, over which the likelihood's slope is taken; chosen
 #: channel of each number of a response at an edge: thrust by the thrust command, speed by pitch, height by thrust
 EDGE_CHANNELS = np.repeat([COMMAND.start, COMMAND.start + AXES.index("pitch"), COMMAND.start],
@@ -92,7 +92,7 @@ class CommandView:
             return self.elements.floor, 0.0
         ratio = loop.ratio(active)
         return self.workspace.cached("power", (ratio.tobytes(), wide),
-                                     lambda: self._expected(loop.floor, ratio, wide), KEPT)
+                                     lambda: self._expected(loop.floor, ratio, wide), KEPT_POWERS)
 
     def _expected(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
         """`power` where effects multiply the floor of the commands by a ratio, (bins, AXES) each."""
@@ -141,7 +141,7 @@ class CommandView:
         for s in self.powers:
             correction = correction_of(s, floor, ratio, wide)
             power = floor * ratio * np.exp(correction.log_power)
-            tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
+            tails = (COMMAND_FREEDOM + 1.0) * np.log1p(s / (power * COMMAND_FREEDOM))
             total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + correction.cost
         return total
 
@@ -194,7 +194,7 @@ def _of_blocks(loop: ClosedLoop, number: int, spectra: np.ndarray) -> CommandEle
     return CommandElements(
         values=spectra.ravel(), floor=each(loop.floor), channel=each(COMMAND.start + np.arange(len(AXES))),
         frequency=each(command_frequencies()[:, None]), flight=np.full(spectra.size, number),
-        freedom=np.full(spectra.size, FREEDOM))
+        freedom=np.full(spectra.size, COMMAND_FREEDOM))
 
 
 def _of_edge(floor: edge_response.EdgeFloor, flight: Flight, number: int, edge: Edge) -> CommandElements:

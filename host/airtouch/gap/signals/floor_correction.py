@@ -12,15 +12,23 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit
 
-from airtouch.gap.loop.command_spectra import FREEDOM, command_frequencies
+from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight; chosen
-SPREAD = (0.10, 0.04)  #: nepers of power, standard deviation of the amount of the first shape, of each other; chosen
+#: nepers of power, standard deviation of the amount of the first shape, of each other; chosen, not measured. Larger
+#: ones leave less evidence in the commands, as the floor takes up more of what effects make; with smaller ones a floor
+#: of few nominal flights, or other air, looks like an effect
+SPREAD = (0.10, 0.04)
 ROUNDS = 4  #: Newton steps to the correction; chosen
-WIDE = 6.0  #: factor on SPREAD where random effects shake the loop in ways that no log holds; chosen
-COMMAND_DOUBT = 0.1  #: error of the loop model, as a share of the logarithm of `ClosedLoop.ratio`; chosen
+#: factor on SPREAD where random effects shake the loop in ways that no log holds; chosen, not measured. With a larger
+#: one commands say less of any effect beside a random one, with a smaller one what shakes the loop looks like an effect
+WIDE = 6.0
+#: error of the loop model, as a share of the logarithm of `ClosedLoop.ratio` (rms over bins and axes); chosen, not
+#: measured. The floor of a hypothesis may be off by so much more: with a larger one the commands speak less for and
+#: against strong effects, with a smaller one errors of the loop model speak against right ones
+COMMAND_DOUBT = 0.1
 
 
 class Correction(NamedTuple):
@@ -77,5 +85,5 @@ def _push(over, factor):
         for b in range(out.shape[0]):
             for a in range(out.shape[1]):
                 e = block[b, a] * factor[b, a]
-                out[b, a] += (FREEDOM + 1.0) * e / (FREEDOM + e) - 1.0
+                out[b, a] += (COMMAND_FREEDOM + 1.0) * e / (COMMAND_FREEDOM + e) - 1.0
     return out

@@ -34,10 +34,8 @@ def estimate_quiet_power(modelled: Sequence[np.ndarray], power: np.ndarray) -> t
 
     modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the power is
     measured on quiet blocks, and blocks are quiet that are not much stronger, until the same ones are quiet twice, for
-    MOST_ROUNDS at most. Of 16 sets of 2 to 6 simulated flights (`diagnosis`, `hover`, `paper-low`, `steps`) 15 settle
-    by then; sets of the authors' recorded flights take 5 to 7 rounds, those of neural-swarm up to 8, and one of these
-    goes round in circles. What the fourth round still changed was 1 to 13 entries, 6 % at most. Where flights differ so
-    much that an axis has no quiet block, there is no power to measure, and the search ends.
+    MOST_ROUNDS at most. The fourth round changes at most 6 % of the entries (host/docs/looks.md, 2026-11-26 07:29).
+    Where flights differ so much that an axis has no quiet block, there is no power to measure, and the search ends.
     """
     quiet = np.ones((len(power), 3), bool)
     for _ in range(MOST_ROUNDS):

@@ -43,10 +43,14 @@ CUT_DOUBT = 0.3
 #: relative error of the loop model in the commands that answer a torque: that in eight pairs of simulated flights with
 #: and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz)
 ANSWER_DOUBT = 0.2
-#: difference of q from that of the loop model, taken as a standard deviation: that in twelve pairs of simulated flights
-#: of its own loop (host/docs/looks.md, 2026-11-24 03:20)
+#: standard deviation of q around that of the loop model, for a prior of standard deviation 1 of the share of commands
+#: that follows the model (`Law.ratio`): the difference in twelve pairs of simulated flights of its own loop
+#: (host/docs/looks.md, 2026-11-24 03:20)
 SHARE_DOUBT = 0.2
-NOISE = 0.2  #: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; chosen
+#: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this on it is
+#: believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says less of
+#: effects that act through the commands; with a smaller one noise of the gyro counts as a response
+NOISE = 0.2
 FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a single one is 1, whatever is in it
 
 
@@ -105,10 +109,20 @@ class Law:
     def ratio(self, change: Change) -> np.ndarray:
         """Ratio c (bins, 3) of q with effects that change the loop to q without.
 
-        A share a of the commands follows the loop model, the others turn the vehicle as they say: q = a before + 1 - a,
-        with effects a after + (1 - a) motors. The share is the least squares solution for `transfer`, with a prior at 1
-        of a spread SHARE_DOUBT in q. In yaw c becomes 1 + (c - 1) / max(|q~|, 1)^2: where |q~| exceeds 1 it is mostly
-        noise of the gyro, which effects do not change.
+        A share a of the commands follows the loop model, the others turn the vehicle as they say. With b, the loop
+        model's share of torque that turns it (`Change.before`), m = `Change.motors` and s = `Change.share`, the ratio
+        is
+
+            c = (a m s b + (1 - a) m) / (a b + 1 - a)
+
+        q is over what the model makes of a logged command, b over what the vehicle's motors make of it. So q times
+        l = `disturbed.logged_over_flown` (`Change.logged`), the former over the latter, is what a b + 1 - a should be.
+        The share minimises, bin by bin and axis by axis, within 0 and 1,
+
+            |q l - (a b + 1 - a)|^2 + SHARE_DOUBT^2 (a - 1)^2
+
+        In yaw c becomes 1 + (c - 1) / max(|q~|, 1)^2: where |q~| exceeds 1 it is mostly noise of the gyro, which
+        effects do not change.
         """
         before = change.before[self.kind]
         after = change.motors * change.share[self.kind] * before
@@ -153,10 +167,13 @@ class Response:
 
     def with_residual(self, spectra: np.ndarray, quiet: np.ndarray, torque: TorqueSpectra,
                       change: Change | None = None) -> np.ndarray:
-        """Spectra (blocks, bins, COUNT) of the gap, the torque above the means by the laws; NaN where there is no law.
+        """Spectra (blocks, bins, COUNT) of the gap in which the residual of the laws replaces that of the torque.
 
-        spectra: measured minus modelled with all effects. quiet (blocks, 3): whether no set-point stepped on an axis.
-        change: by effects that change the loop.
+        It does so above the bins of the means (FIRST_BIN), and is NaN in a block for which there is no law.
+
+        spectra (blocks, bins, COUNT): of measured minus modelled, with all effects in the model. quiet (blocks, 3):
+        whether no set-point stepped on an axis. torque: of the same blocks. change: what effects that change the loop
+        make of the torque of a command; None for no such effect.
         """
         residual = self.quiet_law.residual(torque, change)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis

@@ -1,39 +1,27 @@
-"""Short-time spectra of the gap, and the floor that they are held against.
+"""Short-time spectra of the gap: blocks of a flight, their spectra, which bins count.
 
 Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping (Welch 1967). A bin's value over the
-square root of the floor's power is a complex normal number of power 1 in a nominal flight. The file reads: blocks of a
-flight, their spectra, which bins count, the floor of nominal flights.
+square root of the floor's power (`floor`) is a complex normal number of power 1 in a nominal flight.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.blocks import BANDS_HZ, count_within, half_overlapping, hann_window
+from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
-from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, TORQUE
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT
 
-#: state of the vehicle throughout a block: in the air, at rest on the ground
-AIR, REST = "air", "ground"
+# Blocks. A sample has a phase (`flights.flight`), of which GROUND is one; a block has a state. It is at REST where the
+# phase is GROUND throughout and the motors are off, in the AIR where the phase is never GROUND; others are not taken.
+AIR, REST = "air", "ground"  #: states of the vehicle throughout a block: in the air, at rest on the ground
 LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
 OVERLAP_WEIGHT = 0.5  #: of a block in a sum of log likelihoods, as half overlapping blocks hold every sample twice
 MOST_LOST = 0.1  #: share of a block's samples that may be bridged; chosen
-HANN_POWER = 1.5  #: bins, noise bandwidth of a Hann window
-LEAST_LEFT = 0.1  #: share of a block's power that is left at least when the power of lost rows is taken off; chosen
-#: Hz, upper end of the band in which torque and rate hold the trim of a flight, which does not go with how hard it is
-#: flown: that of the lowest band
-TRIM_HZ = BANDS_HZ[1]
-FEWEST_BLOCKS = 4  #: blocks of nominal flights that a floor is measured on; chosen
-#: power of the floor where nominal flights have fewer than FEWEST_BLOCKS, over that of the sensors' noise; chosen
-UNKNOWN_FLOOR = 2.0
-LEAST_FLOOR = 0.5  #: least power of a measured floor over that of the sensors' noise; chosen
+
+# Power over frequency, here and in the rooms that use it.
+SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 #: bins, frequency at which a spectrum that falls to 0 is taken in its lowest bin, as the window leaks into it; chosen
 LEAKED = 0.5
 LEAST_POWER = 1e-300  #: least power that is divided by or has a logarithm; below any measured
-SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 
 
 def starts(flight: Flight, state: str) -> np.ndarray:
@@ -88,124 +76,6 @@ def judged_bins(state: str) -> np.ndarray:
     return in_band
 
 
-@dataclass(frozen=True)
-class Floor:
-    """Power of the residuals of nominal flights, against which a gap is held.
-
-    power: by state (bins, COUNT), unit^2/Hz; block_counts: by state, how many blocks it is measured on; offset
-    (COUNT,): standard deviation between flights of a channel's mean in the air, in its unit; offset_beyond (COUNT,):
-    that part of it which the power in the lowest bin does not give; clock_s: rms of the logged times around regular
-    ones, s; lost: share of lost samples; slopes: of the power in the air with how hard the vehicle is flown, None for
-    too few flights; least_power (bins, COUNT): power in the air that stays however calmly it is flown.
-    """
-
-    power: dict[str, np.ndarray]
-    block_counts: dict[str, int]
-    offset: np.ndarray
-    clock_s: float
-    lost: float
-    slopes: Slopes | None = None
-    least_power: np.ndarray | float = 0.0
-    offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
-
-    def of_blocks(self, flight: Flight, first: np.ndarray, state: str) -> np.ndarray:
-        """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
-        power = self.power[state]
-        if self.slopes is None or state != AIR:
-            return np.broadcast_to(power, (len(first), *power.shape))
-        return np.maximum(power * self.slopes.relative_power(hardness_of(flight, first, LENGTH[AIR])), self.least_power)
-
-
-@dataclass(frozen=True)
-class NominalBlocks:
-    """A flight declared nominal and its blocks.
-
-    residual (n, COUNT): what the calibrated model leaves of it; first, spectra: by state the first samples (blocks,)
-    and the spectra (blocks, bins, COUNT) of the blocks; bridging (blocks, bins, COUNT): power that lost rows add in the
-    air.
-    """
-
-    flight: Flight
-    residual: np.ndarray
-    first: dict[str, np.ndarray]
-    spectra: dict[str, np.ndarray]
-    bridging: np.ndarray
-
-
-def floor_of(nominal: Sequence[NominalBlocks], sensor_rms: np.ndarray) -> Floor:
-    """The floor of flights declared nominal, one or more, from what the calibrated model leaves of them.
-
-    sensor_rms (COUNT,): white noise that the sensors are declared to have, rms at 100 Hz (of the gyro for torque,
-    rad/s); the floor never falls below LEAST_FLOOR of its power. The power that lost rows add is taken off, as each
-    flight loses other rows, to LEAST_LEFT of what is measured.
-    """
-    flights = [n.flight for n in nominal]
-    powers = {r: np.abs(np.concatenate([n.spectra[r] for n in nominal])) ** 2 for r in (AIR, REST)}
-    in_air, slopes = _power_in_air(nominal, powers[AIR])
-    sensors = {r: sensor_power(sensor_rms, r) for r in (AIR, REST)}
-    power = {AIR: _floor_power(in_air, sensors[AIR]), REST: _floor_power(powers[REST], sensors[REST])}
-    offset, beyond = _offsets(nominal, power[AIR][0])
-    return Floor(power=power, block_counts={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
-                 clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
-                 lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
-                 slopes=slopes, least_power=LEAST_FLOOR * sensors[AIR])
-
-
-def _power_in_air(nominal: Sequence[NominalBlocks], power: np.ndarray) -> tuple[np.ndarray, Slopes | None]:
-    """Power (blocks, bins, COUNT) as if all blocks were flown alike, and its slopes with how hard they are flown.
-
-    power (blocks, bins, COUNT): of all blocks in the air, from which what lost rows add is taken off. Too few blocks
-    stay as they are, and have no slopes.
-    """
-    if len(power) < FEWEST_BLOCKS:
-        return power, None
-    hardness = np.concatenate([hardness_of(n.flight, n.first[AIR], LENGTH[AIR]) for n in nominal])
-    trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= TORQUE.start)
-    slopes = slopes_of(power, hardness, frequencies(AIR), trim)
-    own = np.maximum(power - np.concatenate([n.bridging for n in nominal]), LEAST_LEFT * power)
-    return own / slopes.relative_power(hardness), slopes
-
-
-def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
-    """Power (bins, COUNT) of the floor from that of nominal blocks (blocks, bins, COUNT) and of the sensors' noise."""
-    if len(power) < FEWEST_BLOCKS:
-        return UNKNOWN_FLOOR * sensor
-    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0))), LEAST_FLOOR * sensor)
-
-
-def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`Floor.offset` and `Floor.offset_beyond`, (COUNT,) each: 0 for one flight.
-
-    lowest (COUNT,): the floor's power in the lowest bin, which gives the means of flights a scatter by chance.
-    """
-    if len(nominal) < 2:
-        return np.zeros(COUNT), np.zeros(COUNT)
-    air = [(n.flight.phase != GROUND) & n.flight.usable for n in nominal]
-    means = np.array([n.residual[a].mean(axis=0) for n, a in zip(nominal, air, strict=True)])
-    variance = np.nan_to_num(means.var(axis=0, ddof=1))
-    chance = HANN_POWER * lowest * np.mean([1.0 / max(a.sum() * PERIOD_S, PERIOD_S) for a in air])
-    return np.sqrt(variance), np.sqrt(np.maximum(variance - chance, 0.0))
-
-
-def sensor_power(sensor_rms: np.ndarray, state: str) -> np.ndarray:
-    """PSD (bins, COUNT) of the sensors' white noise; that of the gyro's differences rises with frequency.
-
-    sensor_rms (COUNT,): as for `floor_of`.
-    """
-    f = frequencies(state)
-    white = np.broadcast_to(2.0 * PERIOD_S * sensor_rms ** 2, (len(f), COUNT)).copy()
-    differences = difference_power(np.maximum(f, LEAKED * f[1]))
-    white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (sensor_rms[TORQUE] / PERIOD_S) ** 2
-    return white
-
-
 def difference_power(f: np.ndarray) -> np.ndarray:
     """PSD (bins,) of the differences between samples of white noise over its own, at frequencies f (bins,), Hz."""
     return 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2
-
-
-def _smooth(power: np.ndarray) -> np.ndarray:
-    """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged."""
-    out = power.copy()
-    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], LEAST_POWER)), SMOOTH, axis=0, mode="nearest"))
-    return out

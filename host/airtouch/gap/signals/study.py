@@ -9,8 +9,8 @@ import numpy as np
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.floor import Floor
 from airtouch.gap.signals.response import Response
-from airtouch.gap.signals.spectra import Floor
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.effect import Gate
@@ -25,17 +25,23 @@ if TYPE_CHECKING:  # layers above this one, for types only
 class Study:
     """What flights are compared with.
 
-    vehicle, calibration: the model without effects; controller: the control loop as nominal flights show it, None
-    without them; floor: power of the gap of nominal flights; response: how the gyro follows their commands, None where
-    nobody knows; nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`);
-    nominal_count: number of nominal flights; scatter: how strong effects seem to be in them, None without any;
-    relations: what was learned of such flights (`relations.library.Library`), if anything; overhead: when another
-    vehicle is known to be overhead, none where nobody knows.
+    vehicle, calibration: the model without effects; loop: the control loop as nominal flights show it, None without
+    them; floor: power of the gap of nominal flights, that of their commands apart (`ClosedLoop.floor`); response: how
+    the gyro follows their commands, None where nobody knows; nominal_count: number of nominal flights.
+
+    `nominal.build_study` makes a study with these. Rooms above fill in the others later, each by a copy of the study:
+
+    - nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`);
+      `nominal.calibrate`;
+    - scatter: how strong effects seem to be in nominal flights, None without any; `nominal.calibrate`;
+    - relations: what was learned of such flights (`relations.library.Library`), if anything; `nominal.calibrate`;
+    - overhead: when another vehicle is known to be overhead, none where nobody knows; `passing.overhead`, which adds
+      the size of its wake to the scatter.
     """
 
     vehicle: Vehicle
     calibration: tuple[Active, ...]
-    controller: ClosedLoop | None
+    loop: ClosedLoop | None
     floor: Floor
     response: Response | None = None
     nameless_floor: "NamelessFloor | None" = None
@@ -45,8 +51,8 @@ class Study:
     overhead: Gate = ()
 
     def residual(self, flight: Flight, active: Sequence[Active] = ()) -> np.ndarray:
-        """Measured minus modelled (n, COUNT) of a flight, with effects in the model: `channels.residual`."""
-        return residual(flight, self.vehicle, (*self.calibration, *active), self.controller)
+        """Residual (n, COUNT) of a flight, with effects in the model: `channels.residual`."""
+        return residual(flight, self.vehicle, (*self.calibration, *active), self.loop)
 
     @property
     def simulated(self) -> bool:
@@ -56,12 +62,12 @@ class Study:
     @property
     def same_models(self) -> bool:
         """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
-        return self.simulated and self.controller is not None and self.controller.by_firmware
+        return self.simulated and self.loop is not None and self.loop.by_firmware
 
     @property
     def recorded(self) -> bool:
-        """Whether its nominal flights are not known to be a simulator's; one flight alone is not.
+        """Whether it has nominal flights and these count as recorded ones, as a single one always does.
 
-        Without nominal flights this is False, as `simulated` is.
+        Without nominal flights both this and `simulated` are False.
         """
         return self.scatter is not None and not self.scatter.exact

@@ -18,7 +18,7 @@ LEAST_SECONDS = 0.3  #: seconds that a cell needs; one with less is left out; ch
 INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
 #: degrees of freedom of a block at most, as blocks differ by more than chance; chosen. With it the intervals hold the
 #: true rms in 85 of 100 cells or more (test_map.py)
-FREEDOM = 4.0
+BLOCK_FREEDOM = 4.0
 FLOOR_SEED = 100  #: of the floors' bootstrap, no phase's number, which is that of a phase's own
 AIR = "air"  #: key of the floor of phases in which no nominal flight was
 
@@ -69,12 +69,13 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
 
 
 def _freedom(seconds: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-    """Degrees of freedom (regimes, bands, 1) of a mean square of noise: 2 x time x bandwidth, FREEDOM a block at most.
+    """Degrees of freedom (regimes, bands, 1) of a mean square of noise: 2 x time x bandwidth.
 
-    seconds, blocks (regimes,). Bendat and Piersol, Random Data, 4th ed., section 8.3.
+    A block has BLOCK_FREEDOM at most (Bendat and Piersol, Random Data, 4th ed., section 8.3). seconds, blocks: each
+    (regimes,).
     """
     width = np.array([b - a for a, b in MAP_BANDS_HZ])
-    limit = np.maximum(FREEDOM * blocks, 1.0)[:, None]
+    limit = np.maximum(BLOCK_FREEDOM * blocks, 1.0)[:, None]
     return np.clip(2.0 * seconds[:, None] * width, 1.0, limit)[:, :, None]
 
 

@@ -132,7 +132,7 @@ def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: in
 
 def _only_in_commands(trial: Trial, terms: Terms) -> bool:
     """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
-    loop = trial.data.study.controller
+    loop = trial.data.study.loop
     one_step_off = [t.active(np.ones(len(t.free))) for t in terms]
     return loop is not None and not any(shows(trial.data, t) for t in terms) \
         and not np.allclose(loop.ratio(one_step_off), 1.0)

@@ -5,7 +5,8 @@ import pytest
 
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signals.spectra import AIR, LENGTH, REST, NominalBlocks, floor_of, short_time_spectra, starts
+from airtouch.gap.signals.floor import NominalBlocks, floor_of
+from airtouch.gap.signals.spectra import AIR, LENGTH, REST, short_time_spectra, starts
 from gap_flights import flight
 
 
