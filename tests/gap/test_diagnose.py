@@ -21,6 +21,7 @@ class Chosen:
     singles: dict
     least_gain: dict
     parts: tuple = field(default=())
+    policy: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(must_close_gap=True))
 
 
 @pytest.mark.parametrize(("count", "seconds", "chosen"), [
@@ -37,7 +38,7 @@ def test_flights_of_210_s_are_judged_and_no_fewer_than_four(count, seconds, chos
 def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_left_out(monkeypatch, alone, names):
     """With slow motors 0.6 of the gap closes; without them as much as `alone`."""
     def of(*effects):
-        steps = [SimpleNamespace(name=n, key=n) for n in effects]
+        steps = [SimpleNamespace(name=n, passing_key=None) for n in effects]
         chosen = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
                                              for n in effects))
         return Chosen(steps, chosen, dict.fromkeys(effects), dict.fromkeys(effects))
