@@ -20,15 +20,15 @@ from pathlib import Path
 from airtouch.gap.nominal.kept_scatter import VARIABLE
 
 
-def seconds(processors: set[int], out: Path, kept: str) -> float:
-    """Wall time of one diagnosis on some processors; kept: folder of kept scatters, empty for none."""
+def seconds(processors: set[int], out: Path, cache: str) -> float:
+    """Wall time of one diagnosis on some processors; cache: folder of the baselines' scatters, empty for none."""
     example = resources.files("airtouch.gap.example")
     baseline = [str(example / f"nominal_{i}.csv.gz") for i in range(4)]
     command = [sys.executable, "-m", "airtouch", "gap", "diagnose", str(example / "real.csv.gz"),
                "--baseline", *baseline, "--json", str(out / "it.json"),
                "--report", str(out / "it.html"), "--force"]
     start = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True, env={**os.environ, VARIABLE: kept},
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, VARIABLE: cache},
                    preexec_fn=lambda: os.sched_setaffinity(0, processors))
     return time.perf_counter() - start
 
@@ -43,12 +43,12 @@ def main() -> None:
     every = os.sched_getaffinity(0)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        kept = str(out / "kept")
+        cache_folder = str(out / "cache")
         rows = {f"{flight} flight, {name}": (processors, cache)
-                for flight, cache in (("first", ""), ("further", kept))
+                for flight, cache in (("first", ""), ("further", cache_folder))
                 for name, processors in ((f"{len(every)} processors", every), ("1 processor", {min(every)}))}
         print("warming up: the first time compiles", file=sys.stderr, flush=True)
-        seconds(every, out, kept)
+        seconds(every, out, cache_folder)
         rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
                   for _ in range(runs)]
     for row in rows:

@@ -105,9 +105,10 @@ def _best_of(judged: Mapping[str, Candidate], before: float) -> Candidate | None
     """The best of the candidates that were fitted in full; None where there is none.
 
     Likelihoods of real flights are too sure of themselves (TEMPERATURE). So of two that gain nearly as much the one is
-    better whose strength is the rarer in nominal flights. A deviation that nominal flights have as well, too, is better
-    than one with evidence only where it gains more by a share MISFIT_SHARE_DEVIATION, as no model is exact. before:
-    nats that the effects gain to which one is added.
+    better whose strength is the rarer in nominal flights. A deviation that nominal flights have as well is added before
+    an effect with evidence only where it gains more by a share MISFIT_SHARE_DEVIATION, as no model is exact.
+
+    before: nats that the last step gains over no effect.
     """
     full = [c for c in judged.values() if c.full]
 

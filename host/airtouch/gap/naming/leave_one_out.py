@@ -24,10 +24,14 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     These are all that are named, where there are several, and one that comes and goes beside any other: what is as
     strong as in nominal flights may have its seconds as well. Seconds that another vehicle's log tells are sure.
     """
-    several = sum(s.named for s in steps) > 1
-    searched = {s.name for s in steps if s.passing_key not in (None, KNOWN_OVERHEAD)} if len(steps) > 1 else set()
+    several_named = sum(s.named for s in steps) > 1
+
+    def stands_beside_others(step: Step) -> bool:
+        searched_for = step.passing_key not in (None, KNOWN_OVERHEAD)
+        return step.named and (several_named or (searched_for and len(steps) > 1))
+
     return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
-            if s.named and (several or s.name in searched) else s for place, s in enumerate(steps)]
+            if stands_beside_others(s) else s for place, s in enumerate(steps)]
 
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:

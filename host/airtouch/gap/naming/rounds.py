@@ -56,10 +56,9 @@ def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     candidates, progress, promising: as for `round_of`; every_random: as for `screen_random`.
     """
     screened = screen_variants(start, candidates, progress)
-    means = _best_variants(screened.means)
-    by_gain = sorted(screened.means, key=lambda c: -c.gain)
-    unpromising, random = screen_random(start, screened.random, by_gain, every_random)
-    to_fit, not_fitted = _by_promise(means + unpromising, start.gain, promising)
+    means = sorted(screened.means, key=lambda c: -c.gain)
+    unpromising, random = screen_random(start, screened.random, means, every_random)
+    to_fit, not_fitted = _by_promise(_best_variants(means) + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.choice_cost) for c in to_fit]
     return [*screened.unseen, *random, *means_to_fit], not_fitted
 
@@ -77,10 +76,10 @@ def _fitted(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Can
     return fit() if briefly.gain - before > PROMISING else briefly
 
 
-def _best_variants(screened: Sequence[Candidate]) -> list[Candidate]:
-    """The best variant of each name and number of terms, best first."""
+def _best_variants(means: Sequence[Candidate]) -> list[Candidate]:
+    """The best variant of each name and number of terms, best first, as `means` are."""
     best: dict[tuple[str, int], Candidate] = {}
-    for candidate in sorted(screened, key=lambda c: -c.gain):
+    for candidate in means:
         best.setdefault((candidate.name, len(candidate.terms)), candidate)
     return list(best.values())
 

@@ -26,7 +26,7 @@ ROUNDS = 4  #: Newton steps to the correction; chosen
 #: one commands say less of any effect beside a random one, with a smaller one what shakes the loop looks like an effect
 WIDE = 6.0
 #: error of the loop model, as a share of the logarithm of `ClosedLoop.ratio` (rms over bins and axes); chosen, not
-#: measured. The floor of a hypothesis may be off by so much more: with a larger one the commands speak less for and
+#: measured. The floor of a hypothesis is as much less certain: with a larger error the commands speak less for and
 #: against strong effects, with a smaller one errors of the loop model speak against right ones
 COMMAND_DOUBT = 0.1
 

@@ -1,7 +1,7 @@
 """Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -195,12 +195,16 @@ def _screened_random_by_name(start: RoundStart, variants: Iterable[PricedVariant
     means_of: the best variants of a mean effect, by name; where there are any, only these count as the mean term.
     """
     screened: dict[str, list[ScreenedRandom]] = {}
+    judged: dict[Hashable, tuple[float, np.ndarray]] = {}  # one random term stands beside several mean ones
     for variant in variants:
         name, terms, cost = variant
         if name in means_of and not any(_same(terms[0], m.terms[-1]) for m in means_of[name]):
             continue
         if len(terms) == 1 or terms[0].shows_in == MEAN:
-            gain, strength = judge_random(start.halves, random_of(terms)[0])
+            term = random_of(terms)[0]
+            if term.key not in judged:
+                judged[term.key] = judge_random(start.halves, term)
+            gain, strength = judged[term.key]
             screened.setdefault(name, []).append(ScreenedRandom(gain - cost, strength, variant))
     return screened
 
