@@ -21,7 +21,7 @@ from hovers import FLOOR
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
 POLICY = policy_of(replace(FLOOR, nominal_count=5), 30.0)  #: of flights compared with five nominal ones
-TERMS = {name: (SimpleNamespace(name=name, shows_in="mean"),) for name in EVIDENCE}
+TERMS = {name: (SimpleNamespace(name=name, slot=name, shows_in="mean"),) for name in EVIDENCE}
 
 
 def judged(name, gain, evidence=None):

@@ -1,5 +1,7 @@
 """Forward selection on candidates whose gain and evidence a test makes up: which are added, and which have a name."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from airtouch.gap.naming import forward as module
@@ -21,7 +23,7 @@ def select(monkeypatch):
 
     Returns the state, and the names that were judged in each round.
     """
-    def run(candidates, passing=None, screened=(), left=()):
+    def run(candidates, passing=None, screened=(), left=(), first_gain=FIRST_GAIN):
         def judged(name, so_far=0.0):
             gain, evidence = candidates[name]
             return Candidate(name, (), so_far + gain, full=name not in screened, evidence=evidence)
@@ -44,7 +46,8 @@ def select(monkeypatch):
         monkeypatch.setattr(module, "is_random_misfit", lambda trial, last, candidate: candidate.name in left)
         monkeypatch.setattr(module, "with_leave_one_out_gains", lambda on, steps: steps)
         alone = {n: judged(n) for n in candidates}
-        search = Search(None, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, FIRST_GAIN),
+        trial = SimpleNamespace(policy=SimpleNamespace(first_gain=first_gain))
+        search = Search(trial, dict.fromkeys(candidates, [()]), alone, dict.fromkeys(candidates, first_gain),
                         lambda _: None)
         return forward(search, passing), rounds
 
@@ -79,6 +82,12 @@ def test_what_nominal_flights_have_as_well_is_a_deviation_and_after_three_only_w
     assert names(state) == [("e", False), ("d", False), ("c", False)] and state.deviations == MOST_DEVIATIONS
     state, _ = select({**deviations, "f": (30.0, FIRST_GAIN)})
     assert names(state)[3:] == [("f", True)] and state.named == ["f"]
+
+
+def test_beside_a_deviation_the_first_name_needs_what_any_first_effect_does(select):
+    judged = {"deviation": (200.0, 0.0), "named": (LEAST_GAIN - 0.1, FIRST_GAIN)}
+    assert names(select(judged)[0]) == [("deviation", False), ("named", True)]
+    assert names(select(judged, first_gain=LEAST_GAIN)[0]) == [("deviation", False)]
 
 
 def test_a_random_effect_that_another_leaves_makes_no_room_for_deviations(select):

@@ -1,22 +1,23 @@
 """What flights must show for a name, by what is known of them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from airtouch.gap.naming.policy import policy_of
 
-SIMULATED = {"simulated": True, "recorded": False}
-RECORDED = {"simulated": False, "recorded": True}
-UNKNOWN = {"simulated": False, "recorded": False}
+SIMULATED, RECORDED = "simulated", "recorded"
+NO_BASELINE = "no baseline"
 
 
 def policy(kind, count=6, same_models=False, nominal_gain=20.0, loop=True):
     """The policy for flights of 30 s. nominal_gain: nats that the nameless model gains in nominal ones as long."""
     allowed = lambda seconds, least: nominal_gain if (seconds, least) == (30.0, 12.0) else None  # noqa: E731
     return policy_of(SimpleNamespace(
-        **kind, nominal_count=count, same_models=same_models, loop=SimpleNamespace() if loop else None,
-        scatter=None if kind is UNKNOWN else SimpleNamespace(allowed=allowed)), 30.0)
+        simulated=kind == SIMULATED, nominal_count=count, same_models=same_models,
+        loop=SimpleNamespace() if loop else None,
+        scatter=None if kind == NO_BASELINE else SimpleNamespace(allowed=allowed)), 30.0)
 
 
 @pytest.mark.parametrize(("kind", "same_models", "assumed", "share"), [
@@ -37,7 +38,7 @@ def test_recorded_flights_may_leave_what_nominal_ones_leave():
     assert policy(SIMULATED, nominal_gain=33.0).unknown.nats(0.0, 5000.0, False) == pytest.approx(12.0 * 7 / 5)
 
 
-@pytest.mark.parametrize("kind", [RECORDED, UNKNOWN])
+@pytest.mark.parametrize("kind", [RECORDED, NO_BASELINE])
 def test_without_two_nominal_flights_a_fifth_of_what_is_gained_over_no_effect_may_be_left(kind):
     limit = policy(kind, count=1).unknown
     assert limit.nats(9000.0, 1000.0, False) == limit.nats(9000.0, 1000.0, True) == pytest.approx(200.0)
@@ -52,6 +53,11 @@ def test_models_are_more_exact_in_simulated_flights():
     assert recorded.loop_is_assumed and not simulated.loop_is_assumed
     assert recorded.must_close_gap and not recorded.judges_over_prediction
     assert simulated.judges_over_prediction and not simulated.must_close_gap
+
+
+def test_flights_without_a_baseline_count_as_recorded():
+    alone, recorded = policy(NO_BASELINE, count=0, loop=False), policy(RECORDED, loop=False)
+    assert replace(alone, unknown=recorded.unknown) == recorded
 
 
 def test_without_a_model_of_the_loop_the_first_effect_must_gain_as_much_as_a_further_one():

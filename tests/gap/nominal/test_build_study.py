@@ -19,7 +19,7 @@ def test_without_flights_the_floor_is_twice_the_declared_noise():
 
 def test_without_flights_commands_and_rates_say_nothing():
     study = declared_study(VEHICLE, ())
-    assert study.loop is None and study.response is None and not study.simulated and not study.recorded
+    assert study.loop is None and study.response is None and not study.simulated
     for state in (AIR, REST):
         assert (study.floor.power[state][:, COMMAND] > 1e9).all() and (study.floor.power[state][:, RATE] > 1e3).all()
     assert not study.floor.offset.any()

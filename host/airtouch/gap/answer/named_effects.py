@@ -42,15 +42,14 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     readings = selection.inference.readings if selection.inference is not None else {}
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
     fitted = best_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
-    names = {t.name for t in chosen.terms}
-    shown = [t for t in fitted.terms if t.name in names]
+    shown = [t for t in fitted.terms if t.slot in selection.named_slots]
     effects = [_named(t, *_in_spectra(data, hypothesis, fitted, t, readings), readings)
                for t in shown if not t.companion]
     for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, part) for e in effects]
     effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
     order = [s.name for s in selection.named]
-    return sorted(effects, key=lambda e: order.index(e.name) if e.name in order else len(order))
+    return sorted(effects, key=lambda e: order.index(e.name))
 
 
 def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
@@ -82,7 +81,7 @@ def _in_spectra(data: Data, hypothesis: Candidate, fitted: FittedTerms, term: Te
         x, covariance = fitted.scaled[place], fitted.covariance[place, place]
     else:
         x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)
-    of_halves = [t.scaled(t.values) for f in hypothesis.fits for t in f.terms if t.identity == term.identity]
+    of_halves = [t.scaled(t.values) for f in hypothesis.fits for t in f.terms if t.slot == term.slot]
     apart = 0.5 * (of_halves[0] - of_halves[1]) if len(of_halves) == 2 else np.zeros(len(x))
     error = _model_error(data.study.loop, term, term.name in readings and len(x) == 1)
     return x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2)

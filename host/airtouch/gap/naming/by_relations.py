@@ -8,7 +8,6 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.judging import Trial
-from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.relations.effect_class import EffectClass
@@ -46,7 +45,7 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
         singles=singles, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
-        least_gain=dict.fromkeys(singles, FIRST_GAIN), assumed=False, inference=inference,
+        least_gain=dict.fromkeys(singles, trial.policy.first_gain), assumed=False, inference=inference,
         policy=trial.policy)
 
 

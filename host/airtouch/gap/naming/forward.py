@@ -152,5 +152,5 @@ def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidat
     worth = {n: v for n, v in search.candidates.items() if named or n in gained}
     sure = {n for n, c in before.items() if c.full and c.evidence >= SURE_EVIDENCE and not is_random(n)}
     extensions = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return extensions, {n: least_further_gain(trial, steps[-1], c) if named else FIRST_GAIN
+    return extensions, {n: least_further_gain(trial, steps[-1], c) if named else trial.policy.first_gain
                         for n, c in extensions.items()}

@@ -4,14 +4,14 @@ The gains of all effects and of all but one are those of `judging.cross_validate
 are not charged with what they gain less once the commands' floor is less certain.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import ROUND_TRIP
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
-from airtouch.gap.naming.records import Step
+from airtouch.gap.naming.records import Step, new_terms
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import CLOCK
@@ -36,7 +36,7 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
 
 def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
-    last, dropped = steps[-1], _new_keys(steps, place)
+    last, dropped = steps[-1], _new_slots(steps, place)
     others = _without(last.terms, dropped)
     gain = clock_gains(trial.data, others)
     if all(t.shows_in == CLOCK for t in others):
@@ -56,13 +56,13 @@ def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> fl
     effects before the first random one are fitted anew by themselves, without the dropped one, for what they lose.
     """
     none_before = 0  # as the place of the first random effect, where there is none
-    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(_new_terms(steps, i))), none_before)
+    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(new_terms(steps, i))), none_before)
     earlier = [i for i in range(first_random) if i != place]
     if not earlier:
         return 0.0
     if place > first_random:
         return steps[-1].charges.gained_while_certain
-    later = frozenset().union(*(_new_keys(steps, i) for i in range(len(steps)) if i not in earlier))
+    later = frozenset().union(*(_new_slots(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
     return lost_beside_random(trial, refits)
 
@@ -72,22 +72,11 @@ def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
 
 
-def _new_terms(steps: Sequence[Step], place: int) -> list[Term]:
-    """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
-    before = {_key(t) for t in steps[place - 1].terms} if place else set()
-    return [t for t in steps[place].terms if _key(t) not in before]
+def _new_slots(steps: Sequence[Step], place: int) -> frozenset[Hashable]:
+    """Slots of the terms that the step at a place has added."""
+    return frozenset(t.slot for t in new_terms(steps, place))
 
 
-def _new_keys(steps: Sequence[Step], place: int) -> frozenset[tuple]:
-    """Keys of the terms that the step at a place has added."""
-    return frozenset(_key(t) for t in _new_terms(steps, place))
-
-
-def _without(terms: Sequence[Term], dropped: frozenset[tuple]) -> list[Term]:
-    """The terms whose key is not among those that are dropped."""
-    return [t for t in terms if _key(t) not in dropped]
-
-
-def _key(term: Term) -> tuple:
-    """What tells a term from a hypothesis's others: its effect (of which rotor), and whether it is a companion."""
-    return term.identity, term.companion
+def _without(terms: Sequence[Term], dropped: frozenset[Hashable]) -> list[Term]:
+    """The terms whose slot is not among those that are dropped."""
+    return [t for t in terms if t.slot not in dropped]

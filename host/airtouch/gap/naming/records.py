@@ -1,6 +1,6 @@
 """The result of a selection of effects: candidates judged, the steps, and what speaks against the effects named."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.policy import NamingPolicy
 from airtouch.gap.relations.inference import Against, Inference
-from airtouch.gap.signatures.signature import CLOCK, COMPANIONS
-from airtouch.gap.signatures.term import Terms
+from airtouch.gap.signatures.signature import CLOCK
+from airtouch.gap.signatures.term import Term, Terms
 
 
 @dataclass(frozen=True)
@@ -159,12 +159,16 @@ class Selection:
     @property
     def chosen(self) -> Candidate | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
-        names, last = {s.name for s in self.named}, self.last_step
-        if not names or last is None:
+        last, slots = self.last_step, self.named_slots
+        if last is None or not slots:
             return None
-        names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
-        fits = tuple(replace(f, terms=_of_names(f.terms, names)) for f in last.fits)
-        return replace(last, terms=_of_names(last.terms, names), fits=fits)
+        fits = tuple(replace(f, terms=_in_slots(f.terms, slots)) for f in last.fits)
+        return replace(last, terms=_in_slots(last.terms, slots), fits=fits)
+
+    @property
+    def named_slots(self) -> frozenset[Hashable]:
+        """Slots (`Term.slot`) of the terms of the effects named: a deviation may have the same name."""
+        return frozenset(t.slot for i, s in enumerate(self.steps) if s.named for t in new_terms(self.steps, i))
 
     def gained(self, candidate: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
@@ -200,6 +204,12 @@ class Selection:
         return self.against_over_limit < 1.0
 
 
-def _of_names(terms: Terms, names: Container[str]) -> Terms:
-    """The terms whose effect is among the names."""
-    return tuple(t for t in terms if t.name in names)
+def new_terms(steps: Sequence[Step], place: int) -> list[Term]:
+    """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
+    before = {t.slot for t in steps[place - 1].terms} if place else set()
+    return [t for t in steps[place].terms if t.slot not in before]
+
+
+def _in_slots(terms: Terms, slots: Container[Hashable]) -> Terms:
+    """The terms whose slot is among these."""
+    return tuple(t for t in terms if t.slot in slots)

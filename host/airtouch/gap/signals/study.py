@@ -56,18 +56,13 @@ class Study:
 
     @property
     def simulated(self) -> bool:
-        """Whether its nominal flights are those of a simulator, which are all drawn alike."""
+        """Whether its nominal flights are those of a simulator, which are all drawn alike.
+
+        Flights of a study without nominal flights, or with a single one, count as recorded.
+        """
         return self.scatter is not None and self.scatter.exact
 
     @property
     def same_models(self) -> bool:
         """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
         return self.simulated and self.loop is not None and self.loop.by_firmware
-
-    @property
-    def recorded(self) -> bool:
-        """Whether it has nominal flights and these count as recorded ones, as a single one always does.
-
-        Without nominal flights both this and `simulated` are False.
-        """
-        return self.scatter is not None and not self.scatter.exact

@@ -46,6 +46,11 @@ class Term:
         return self.name, self.values.get(self.signature.several_by)
 
     @property
+    def slot(self) -> Hashable:
+        """What tells a term from the others of a hypothesis: its effect (of which rotor), and whether a companion."""
+        return self.identity, self.companion
+
+    @property
     def key(self) -> Hashable:
         """Equal for terms that are equal."""
         return (self.name, self.shows_in, self.free, *sorted(self.values.items()), self.companion, self.gate)
