@@ -24,6 +24,6 @@ def test_what_all_flights_share_is_no_offset_of_each(count):
     offset = np.where(np.arange(COUNT) == COLUMN["force_z"], SPREAD, 0.0)
     study = replace(FLOOR, floor=replace(FLOOR.floor, offset=offset))
     data = Data(study, [hover(40 + k, (0.0, 0.0, -DOWN), name=f"flight {k}") for k in range(count)])
-    halves = [remainder_of(data, part, ()) for part in trial_of(data).parts]
-    look = judge_means(data, halves, terms("mass")[:1])
+    remainders = [remainder_of(data, part, ()) for part in trial_of(data).halves]
+    look = judge_means(data, remainders, terms("mass")[:1])
     assert look.gain == pytest.approx(max(count, 2) * 0.5 * (DOWN / SPREAD) ** 2, rel=0.1)

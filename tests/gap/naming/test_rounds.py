@@ -140,13 +140,13 @@ def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_t
     answer, _ = by_relations(monkeypatch, explained=True, likeliest="downwash")
     assert select.select(data, candidates_of(["mass"])) is answer
     by_relations(monkeypatch, explained=False, likeliest="downwash")
-    assert [s.name for s in select.select(data, candidates_of(["mass"])).named] == ["downwash"]
+    assert [s.name for s in select.select(data, candidates_of(["mass"])).named_steps] == ["downwash"]
 
 
 def test_a_wake_of_some_seconds_is_named_though_another_effect_is_likeliest_in_the_whole_flight(monkeypatch):
     data = Data(scattered(), [with_a_push(9.0, 15.0)])
     by_relations(monkeypatch, explained=False, likeliest="mass")
-    assert [s.name for s in select.select(data, candidates_of(["mass"])).named] == ["downwash"]
+    assert [s.name for s in select.select(data, candidates_of(["mass"])).named_steps] == ["downwash"]
 
 
 def test_a_wind_that_comes_and_goes_is_named_only_if_it_is_likeliest_in_the_whole_flight(monkeypatch):

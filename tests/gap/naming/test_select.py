@@ -9,6 +9,7 @@ import pytest
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, policy, rounds
+from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.scatter import Scatter
@@ -26,26 +27,26 @@ def test_where_nothing_is_nothing_is_found():
     names_reported = []
     names = ("mass", "imu_bias", "rotor_drag", "wind", "imu_noise", "weak_motor")
     selection, _ = select_from([hover(1)], names, progress=names_reported.append)
-    assert selection.steps == () and selection.chosen is None and selection.explained
-    assert set(names_reported) == set(selection.singles) == set(names) == set(selection.least_gain)
-    assert set(selection.least_gain.values()) == {policy.LEAST_GAIN}  # without a loop the stricter one
+    assert selection.steps == () and selection.named_hypothesis is None and is_explained(selection)
+    assert set(names_reported) == set(selection.single_effects) == set(names) == set(selection.least_nats)
+    assert set(selection.least_nats.values()) == {policy.LEAST_GAIN}  # without a loop the stricter one
     assert selection.nameless.over_none == selection.nameless.over_last_step < 12.0
-    assert not any(j.full for j in selection.singles.values())
+    assert not any(j.full for j in selection.single_effects.values())
     assert not selection.assumed and selection.policy.unknown.nominal_gain == 0.0
-    drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
+    drag, motor = selection.single_effects["rotor_drag"], selection.single_effects["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
     assert drag.gain == pytest.approx(-policy.PRICE) and drag.charges.choice_cost == 0.0
     assert motor.charges.choice_cost == pytest.approx(np.log(4.0)), "one of four rotors"
-    assert selection.singles["wind"].charges.choice_cost == pytest.approx(np.log(2.0))
+    assert selection.single_effects["wind"].charges.choice_cost == pytest.approx(np.log(2.0))
 
 
 def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     selection, data = heavy
     (step,) = selection.steps
-    assert step.name == "mass" and step.named and step.full and step.evidence == step.gain
-    loss = selection.singles["thrust_coefficient"].terms[0].values["loss"]
+    assert step.name == "mass" and step.is_named and step.full and step.evidence == step.gain
+    loss = selection.single_effects["thrust_coefficient"].terms[0].values["loss"]
     assert step.terms[0].values["fraction"] == pytest.approx(loss / (1.0 - loss), rel=0.03)
-    bias = selection.singles["imu_bias"]
+    bias = selection.single_effects["imu_bias"]
     assert bias.terms[0].values["acc_z"] == pytest.approx(-DOWN, rel=0.03)
     assert bias.strength.mean[2] == pytest.approx(-DOWN / 0.1, rel=0.03) and bias.strength.variance.shape == (6,)
     assert np.abs(bias.strength.mean[:2]).max() < 0.1
@@ -55,38 +56,39 @@ def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
     assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * policy.PRICE, abs=2.0)
     nameless = selection.nameless
-    assert nameless.over_none > 0.9 * step.gain and nameless.over_last_step < 12.0 and selection.explained
-    assert selection.chosen.terms == step.terms
+    assert nameless.over_none > 0.9 * step.gain and nameless.over_last_step < 12.0 and is_explained(selection)
+    assert selection.named_hypothesis.terms == step.terms
 
 
 def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_beside_what_is_named():
     selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=2.0)], ("mass", "imu_noise"), scattered(mass=[3.0]))
-    assert [(s.name, s.named) for s in selection.steps] == [("imu_noise", True), ("mass", False)]
+    assert [(s.name, s.is_named) for s in selection.steps] == [("imu_noise", True), ("mass", False)]
     assert selection.steps[1].evidence < 1.0 < policy.LEAST_GAIN < selection.steps[1].gain - selection.steps[0].gain
-    assert [s.name for s in selection.named] == ["imu_noise"]
+    assert [s.name for s in selection.named_steps] == ["imu_noise"]
     # four times a floor of twice the declared power; the declared one itself is no part of what is added
-    assert selection.chosen.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
-    assert [t.name for t in selection.chosen.terms] == ["imu_noise"]
+    assert selection.named_hypothesis.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
+    assert [t.name for t in selection.named_hypothesis.terms] == ["imu_noise"]
     assert {t.name for t in selection.last_step.terms} == {"imu_noise", "mass"} and selection.assumed
     push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
-    assert [s.named for s in push_only.steps] == [False] and push_only.chosen is None and push_only.explained
+    assert [s.is_named for s in push_only.steps] == [False] and push_only.named_hypothesis is None
+    assert is_explained(push_only)
     assert push_only.policy.unknown.nominal_gain == pytest.approx(12.0), "of a rate of 0"
 
 
 def test_of_two_that_gain_nearly_as_much_the_rarer_in_nominal_flights_is_named():
     flights = [hover(1, (0.0, 0.0, -DOWN))]
     selection, _ = select_from(flights, ("mass", "imu_bias"), scattered(mass=[3.0], imu_bias=[0.001] * 6))
-    assert [s.name for s in selection.named] == ["imu_bias"]
-    assert selection.singles["mass"].gain > selection.singles["imu_bias"].gain
+    assert [s.name for s in selection.named_steps] == ["imu_bias"]
+    assert selection.single_effects["mass"].gain > selection.single_effects["imu_bias"].gain
     selection, _ = select_from(flights, ("mass", "imu_bias"), scattered(mass=[0.001], imu_bias=[0.001] * 6))
-    assert [s.name for s in selection.named] == ["mass"]
+    assert [s.name for s in selection.named_steps] == ["mass"]
 
 
 def test_an_effect_at_its_bound_stands_in_for_another_and_is_not_named():
     selection, _ = select_from([hover(3, (0.0, 0.0, -8.0))], ("mass",))
     (step,) = selection.steps
-    assert step.terms[0].values["fraction"] == 1.0 and step.evidence == 0.0 and not step.named
-    assert selection.chosen is None and not selection.explained
+    assert step.terms[0].values["fraction"] == 1.0 and step.evidence == 0.0 and not step.is_named
+    assert selection.named_hypothesis is None and not is_explained(selection)
 
 
 def test_bounds_are_approached_from_within_on_both_sides():
@@ -104,10 +106,10 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
     flight = replace(hover(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)
     names = ("mass", "imu_noise", "packet_loss")
     selection, data = select_from([flight], names)
-    assert {s.name for s in selection.named} == set(names) and selection.named[-1].name == "packet_loss"
+    assert {s.name for s in selection.named_steps} == set(names) and selection.named_steps[-1].name == "packet_loss"
     share = next(t for t in selection.last_step.terms if t.name == "packet_loss").values["share"]
     assert share == pytest.approx(lost.mean(), rel=0.1)
-    by_name = {s.name: s.leave_one_out_gain for s in selection.named}
+    by_name = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     lost_alone = clock_gain(data, candidates_of(["packet_loss"])["packet_loss"][0][0])[1]
     assert by_name["packet_loss"] == pytest.approx(lost_alone, rel=1e-3)
     gains = [s.gain for s in selection.steps]
@@ -124,7 +126,7 @@ def test_no_more_than_so_many_effects_are_named(monkeypatch):
     lost = np.random.default_rng(0).random(3000) < 0.1
     selection, _ = select_from([replace(hover(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
                                ("mass", "imu_noise", "packet_loss"))
-    assert {s.name for s in selection.named} == {"imu_noise", "packet_loss"}, "the two that gain most"
+    assert {s.name for s in selection.named_steps} == {"imu_noise", "packet_loss"}, "the two that gain most"
 
 
 def test_the_strengths_of_all_effects_need_fits_of_what_promises_nothing():

@@ -47,21 +47,21 @@ def test_beside_an_effect_of_recorded_flights_another_must_gain_a_tenth_as_much(
     """A push, and noise a tenth above the floor: enough beside models that are exact, and not beside those of air."""
     flights, names = [hover(2, (0.0, 0.0, -DOWN), louder=1.1)], ("mass", "imu_noise")
     exact, _ = select_from(flights, names, scattered(exact=True))
-    assert [(s.name, s.named) for s in exact.steps] == [("mass", True), ("imu_noise", True)]
-    factor = exact.chosen.terms[1].values["factor"]
+    assert [(s.name, s.is_named) for s in exact.steps] == [("mass", True), ("imu_noise", True)]
+    factor = exact.named_hypothesis.terms[1].values["factor"]
     assert factor == pytest.approx(np.sqrt(2.0 * 1.1 ** 2 - 1.0), rel=0.03), "over the declared noise, half the floor"
     added = gains(exact)
     assert policy.LEAST_GAIN < added["imu_noise"] < 0.1 * added["mass"]
     recorded, _ = select_from(flights, names, scattered())
     assert [s.name for s in recorded.steps] == ["mass"]
-    assert recorded.singles["imu_noise"].gain > policy.LEAST_GAIN, "alone it would do"
+    assert recorded.single_effects["imu_noise"].gain > policy.LEAST_GAIN, "alone it would do"
 
 
 def test_an_effect_in_cells_of_its_own_is_held_against_what_is_gained_there():
     """Twice the noise everywhere, and a faint push that shows in the lowest band alone."""
     flights, names = [hover(2, (0.0, 0.0, -0.06), louder=2.0)], ("mass", "imu_noise")
     exact, _ = select_from(flights, names, scattered(exact=True))
-    assert [(s.name, s.named) for s in exact.steps] == [("imu_noise", True), ("mass", True)]
+    assert [(s.name, s.is_named) for s in exact.steps] == [("imu_noise", True), ("mass", True)]
     added = gains(exact)
     assert policy.LEAST_GAIN < added["mass"] < 0.01 * added["imu_noise"]
     recorded, _ = select_from(flights, names, scattered())
@@ -88,10 +88,10 @@ def test_the_variant_of_a_random_effect_is_that_of_its_time(time_s):
 def test_an_effect_of_the_loop_is_chosen_by_what_it_gains_in_the_commands(flying, name, parameter, value):
     selection, data = select_from(fly(1, 2, {name: {parameter: value}}), (name, "mass"), flying)
     (step,) = selection.steps
-    assert step.name == name and step.named and selection.assumed
+    assert step.name == name and step.is_named and selection.assumed
     assert selection.policy.unknown.least == pytest.approx(12.0 * 5 / 3), "of four nominal flights"
     assert step.terms[0].values[parameter] == pytest.approx(value, rel=0.2)
-    assert set(selection.least_gain.values()) == {policy.FIRST_GAIN}
+    assert set(selection.least_nats.values()) == {policy.FIRST_GAIN}
     assert step.evidence == step.gain  # nothing is known of nominal flights' scatter
     free = len(step.terms[0].free)
     price = (free - 1) * policy.PRICE + step.charges.choice_cost
@@ -150,7 +150,7 @@ def test_a_few_lost_rows_beside_a_large_effect_are_not_named():
     lost[500:2900:200] = True
     selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
                                   scattered(exact=True))
-    assert 0.0 < selection.singles["packet_loss"].gain < policy.LEAST_GAIN
+    assert 0.0 < selection.single_effects["packet_loss"].gain < policy.LEAST_GAIN
     assert [s.name for s in selection.steps] == ["mass"]
 
 
@@ -158,7 +158,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
     lost = np.random.default_rng(0).random(3000) < 0.1
     flight = replace(hover(2, (0.0, 0.0, -0.02)), lost=lost)
     selection, _ = select_from([flight], ("mass", "packet_loss"), scattered(exact=True))
-    assert 0.0 < selection.singles["mass"].gain < policy.LEAST_GAIN
+    assert 0.0 < selection.single_effects["mass"].gain < policy.LEAST_GAIN
     assert [s.name for s in selection.steps] == ["packet_loss"]
 
 
@@ -172,7 +172,7 @@ def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named(
 
 def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():
     selection, data = select_from([hover(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
-    shares = {s.name: s.leave_one_out_gain for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     (bias,) = (t for t in selection.last_step.terms if t.name == "imu_bias")
     bias_gain = own_gain(data, [bias]) - 5 * policy.PRICE
     assert shares["imu_noise"] == pytest.approx(selection.last_step.gain - bias_gain, abs=0.3)
@@ -218,7 +218,7 @@ def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, los
     """One of four rotors is chosen, whether it is the first effect found or the second."""
     selection, data = select_from([weak(louder=louder, r2=loss)], ("weak_motor", "imu_noise"))
     assert selection.steps[0].name == first
-    shares = {s.name: s.leave_one_out_gain for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     assert set(shares) == {"weak_motor", "imu_noise"}
     of = {t.name: t for t in selection.last_step.terms}
     assert selection.last_step.gain == pytest.approx(own_gain(data, selection.last_step.terms) - np.log(4.0), abs=0.3)
@@ -232,7 +232,8 @@ def test_what_an_effect_adds_includes_its_companion():
     flight = swaying(drag=0.02, gust_mps2=0.1)
     pushed = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN])
     selection, data = select_from([pushed], ("gust", "mass"), scattered(exact=True))
-    shares, (gust, drag, mass) = {s.name: s.leave_one_out_gain for s in selection.named}, selection.last_step.terms
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
+    gust, drag, mass = selection.last_step.terms
     assert (gust.name, drag.name, mass.name) == ("gust", "rotor_drag", "mass") and drag.companion
     assert shares["gust"] == pytest.approx(selection.last_step.gain - own_gain(data, [mass]), abs=0.3)
     of_gust = own_gain(data, [gust, drag]) - policy.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
@@ -244,7 +245,7 @@ def test_without_the_gusts_a_drag_that_was_found_by_itself_stays():
     without_companion = all_candidates(without=("rotor_drag",))["gust"]
     data = Data(scattered(exact=True), [swaying(drag=0.02, gust_mps2=0.1)])
     selection = select(data, {**candidates_of(["rotor_drag"]), "gust": without_companion}, without=ALWAYS)
-    shares = {s.name: s.leave_one_out_gain for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     assert set(shares) == {"gust", "rotor_drag"} and not any(t.companion for t in selection.last_step.terms)
     drag = [t for t in selection.last_step.terms if t.name == "rotor_drag"]
     of_drag = own_gain(data, drag) - policy.PRICE  # a second axis of drag
@@ -256,7 +257,7 @@ def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
     lost = np.random.default_rng(0).random(3000) < 0.1
     selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
                                   scattered(exact=True))
-    shares = {s.name: s.leave_one_out_gain for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     mass = [t for t in selection.last_step.terms if t.name == "mass"]
     assert shares == {"mass": pytest.approx(own_gain(data, mass)), "packet_loss": pytest.approx(loss(data)[1])}
 
@@ -266,7 +267,7 @@ def test_noise_beside_a_push_is_named_where_it_gains_a_quarter_as_much(louder, n
     """A model that is wrong looks random: noise that gains less stands there without a name."""
     selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=louder)], ("mass", "imu_noise"), scattered())
     added = gains(selection)
-    assert [(s.name, s.named) for s in selection.steps] == [("mass", True), ("imu_noise", named)]
+    assert [(s.name, s.is_named) for s in selection.steps] == [("mass", True), ("imu_noise", named)]
     assert (added["imu_noise"] > 0.25 * added["mass"]) == named and added["imu_noise"] > 0.1 * added["mass"]
 
 
@@ -280,8 +281,8 @@ def test_three_deviations_of_nominal_flights_are_added_and_then_only_what_is_evi
     study = scattered(**{n: r for n, r in rms.items() if n != "packet_loss" or nominal_loss})
     selection, _ = select_from([flight], tuple(rms), study)
     names = ["weak_motor", "mass", "imu_noise"] + ["packet_loss"] * (not nominal_loss)
-    assert [(s.name, s.named) for s in selection.steps] == [(n, n == "packet_loss") for n in names]
-    beside = {n: [t.name for t in j.terms] for n, j in selection.singles.items()}
+    assert [(s.name, s.is_named) for s in selection.steps] == [(n, n == "packet_loss") for n in names]
+    beside = {n: [t.name for t in j.terms] for n, j in selection.single_effects.items()}
     assert beside["weak_motor"] == names[:1] and beside["mass"] == names[:2] and beside["imu_noise"] == names[:3]
     assert beside["packet_loss"] == [*names[:2 if nominal_loss else 3], "packet_loss"], "as judged before the last step"
 
@@ -304,10 +305,10 @@ def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
     nominal = scattered(mass=[abs(mass.strength.mean[0]) / 8.0])
     (evident,), (deviation,) = (select_from(f, ("mass",), nominal)[0].steps for f in (alike, apart))
     # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
-    assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.named
+    assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.is_named
     weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (0.4, 0.7))  # shares of the mass
     assert deviation.evidence == pytest.approx(4.5 * np.log1p((8.0 * weak / between) ** 2 / 8.0), rel=0.1)
-    assert not deviation.named
+    assert not deviation.is_named
     assert deviation.gain > policy.LEAST_GAIN
 
 

@@ -43,13 +43,13 @@ class PricedVariant(NamedTuple):
 class Trial:
     """What hypotheses are judged on.
 
-    parts: the two halves of the flights; policy: what they must show; none_certain, none_uncertain: log likelihood of
-    no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
+    halves: the blocks of the flights, in two; policy: what they must show; none_certain, none_uncertain: log likelihood
+    of no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
     them.
     """
 
     data: Data
-    parts: tuple[BlockSet, BlockSet]
+    halves: tuple[BlockSet, BlockSet]
     policy: NamingPolicy
     none_certain: Sequence[float]
     none_uncertain: Sequence[float]
@@ -57,9 +57,9 @@ class Trial:
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
-    parts = halves(data)
-    none_certain, none_uncertain = ([judge(data, p, (), wide) for p in parts] for wide in (False, True))
-    return Trial(data, parts, policy_of(data.study, data.seconds), none_certain, none_uncertain)
+    of_data = halves(data)
+    none_certain, none_uncertain = ([judge(data, half, (), wide) for half in of_data] for wide in (False, True))
+    return Trial(data, of_data, policy_of(data.study, data.seconds), none_certain, none_uncertain)
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
@@ -132,7 +132,7 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
     The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
     fewer effects.
     """
-    start, part = _start(base, terms, half), trial.parts[half]
+    start, part = _start(base, terms, half), trial.halves[half]
     key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
     return trial.data.workspace.cached(
         "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
@@ -155,12 +155,12 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
     none = trial.none_uncertain if wide or random_of(terms) else trial.none_certain
-    return judge(trial.data, trial.parts[half], terms, wide) - none[half]
+    return judge(trial.data, trial.halves[half], terms, wide) - none[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
-    return np.sum([cell_gains(trial.data, trial.parts[test], hypothesis.fits[train].terms)
+    return np.sum([cell_gains(trial.data, trial.halves[test], hypothesis.fits[train].terms)
                    for train, test in ROUND_TRIP], axis=0)
 
 

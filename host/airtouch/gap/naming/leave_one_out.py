@@ -24,11 +24,11 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     These are all that are named, where there are several, and one that comes and goes beside any other: what is as
     strong as in nominal flights may have its seconds as well. Seconds that another vehicle's log tells are sure.
     """
-    several_named = sum(s.named for s in steps) > 1
+    several_named = sum(s.is_named for s in steps) > 1
 
     def stands_beside_others(step: Step) -> bool:
         searched_for = step.passing_key not in (None, KNOWN_OVERHEAD)
-        return step.named and (several_named or (searched_for and len(steps) > 1))
+        return step.is_named and (several_named or (searched_for and len(steps) > 1))
 
     return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
             if stands_beside_others(s) else s for place, s in enumerate(steps)]
@@ -69,7 +69,7 @@ def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> fl
 
 def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     """Effects fitted to a half anew, from their values on."""
-    return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
+    return fit(trial.data, trial.halves[half], terms, mean_parameters(terms))
 
 
 def _new_slots(steps: Sequence[Step], place: int) -> frozenset[Hashable]:

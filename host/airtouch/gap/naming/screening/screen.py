@@ -31,7 +31,7 @@ class RoundStart:
 
     trial: Trial
     base: Candidate | None
-    halves: Sequence[Remainder]
+    remainders: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
@@ -60,8 +60,8 @@ class Screened:
 def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
     fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
-    halves = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.parts)]
-    return RoundStart(trial, base, halves)
+    remainders = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.halves)]
+    return RoundStart(trial, base, remainders)
 
 
 def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
@@ -113,21 +113,21 @@ def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | No
 def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
     """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    judged = judge_means(start.trial.data, start.halves, terms, start.terms)
+    judged = judge_means(start.trial.data, start.remainders, terms, start.terms)
     gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
-    halves = np.array(judged.fitted)[:, :k]
-    strength = Strength(own.among_all(halves.mean(axis=0)),
-                        covariance_among_all(own, np.diag(_variance_of_mean(halves, judged.variances, k))))
+    of_halves = np.array(judged.fitted)[:, :k]
+    strength = Strength(own.among_all(of_halves.mean(axis=0)),
+                        covariance_among_all(own, np.diag(_variance_of_mean(of_halves, judged.variances, k))))
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
                      charges=Charges(variant.choice_cost), strength=strength)
 
 
-def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
+def _variance_of_mean(values: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
     """Variance (k,) of the mean of two values, and no less than half their difference squared.
 
-    halves (2, k): the values; variances (2, k or more): theirs, of which the first k count.
+    values (2, k); variances (2, k or more): theirs, of which the first k count.
     """
-    return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
+    return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(values, axis=0)))
 
 
 def _only_in_commands(trial: Trial, terms: Terms) -> bool:
@@ -189,7 +189,7 @@ def _screened_random(start: RoundStart, variants: Sequence[PricedVariant]) -> li
         if len(variant.terms) > 1 and first.shows_in != MEAN:
             continue
         if random.key not in judged:
-            judged[random.key] = judge_random(start.halves, random)
+            judged[random.key] = judge_random(start.remainders, random)
         gain, strength = judged[random.key]
         screened.append(ScreenedRandom(gain - variant.choice_cost, strength, variant))
     return screened
