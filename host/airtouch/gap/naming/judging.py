@@ -4,7 +4,8 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
 
     gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
            + clock_gains                        log likelihood of the logged times, by effects that show there alone
-           - price_of                           PRICE of each parameter beyond an effect's first
+           - price_of                           PRICE of each free parameter of a term beyond its first; a random part
+                                                or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
            + gained_while_certain               what effects lose beside the first random one, given back (`Charges`)
 """
@@ -91,7 +92,7 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None
     terms, before = variant.terms, base.terms if base else ()
     charges = _charges(trial, variant, base)
     if base and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
-        gain, fits = base.gain, base.fits
+        gain, fits = base.gain - variant.choice_cost, base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
@@ -139,7 +140,7 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
 
 
 def price_of(terms: Sequence[Term]) -> float:
-    """Held-out nats that parameters beyond an effect's first must earn."""
+    """Nats that free parameters of a term beyond its first must gain; a term that shows in the times alone pays none."""
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 

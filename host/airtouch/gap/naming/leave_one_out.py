@@ -39,13 +39,14 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     last, dropped = steps[-1], _new_slots(steps, place)
     others = _without(last.terms, dropped)
     gain = clock_gains(trial.data, others)
+    cost_of_dropped = steps[place].charges.choice_cost - (steps[place - 1].charges.choice_cost if place else 0.0)
+    cost_of_others = last.charges.choice_cost - cost_of_dropped
     if all(t.shows_in == CLOCK for t in others):
-        return gain
+        return gain - cost_of_others
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
     gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
-    cost_of_dropped = steps[place].charges.choice_cost - (steps[place - 1].charges.choice_cost if place else 0.0)
     gain += _gained_while_certain(trial, steps, place)
-    return gain - price_of(refits[-1].terms) - (last.charges.choice_cost - cost_of_dropped)
+    return gain - price_of(refits[-1].terms) - cost_of_others
 
 
 def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:

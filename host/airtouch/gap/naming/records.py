@@ -40,8 +40,9 @@ class Strength:
 class Charges:
     """What the gain of a hypothesis is charged with beside its parameters, and what is given back to it, nats.
 
-    choice_cost: charged for the choice among the variants of its effects; gained_while_certain: given back, what the
-    effects before the first random one lose because beside it the commands' floor is less certain.
+    choice_cost: charged for the choice among the variants of its effects: of all of them, but of the newest alone where
+    the hypothesis was only screened, whose base has paid already; gained_while_certain: given back, what the effects
+    before the first random one lose because beside it the commands' floor is less certain.
     """
 
     choice_cost: float = 0.0
