@@ -26,7 +26,7 @@ def pushed_in_the_air_alone(seed):
     return hover(seed, push, resting_s=4.0)
 
 
-def test_an_effect_that_says_what_the_flights_do_not_show_over_predicts_there():
+def test_wrong_effect_over_predicts():
     """A bias of the accelerometer would stand at rest as well, and a push does not: its loss there is known."""
     selection, data = select_from([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
     (step,) = selection.steps
@@ -54,7 +54,7 @@ def test_a_right_effect_does_not_over_predict():
     assert over_prediction_of(judging.trial_of(data), named).nats < 2.0 and named.gain > 100.0
 
 
-def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():
+def test_loss_by_channel():
     gains = np.zeros(CELLS)
     lift, forward, at_rest = 2, 0, 1000
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that

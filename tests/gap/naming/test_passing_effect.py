@@ -14,7 +14,7 @@ from airtouch.gap.signatures.scatter import FALSE_SHARE, size_of
 from hovers import ALWAYS, FLOOR, scattered, select_from, with_a_push
 
 
-def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
+def test_passing_effect_is_named_with_its_seconds():
     pushed = [with_a_push(9.0, 15.0)]
     selection, data = select_from(pushed, ("mass",), scattered(), ())
     assert [s.name for s in selection.named_steps] == ["downwash"]
@@ -31,7 +31,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
 
 
 @pytest.mark.parametrize(("size", "named"), [((0.0, 0.0), True), ((0.5, 0.1), True), ((3.0, 0.5), False)])
-def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have(size, named):
+def test_size_must_exceed_that_of_nominal_flights(size, named):
     """size: mean and standard deviation of `size_of` in nominal flights."""
     study = scattered()
     study = replace(study, scatter=replace(study.scatter, passing={"downwash": size}))
@@ -45,7 +45,7 @@ def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have
 
 @pytest.mark.parametrize(("names", "nominal_sizes", "mps2", "named"), [
     (("mass",), {}, 0.5, ["mass"]), (("mass",), {"mass": [3.0]}, 0.5, ["downwash"]), (("imu_noise",), {}, 0.15, [])])
-def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, nominal_sizes, mps2, named):
+def test_passing_effect_must_gain_more_than_a_steady_one(names, nominal_sizes, mps2, named):
     """A push for 25 of 30 s, of which its mass gains more.
 
     A mass that nominal flights have as well does not count; what follows the flight's own height does.
@@ -57,7 +57,7 @@ def test_what_acts_nearly_all_along_must_gain_more_than_what_always_acts(names, 
 
 
 @pytest.mark.parametrize(("less", "named"), [(policy.LEAST_GAIN - 1.0, []), (policy.LEAST_GAIN + 1.0, ["downwash"])])
-def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(monkeypatch, less, named):
+def test_passing_effect_must_gain_more_than_the_height(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
     gain = gated_effects(Data(study, flights))["downwash"].gain
@@ -66,7 +66,7 @@ def test_what_comes_and_goes_must_gain_more_by_as_much_as_a_further_effect_must(
 
 
 @pytest.mark.parametrize("nominal_sizes", [{}, {"mass": [3.0]}])
-def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_nominal_flights_have(nominal_sizes):
+def test_passing_effect_is_dropped_where_its_leave_one_out_size_is_nominal(nominal_sizes):
     """A push all along, harder for half of the flight: the harder half alone gains most, and less beside a mass.
 
     So it does beside a mass that is not named, as nominal flights have it as well.
@@ -94,7 +94,7 @@ def test_what_comes_and_goes_is_taken_back_where_beside_others_it_is_as_much_as_
 
 @pytest.mark.parametrize(("overhead", "key", "since_s"), [
     ((9.0, 12.0), KNOWN_OVERHEAD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
-def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
+def test_known_seconds_go_before_likely_ones(overhead, key, since_s):
     """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
     study = replace(scattered(), overhead=(("pushed", *overhead),))
     selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
@@ -103,7 +103,7 @@ def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_like
     assert (step.charges.choice_cost == 0.0) == (key == KNOWN_OVERHEAD)
 
 
-def test_known_seconds_are_not_held_against_what_nominal_flights_have_as_well():
+def test_known_seconds_need_no_leave_one_out_gain():
     """The harder half of a push that goes on all along, in the seconds under another vehicle, beside its mass."""
     harder = with_a_push(8.0, 23.0, mps2=0.35)
     flights = [replace(harder, acceleration=harder.acceleration - [0.0, 0.0, 0.2])]

@@ -140,7 +140,7 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
 
 
 def price_of(terms: Sequence[Term]) -> float:
-    """Nats that free parameters of a term beyond its first must gain; a term that shows in the times alone pays none."""
+    """Nats that free parameters of a term beyond its first must gain; one that shows in the times alone pays none."""
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
