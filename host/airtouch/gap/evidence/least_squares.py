@@ -30,7 +30,7 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
 
     columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
     about 0; values (n,): the residual; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
-    begins; offsets: m of them, no two with an index in common.
+    begins; offsets: m of them, no two with a place in common.
     """
     columns = np.ascontiguousarray(columns, complex).reshape(-1, len(values))
     k, m = len(columns), len(offsets)

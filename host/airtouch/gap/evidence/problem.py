@@ -43,9 +43,9 @@ class BlockSet:
 
 
 class Offset(NamedTuple):
-    """What a unit offset of one channel of one flight adds: at which indices, how much there, prior's deviation."""
+    """What a unit offset of one channel of one flight adds: at which places, how much there, prior's deviation."""
 
-    index: np.ndarray
+    places: np.ndarray
     column: np.ndarray
     spread: float
 
@@ -164,7 +164,7 @@ class Problem:
 
     @functools.cached_property
     def offsets(self) -> list[Offset]:
-        """`unit_offsets` without zeros. No two have an index in common."""
+        """`unit_offsets` without zeros. No two have a place in common."""
         places = [np.flatnonzero(column) for column, _ in self.unit_offsets]
         return [Offset(here, column[here], spread)
                 for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
