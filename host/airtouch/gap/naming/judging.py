@@ -19,7 +19,7 @@ import numpy as np
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
+from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
@@ -123,7 +123,7 @@ def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, o
 
     fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
-    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP), of_clock)
+    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), of_clock)
     return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
 
 
@@ -147,7 +147,7 @@ def price_of(terms: Sequence[Term]) -> float:
 def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
     """Held-out nats that effects, fitted on each half, lose where the commands' floor is as beside a random effect."""
     return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, True)
-               for train, test in ROUND_TRIP)
+               for train, test in TWO_FOLDS)
 
 
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
@@ -162,7 +162,7 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(trial.data, trial.halves[test], hypothesis.fits[train].terms)
-                   for train, test in ROUND_TRIP], axis=0)
+                   for train, test in TWO_FOLDS], axis=0)
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms]) -> Strength:

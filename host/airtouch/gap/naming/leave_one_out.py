@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
-from airtouch.gap.evidence.problem import ROUND_TRIP
+from airtouch.gap.evidence.problem import TWO_FOLDS
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
 from airtouch.gap.naming.records import Step, new_terms
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -44,7 +44,7 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     if all(t.shows_in == CLOCK for t in others):
         return gain - cost_of_others
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
-    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
+    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in TWO_FOLDS)
     gain += _gained_while_certain(trial, steps, place)
     return gain - price_of(refits[-1].terms) - cost_of_others
 

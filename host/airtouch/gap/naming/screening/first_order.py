@@ -12,7 +12,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data, gap_spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem, problem_of
+from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet, Problem, problem_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -71,7 +71,7 @@ def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Ter
     k = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - k)
     gain, fitted, variances = 0.0, [], []
-    for train, test in ROUND_TRIP:
+    for train, test in TWO_FOLDS:
         x, variance = _least_squares(remainders[train], tables[train], bounds)
         held_out = remainders[test]
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
@@ -94,7 +94,7 @@ def judge_random(remainders: Sequence[Remainder], term: Term) -> tuple[float, np
     The base stays as it is.
     """
     gain, strengths = 0.0, []
-    for train, test in ROUND_TRIP:
+    for train, test in TWO_FOLDS:
         fitted = strongest(remainders[train].problem, term, remainders[train].residual, remainders[train].extra_power)
         problem, residual, before = remainders[test].problem, remainders[test].residual, remainders[test].extra_power
         gain += problem.likelihood(residual, before + problem.random_power([fitted])) \
