@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
+from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, ReplayedFlight, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
@@ -153,8 +153,8 @@ def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.n
 
 def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
     """`_replay_spectra` of flight i, by state."""
-    bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
-                               data.workspace.cached("residuals", i, Workspace))
+    replayed_flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
+    bridged = bridged_residual(replayed_flight, (*data.study.calibration, *active))
     out = {}
     for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, r)
