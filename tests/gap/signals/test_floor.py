@@ -57,7 +57,7 @@ def test_means_of_flights_differ_beyond_chance_only_by_what_their_trims_do():
 
 
 def test_the_floor_of_white_noise_is_its_density_in_both_states():
-    """600 s in the air, 60 s at rest; the highest bin, at half the rate, has half of it, as in any one-sided density."""
+    """600 s in the air, 60 s at rest; the highest bin, at half the rate, has half of it, as in every such density."""
     floor = floor_of([nominal_of(*white(660.0, 1, resting_s=60.0))], np.zeros(COUNT))
     density = 2.0 * PERIOD_S * RMS ** 2
     for state in (AIR, REST):
