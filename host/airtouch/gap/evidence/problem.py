@@ -103,7 +103,7 @@ class Problem:
         replayed = beside_edges(active)
         replay_values = self.base[:self.replay_count]
         if replayed:
-            replay_values = self.layout.gather(gap_spectra(self.data, replayed))
+            replay_values = self.layout.gather(gap_spectra(self.data, replayed, self.layout.flights))
         command_values = self.commands.values_without([a for a in active if not a.gate])
         return np.where(self.known, self.joined(replay_values, command_values), 0.0)
 
