@@ -28,7 +28,7 @@ class AirBlocks:
 class Layout:
     """The order of values that count: piece by piece, block by block, bin by bin, channel by channel.
 
-    pieces: blocks of flights; flights: numbers of these; keep[state] (bins, COUNT): the bins of each channel that count.
+    pieces: blocks of flights; flights: numbers of these; keep[state] (bins, COUNT): bins of each channel that count.
     """
 
     def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:

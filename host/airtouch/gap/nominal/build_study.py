@@ -17,7 +17,7 @@ from airtouch.gap.signals.floor import UNKNOWN_FLOOR, Floor, NominalBlocks, floo
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle

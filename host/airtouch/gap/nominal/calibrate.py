@@ -26,9 +26,9 @@ from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, sp
 from airtouch.gap.nominal.kept_scatter import kept_scatter
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
