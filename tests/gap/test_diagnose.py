@@ -47,8 +47,8 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
     monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(shrink=SimpleNamespace(
         before=1.4, share=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
-    law = SimpleNamespace(changes_loop=lambda active: True)
-    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=law))
+    loop = SimpleNamespace(changes_loop=lambda active: True)
+    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop))
     selection, _ = diagnosis.selection_and_gap(data, ())
     assert [s.name for s in selection.named_steps] == names
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"

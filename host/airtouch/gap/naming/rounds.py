@@ -97,13 +97,13 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
     return worth_a_fit, others
 
 
-def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
+def best_of_each(candidates: Sequence[Candidate], before: int) -> dict[str, Candidate]:
     """The best hypothesis of each candidate, by name, those that only their companion carries put behind it.
 
     before: number of terms of the base.
     """
     best: dict[str, Candidate] = {}
-    for new in sorted(judged, key=lambda c: len(c.terms)):
+    for new in sorted(candidates, key=lambda c: len(c.terms)):
         old = best.get(new.name)
         if old is None or _is_better(new, old):
             best[new.name] = new
