@@ -102,13 +102,16 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
-                        data: Data | None = None) -> Diagnosis:
+                        data: Data | None = None, rank_all: bool = True) -> Diagnosis:
     """`diagnose` with a study that is there already, without map, arms and advice: for many cases alike.
 
-    data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
+    data: of an earlier call with the same flights, whose spectra are used again; rank_all: as for `naming.select`:
+    without it the answer comes sooner, and in the ranking the effects that are not named have no shrink. Raises as
+    `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    return replace(_answer(data, *selection_and_gap(data, tuple(without))), flights=tuple(f.name for f in flights))
+    found = selection_and_gap(data, tuple(without), rank_all=rank_all)
+    return replace(_answer(data, *found), flights=tuple(f.name for f in flights))
 
 
 def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
@@ -197,14 +200,16 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
 
 
 def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
-                      ) -> tuple[Selection, Gap]:
+                      rank_all: bool = True) -> tuple[Selection, Gap]:
     """What is chosen among the candidates, and the gap that it closes.
+
+    rank_all: as for `naming.select`.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
     `naming.gap_closure`. Where they do not, the others are judged without them.
     """
     variants = candidates.all_candidates(without)
-    selection = select(data, variants, say, without)
+    selection = select(data, variants, say, without, rank_all)
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)
     if others:

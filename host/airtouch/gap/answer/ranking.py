@@ -62,7 +62,7 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
             share = shrink_of(data, selection.halves, single, gap).share
         nats = None if single is None else selection.gained(single)
         out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
-    order = {n: c.gain for n, c in selection.single_effects.items()}
+    order = {n: selection.gained(c) for n, c in selection.single_effects.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out
 

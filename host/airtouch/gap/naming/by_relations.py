@@ -1,13 +1,13 @@
 """The effects that the relations of signals name, fitted and judged as every other hypothesis is."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
-from airtouch.gap.naming.judging import Trial
+from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.relations.effect_class import EffectClass
@@ -30,24 +30,23 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
-def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]],
-                           single_effects: Mapping[str, Candidate], inference: Inference,
-                           progress: Callable[[str], None]) -> Selection:
+def selection_by_relations(search: Search, inference: Inference, rank_all: bool = True) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
-    candidates: variants by name; single_effects: every candidate judged alone; progress: called with every name.
+    rank_all: with every candidate judged alone; else those stand in it as not fitted.
     """
     steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
-        own = [c for c in inference.classes if c.effect == effect]
-        variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
-        judged = round_of(trial, variants, steps[-1] if steps else None, progress, promising=(effect,))
+        own, all_variants = [c for c in inference.classes if c.effect == effect], search.candidates[effect]
+        variants = {effect: matching(own[0], all_variants) if len(own) == 1 else list(all_variants)}
+        judged = round_of(search.trial, variants, steps[-1] if steps else None, search.progress, promising=(effect,))
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
+    not_fitted = {name: Candidate(name, (), 0.0, full=False) for name in search.candidates}
     return Selection(
-        single_effects=single_effects, steps=tuple(steps), nameless=NamelessGain(), halves=trial.halves,
-        least_nats=dict.fromkeys(single_effects, trial.policy.first_gain), assumed=False, inference=inference,
-        policy=trial.policy)
+        single_effects=search.single_effects if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
+        halves=search.trial.halves, least_nats=search.least_nats, assumed=False, inference=inference,
+        policy=search.trial.policy)
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

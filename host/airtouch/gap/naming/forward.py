@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 from airtouch.gap.naming.judging import Trial
@@ -27,15 +28,22 @@ from airtouch.gap.signatures.term import Terms
 class Search:
     """The flights, and the candidates among which effects are searched.
 
-    candidates: variants of each effect by name; single_effects: every candidate judged alone; least_nats: what each
-    must gain to be the first step; progress: called with each name that is judged.
+    candidates: variants of each effect by name; progress: called with each name that is judged.
     """
 
     trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
-    single_effects: Mapping[str, Candidate]
-    least_nats: Mapping[str, float]
     progress: Callable[[str], None]
+
+    @cached_property
+    def single_effects(self) -> Mapping[str, Candidate]:
+        """Every candidate judged alone, by name; worked out when it is first asked for."""
+        return round_of(self.trial, self.candidates, None, self.progress)
+
+    @property
+    def least_nats(self) -> Mapping[str, float]:
+        """What each candidate must gain to be the first step."""
+        return dict.fromkeys(self.candidates, self.trial.policy.first_gain)
 
 
 class Extension(NamedTuple):

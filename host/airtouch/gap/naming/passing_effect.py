@@ -1,11 +1,12 @@
 """The effect that comes and goes, tried before those that always act, and its evidence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import height_gain
+from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.records import Candidate, Charges, Step, Strength
@@ -16,23 +17,23 @@ from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(trial: Trial, single_effects: Mapping[str, Candidate], least_nats: Mapping[str, float],
-                   without: Sequence[str]) -> Candidate | None:
+def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
     (`passing_evidence`). Seconds in which another vehicle is known to be overhead go before others, which are only
-    likely. single_effects: candidates judged alone; least_nats: of evidence, for one to count here; without: names that
-    are left out.
+    likely. without: names that are left out.
     """
-    if trial.data.study.scatter is None:
+    trial, data = search.trial, search.trial.data
+    if data.study.scatter is None:
         return None
-    data = trial.data
-    of_steady_effects = [c.gain for name, c in single_effects.items() if c.evidence >= least_nats[name]]
-    steady = max([height_gain(data, trial.halves), *of_steady_effects])
+    least = height_gain(data, trial.halves) + PASSING_GAIN
     passing = [g for g in gated_effects(data, without).values()
-               if g.gain >= steady + PASSING_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
+               if g.gain >= least and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
+    if passing:  # else what always acts need not be judged
+        always = [c.gain for name, c in search.single_effects.items() if c.evidence >= search.least_nats[name]]
+        passing = [g for g in passing if g.gain >= max(always, default=0.0) + PASSING_GAIN]
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]

@@ -34,7 +34,8 @@ PACKAGE_EFFECTS = frozenset(effects.NAMES)  #: names of the package's effects; o
 
 
 def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
-           progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
+           progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = (), rank_all: bool = True,
+           ) -> Selection:
     """The selection of effects among candidates: every one is judged alone, then effects are named.
 
     1. Where no library of the signals' relations holds for the flights, the replay names the effects (`_by_replay`).
@@ -43,20 +44,18 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
        and leaves nothing unexplained: the effect's class was learned from few flights. Else as in 2.
 
     candidates: the variants of every effect by name; progress: called with the name of every candidate that is judged;
-    without: effects that are not searched for as ones that come and go.
+    without: effects that are not searched for as ones that come and go; rank_all: judge every candidate alone where the
+    relations name the effects as well, which the ranking needs for the share of the gap that each closes.
     """
-    trial = trial_of(data)
-    single_effects = round_of(trial, candidates, None, progress)
-    least_nats = dict.fromkeys(single_effects, trial.policy.first_gain)
-    search = Search(trial, candidates, single_effects, least_nats, progress)
+    search = Search(trial_of(data), candidates, progress)
     inference = inference_of(data, list(candidates))
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
-        return _by_relations(search, inference, without)
-    passing = passing_effect(trial, single_effects, least_nats, without)
+        return _by_relations(search, inference, without, rank_all)
+    passing = passing_effect(search, without)
     answer = _by_replay(search, forward(search, passing), passing)
     if inference is None or _own_effect_explains(answer):
         return answer
-    return _by_relations(search, inference, without)
+    return _by_relations(search, inference, without, rank_all)
 
 
 def _own_effect_explains(answer: Selection) -> bool:
@@ -65,16 +64,16 @@ def _own_effect_explains(answer: Selection) -> bool:
     return first is not None and first.name not in PACKAGE_EFFECTS and is_explained(answer)
 
 
-def _by_relations(search: Search, inference: Inference, without: Sequence[str]) -> Selection:
+def _by_relations(search: Search, inference: Inference, without: Sequence[str], rank_all: bool) -> Selection:
     """What the relations of signals name; where these leave something unexplained, what the replay may name instead.
 
     The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake
     (ALWAYS_RANDOM holds `downwash` alone), or the likeliest by the relations.
     """
-    answer = selection_by_relations(search.trial, search.candidates, search.single_effects, inference, search.progress)
+    answer = selection_by_relations(search, inference, rank_all)
     if is_explained(answer):
         return answer
-    passing = passing_effect(search.trial, search.single_effects, search.least_nats, without)
+    passing = passing_effect(search, without)
     if not replay_may_name(passing, inference):
         return answer
     state = forward(search, passing)

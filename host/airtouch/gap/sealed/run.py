@@ -141,7 +141,7 @@ def _diagnosed(study: Study, task: Task) -> Answer:
     """The answer to one task, whose log is read."""
     assert isinstance(task.log, FlightLog)
     flights = list(ready_flights([task.log], study.vehicle, []))
-    diagnosis = diagnose_with_study(study, flights, task.without).plain()
+    diagnosis = diagnose_with_study(study, flights, task.without, rank_all=False).plain()
     diagnosis |= {"flights": [task.flight], "without": list(task.without)}
     content = {k: diagnosis[k] for k in ANSWERED}
     return Answer(task.flight, task.without, json.dumps(content) + "\n")
