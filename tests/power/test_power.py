@@ -140,7 +140,7 @@ def test_each_stage_is_what_it_adds(tmp_path):
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, str(ROOT / "tools" / "power.py"), *map(str, arguments)], capture_output=True,
+    return subprocess.run([sys.executable, str(ROOT / "tools" / "power" / "power.py"), *map(str, arguments)], capture_output=True,
                           text=True)
 
 
