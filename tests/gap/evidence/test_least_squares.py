@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from airtouch.gap.evidence.least_squares import bounded_step, normal_equations
+from airtouch.gap.evidence.problem import Offset
 
 FREE = np.full(3, -9.0), np.full(3, 9.0)
 
@@ -16,18 +17,27 @@ def system():
     columns = rng.normal(size=(3, 200)) + 1j * rng.normal(size=(3, 200))
     values = np.array([-1.0, 2.0, -0.5]) @ columns + 0.3 * (rng.normal(size=200) + 1j * rng.normal(size=200))
     weights, prior = rng.uniform(0.1, 2.0, 200), np.array([0.5, 1.0, 3.0])
+    return columns, values, weights, prior, *as_real_rows(columns, values, weights, prior)
+
+
+def as_real_rows(columns, values, weights, prior):
+    """Rows of a real regression with the prior's, and what they aim at without these."""
     root = np.sqrt(2.0 * weights)
     rows = np.vstack([(root * columns.real).T, (root * columns.imag).T, np.diag(1.0 / prior)])
-    aim = -np.concatenate([root * values.real, root * values.imag])  # a step lowers values + columns * step
-    return columns, values, weights, prior, rows, aim
+    return rows, -np.concatenate([root * values.real, root * values.imag])  # a step lowers values + columns * step
 
 
-@pytest.mark.parametrize("offset", [False, True])
-def test_a_step_is_the_weighted_ridge_regression(system, offset):
-    columns, values, weights, prior, rows, aim = system
-    at = np.array([0.2, -0.1, 0.3])
-    n = 2 if offset else 3
-    equations = normal_equations(columns, prior, values, weights, at)
+@pytest.mark.parametrize("parameters", [0, 1, 3])
+def test_a_step_is_the_weighted_ridge_regression(system, parameters):
+    """With as many parameters; the other columns are offsets, none with an index in common."""
+    columns, values, weights, prior, _, _ = system
+    n, at = parameters, np.array([0.2, -0.1, 0.3])
+    for i in range(n, 3):
+        columns[i, np.arange(200) % 3 != i] = 0.0
+    rows, aim = as_real_rows(columns, values, weights, prior)
+    places = [np.flatnonzero(c) for c in columns[n:]]
+    offsets = [Offset(here, -c[here], p) for here, c, p in zip(places, columns[n:], prior[n:], strict=True)]
+    equations = normal_equations(columns[:n], prior, values, weights, at, offsets)
     step, covariance = bounded_step(equations, at[:n], (FREE[0][:n], FREE[1][:n]))
     expected = np.linalg.lstsq(rows, np.concatenate([aim, -at / prior]), rcond=None)[0]
     np.testing.assert_allclose(step, expected, rtol=1e-9)

@@ -1,6 +1,6 @@
 """Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,8 +15,10 @@ from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
-#: hypotheses whose spectra are cached, for flights of at most so many samples together; chosen for memory
-KEPT_SPECTRA, KEPT_SAMPLES = 96, 20000
+#: hypotheses whose spectra are cached, for flights of at most so many samples together, and the least number for
+#: longer ones; chosen for memory
+KEPT_SPECTRA, KEPT_SAMPLES, LEAST_KEPT = 96, 20000, 8
+Spectra = dict[str, np.ndarray]  #: of one flight by state, (blocks, bins, COUNT)
 
 
 @dataclass
@@ -53,7 +55,7 @@ class Data:
         self.measured_torque = [short_time_spectra(angular_acceleration(f), b[AIR], AIR)
                                 for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
-            self.quiet = [self.study.response.quiet(w) for w in command_torque(self)]
+            self.quiet = [self.study.response.quiet(command_torque(self, i)) for i in range(len(self.flights))]
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
@@ -61,38 +63,41 @@ class Data:
         self.base = gap_spectra(self, ())
 
 
-def gap_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+def gap_spectra(data: Data, active: Sequence[Active], flights: Iterable[int] | None = None) -> list[Spectra]:
     """Spectra of the gap with effects in the model, by flight and state; commands are the command view's.
 
     Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
+    flights: numbers of those that are worked out, all by default; the others' are empty.
     """
+    needed = range(len(data.flights)) if flights is None else set(flights)
+    return [_gap_of(data, i, active) if i in needed else {} for i in range(len(data.flights))]
+
+
+def _gap_of(data: Data, i: int, active: Sequence[Active]) -> Spectra:
+    """`gap_spectra` of flight i."""
     response = data.study.response
     replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
-        return _without_scaling(data, replayed, _replay_spectra(data, replayed))
-    return _cached(data, "by response", active, lambda: _by_response(data, response, active, replayed))
+        return _without_scaling(data, i, replayed)
+    return _cached(data, "by response", i, active, lambda: _by_response(data, i, response, active, replayed))
 
 
-def _by_response(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
-                 ) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap, torque compared with what the commands lead to expect.
+def _by_response(data: Data, i: int, response: Response, active: Sequence[Active], replayed: Sequence[Active],
+                 ) -> Spectra:
+    """Spectra of the gap of flight i, torque compared with what the commands lead to expect.
 
     replayed: the effects that do not show in the commands alone.
     """
-    with_all = _replay_spectra(data, replayed)
+    gap = _replay_spectra(data, i, replayed)
+    if data.flights[i].rates is None:
+        return gap
     law = data.study.loop
     assert law is not None  # a response is known of nominal flights, and so is their loop
     not_loop = [a for a in replayed if not law.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
+    torque = _torque(data.measured_torque[i], *(_replay_spectra(data, i, some) for some in ((), by_command, not_loop)))
     change = law.torque_change(active, frequencies(AIR))
-    nominal, driven, disturbed = (_replay_spectra(data, some) for some in ((), by_command, not_loop))
-    out = []
-    for i, gap in enumerate(with_all):
-        if data.flights[i].rates is not None:
-            torque = _torque(data.measured_torque[i], nominal[i], driven[i], disturbed[i])
-            gap = {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
-        out.append(gap)
-    return out
+    return {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
 
 
 def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],
@@ -108,51 +113,48 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
     return TorqueSpectra(measured, residual, by_command, disturbance)
 
 
-def command_torque(data: Data) -> list[np.ndarray]:
-    """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
-    return [measured - residual[AIR][:, :, TORQUE]
-            for measured, residual in zip(data.measured_torque, _replay_spectra(data, ()), strict=True)]
+def command_torque(data: Data, i: int) -> np.ndarray:
+    """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands of flight i."""
+    return data.measured_torque[i] - _replay_spectra(data, i, ())[AIR][:, :, TORQUE]
 
 
-def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
+def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> list[Spectra] | None:
     """Power by flight and state, as `gap_spectra`, that the gap may have because effects change what is cut of a step.
 
-    None where they change nothing of it.
+    None where they change nothing of it. flights: as for `gap_spectra`.
     """
     response, law = data.study.response, data.study.loop
     change = law.torque_change(active, frequencies(AIR)) if response is not None and law is not None else None
     if response is None or change is None or not change.cut.any():
         return None
-    out = []
-    for f, q, torque, base in zip(data.flights, data.quiet, command_torque(data), data.base, strict=True):
-        power = {r: np.zeros(x.shape) for r, x in base.items()}
-        if f.rates is not None:
-            doubt = response.doubt(q, torque, change)
-            power[AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
-        out.append(power)
+    out: list[Spectra] = [{} for _ in data.flights]
+    for i in set(flights):
+        out[i] = {r: np.zeros(x.shape) for r, x in data.base[i].items()}
+        if data.flights[i].rates is not None:
+            doubt = response.doubt(data.quiet[i], command_torque(data, i), change)
+            out[i][AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
     return out
 
 
-def _without_scaling(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
-                     ) -> list[dict[str, np.ndarray]]:
-    """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
+def _without_scaling(data: Data, i: int, active: Sequence[Active]) -> Spectra:
+    """Spectra of flight i whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
+    with_all = _replay_spectra(data, i, active)
     unscaled = [a for a in active if not signature_of(a.effect).scales_torque]
     if len(unscaled) == len(active):
         return with_all
-    out = [{r: v.copy() for r, v in e.items()} for e in with_all]
-    for spectra_of_all, spectra_without in zip(out, _replay_spectra(data, unscaled), strict=True):
-        for r, v in spectra_of_all.items():
-            v[:, :, TORQUE] = spectra_without[r][:, :, TORQUE]
+    out, without = {r: v.copy() for r, v in with_all.items()}, _replay_spectra(data, i, unscaled)
+    for r, v in out.items():
+        v[:, :, TORQUE] = without[r][:, :, TORQUE]
     return out
 
 
-def _replay_spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
-    """Spectra of what was measured minus what the model makes of the logged commands."""
-    return _cached(data, "spectra", active, lambda: [_flight_replay(data, i, active) for i in range(len(data.flights))])
+def _replay_spectra(data: Data, i: int, active: Sequence[Active]) -> Spectra:
+    """Spectra of what was measured in flight i minus what the model makes of the logged commands."""
+    return _cached(data, "spectra", i, active, lambda: _replayed(data, i, active))
 
 
-def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np.ndarray]:
-    """`_replay_spectra` of flight i, by state."""
+def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
+    """`_replay_spectra`, made anew."""
     bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
                                data.workspace.cached("residuals", i, Workspace))
     out = {}
@@ -163,11 +165,13 @@ def _flight_replay(data: Data, i: int, active: Sequence[Active]) -> dict[str, np
     return out
 
 
-def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
-            ) -> list[dict[str, np.ndarray]]:
-    """Spectra under a hypothesis, made once while it is among the KEPT_SPECTRA last used; those of no effect always."""
+def _cached(data: Data, name: str, i: int, active: Sequence[Active], make: Callable[[], Spectra]) -> Spectra:
+    """Spectra of flight i under a hypothesis, made once while it is among the last used; of no effect always.
+
+    Those of KEPT_SPECTRA hypotheses are kept, of fewer where all flights have more than KEPT_SAMPLES.
+    """
     if not active:
-        return data.workspace.cached(f"{name} of no effect", (), make)
-    if sum(len(f) for f in data.flights) > KEPT_SAMPLES:
-        return make()
-    return data.workspace.cached(name, tuple(a.key for a in active), make, KEPT_SPECTRA)
+        return data.workspace.cached(f"{name} of no effect", i, make)
+    samples, n = sum(len(f) for f in data.flights), len(data.flights)
+    hypotheses = max(KEPT_SPECTRA * KEPT_SAMPLES // max(samples, KEPT_SAMPLES), LEAST_KEPT)
+    return data.workspace.cached(name, (i, *(a.key for a in active)), make, hypotheses * n)

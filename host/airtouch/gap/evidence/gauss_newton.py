@@ -53,7 +53,7 @@ class Posterior:
         self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         own = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
-        self.prior = np.concatenate([own, [deviation for _, deviation in problem.unit_offsets]])
+        self.prior = np.concatenate([own, [o.spread for o in problem.offsets]])
 
     def at(self, x: np.ndarray, offsets: np.ndarray) -> _State:
         """The state at parameters x (k,) and offsets (m,)."""
@@ -84,8 +84,8 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
     """
     problem, mean = posterior.problem, posterior.mean
     low, high = limits(mean)
-    x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.unit_offsets)), np.zeros((len(x), len(x)))
-    if not mean and not problem.unit_offsets:
+    x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
+    if not mean and not problem.offsets:
         return MeanFit(x, covariance, problem.base)
     now = posterior.at(x, offsets)
     slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
@@ -104,9 +104,9 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
           damping: float) -> _Step:
     """A step, shortened until it gains, TRIES times at most."""
     problem, size = posterior.problem, len(now.x)
-    columns = [*slopes.columns, *(-column for column, _ in problem.unit_offsets)]
-    equations = normal_equations(columns, posterior.prior, now.values, weights_of(problem, now.values, now.power),
-                                 np.concatenate([now.x, now.offsets]))
+    equations = normal_equations(slopes.columns, posterior.prior, now.values,
+                                 weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
+                                 problem.offsets)
     equations = equations.with_power(*slopes.of_power(now.x, now.values, now.power, posterior.wide))
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)

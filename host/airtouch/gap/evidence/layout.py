@@ -28,11 +28,12 @@ class AirBlocks:
 class Layout:
     """The order of values that count: piece by piece, block by block, bin by bin, channel by channel.
 
-    pieces: blocks of flights; keep[state] (bins, COUNT): the bins of each channel that count.
+    pieces: blocks of flights; flights: numbers of these; keep[state] (bins, COUNT): bins of each channel that count.
     """
 
     def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:
         self.pieces, self.keep = pieces, keep
+        self.flights = frozenset(i for i, _, _ in pieces)
         self.sizes = [int(chosen.sum()) * int(keep[r].sum()) for _, r, chosen in pieces]  #: values of each piece
 
     def gather(self, by_flight: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:

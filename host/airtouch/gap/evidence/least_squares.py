@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.evidence.problem import Offset, Problem
 from airtouch.gap.signals.spectra import LEAST_POWER, OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
@@ -25,17 +25,27 @@ class NormalEquations(NamedTuple):
 
 
 def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
-                     weights: np.ndarray, at: np.ndarray) -> NormalEquations:
-    """Normal equations of the ridge regression that lowers values + sum(step * column).
+                     weights: np.ndarray, at: np.ndarray, offsets: Sequence[Offset] = ()) -> NormalEquations:
+    """Normal equations of the ridge regression that lowers values + sum(step * column) - sum(step * offset).
 
-    columns (k + m, n): change of the values per parameter and offset; prior (k + m,): their standard deviations about
-    0; values (n,): the residual; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step begins.
+    columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
+    about 0; values (n,): the residual; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
+    begins; offsets: m of them, no two with a place in common.
     """
-    j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
-    wj = j * np.repeat(weights, 2)
-    return NormalEquations(
-        2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2),
-        -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2)
+    columns = np.ascontiguousarray(columns, complex).reshape(-1, len(values))
+    k, m = len(columns), len(offsets)
+    matrix, right = np.diag(1.0 / prior ** 2), -at / prior ** 2
+    if k:
+        j = columns.view(float)  # real and imaginary parts side by side
+        wj = j * np.repeat(weights, 2)
+        matrix[:k, :k] += 2.0 * (wj @ j.T)
+        right[:k] -= 2.0 * (wj @ np.ascontiguousarray(values, complex).view(float))
+    for i, (index, column, _) in zip(range(k, k + m), offsets, strict=True):
+        weighted = (weights[index] * column).conj()
+        matrix[i, i] += 2.0 * (weighted @ column).real
+        right[i] += 2.0 * (weighted @ values[index]).real
+        matrix[:k, i] = matrix[i, :k] = -2.0 * (columns[:, index] @ weighted).real
+    return NormalEquations(matrix, right)
 
 
 def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],

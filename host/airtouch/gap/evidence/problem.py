@@ -4,6 +4,7 @@ import functools
 import weakref
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,14 @@ class BlockSet:
     def key(self) -> Hashable:
         """Equal for two parts of the same blocks."""
         return tuple((flight, state, chosen.tobytes()) for flight, state, chosen in self.pieces)
+
+
+class Offset(NamedTuple):
+    """What a unit offset of one channel of one flight adds: at which places, how much there, prior's deviation."""
+
+    places: np.ndarray
+    column: np.ndarray
+    spread: float
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ class Problem:
         replayed = beside_edges(active)
         replay_values = self.base[:self.replay_count]
         if replayed:
-            replay_values = self.layout.gather(gap_spectra(self.data, replayed))
+            replay_values = self.layout.gather(gap_spectra(self.data, replayed, self.layout.flights))
         command_values = self.commands.values_without([a for a in active if not a.gate])
         return np.where(self.known, self.joined(replay_values, command_values), 0.0)
 
@@ -154,10 +163,11 @@ class Problem:
                  for r, begin in first.items()} for j, first in enumerate(self.data.first)]
 
     @functools.cached_property
-    def offsets(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
-        """`unit_offsets` without zeros: indices, values there, deviation. No two have an index in common."""
+    def offsets(self) -> list[Offset]:
+        """`unit_offsets` without zeros. No two have a place in common."""
         places = [np.flatnonzero(column) for column, _ in self.unit_offsets]
-        return [(here, column[here], spread) for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
+        return [Offset(here, column[here], spread)
+                for here, (column, spread) in zip(places, self.unit_offsets, strict=True)]
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:

@@ -44,9 +44,9 @@ class TorquePower:
         of_loop = law.torque_change(loop, frequencies(AIR)) if law and loop else None
         if of_loop is None:
             return np.zeros(len(self.base))
-        gather = self.layout.gather
-        change = np.where(self.known, gather(gap_spectra(self.data, loop)) - self.base, 0.0)
-        steps = step_doubt(self.data, loop)
+        gather, flights = self.layout.gather, self.layout.flights
+        change = np.where(self.known, gather(gap_spectra(self.data, loop, flights)) - self.base, 0.0)
+        steps = step_doubt(self.data, loop, flights)
         doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(of_loop)
 

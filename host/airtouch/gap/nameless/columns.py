@@ -115,7 +115,8 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
         bands[:FIRST_BIN] = False
         shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP_COLUMNS)
         out = []
-        for i, torque in enumerate(command_torque(data)):
+        for i in range(len(data.flights)):
+            torque = command_torque(data, i)
             weighted = torque if response is None else response.weighted(data.quiet[i], torque)
             out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
         return out

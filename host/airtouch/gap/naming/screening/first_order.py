@@ -148,15 +148,16 @@ def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[n
 
     table: change (n,) of the spectra per scaled parameter, k of them; bounds: lowest and highest parameters (k,).
     """
-    size, constants = len(table), half.problem.unit_offsets
-    columns = np.array([*table, *(-c for c, _ in constants)])
-    prior = np.concatenate([np.full(size, PRIOR_UNITS), [deviation for _, deviation in constants]])
+    size, columns, constants = len(table), np.array(table), half.problem.offsets
+    prior = np.concatenate([np.full(size, PRIOR_UNITS), [c.spread for c in constants]])
     x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.values
     for _ in range(ROUNDS):
         weights = weights_of(half.problem, values, half.extra_power)
-        equations = normal_equations(columns, prior, values, weights, np.concatenate([x, offsets]))
+        equations = normal_equations(columns, prior, values, weights, np.concatenate([x, offsets]), constants)
         change, covariance = bounded_step(equations, x, bounds)
         x = np.clip(x + change[:size], *bounds)
         offsets = offsets + change[size:]
-        values = half.values + np.concatenate([x, offsets]) @ columns
+        values = half.values + x @ columns
+        for amount, (index, column, _) in zip(offsets, constants, strict=True):
+            values[index] -= amount * column
     return x, np.diag(covariance)
