@@ -47,8 +47,8 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
     monkeypatch.setattr(diagnosis, "gap_of", lambda data, parts, chosen: SimpleNamespace(named=SimpleNamespace(
         before=1.4, share=Quantity(0.6 if len(chosen.terms) == 2 else alone))))
-    law = SimpleNamespace(changes_loop=lambda active: True)
-    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=law))
+    loop = SimpleNamespace(changes_loop=lambda active: True)
+    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop))
     selection, _ = diagnosis.selection_and_gap(data, ())
     assert [s.name for s in selection.named] == names
     assert "motor_lag" in set(selection.singles) & set(selection.least_gain), "the ranking lists every candidate tried"

@@ -8,7 +8,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.floor import Floor
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import batch, replay, scenario

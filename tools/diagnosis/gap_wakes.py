@@ -47,8 +47,8 @@ from airtouch.gap.passing.bursts import UNSTEADY_YAW
 from airtouch.gap.passing.one_sided import DOWNWARD
 from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signals.channels import residual
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import OVERHEAD
+from airtouch.gap.study import Study
 from airtouch.logs import read
 
 LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number

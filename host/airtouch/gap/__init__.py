@@ -17,14 +17,15 @@ features    what a flight's signals do to one another, in numbers
 nameless    what no effect explains: the nameless model, "a model without names" in answers
 passing     effects that come and go: when they act
 evidence    how likely flights are under effects, and the fit of effects to them
-signals     what is compared, channel by channel, and with what: the study of a vehicle
+signals     what is compared, channel by channel: residuals, spectra, floors
 loop        the closed loop: what noise, set-points and torques make of the commands
 edges       what flights do at the edges of a platform
 signatures  what is known of each effect, and how strong it seems in nominal flights
 flights     a log made ready: on a regular clock, attitude and heights, moments of contact
 
-`diagnosis` calls them all and fills a `result`; `measurement` is the map alone. A `workspace` keeps what is worked out
-once; `second_process` shares work with another core.
+`diagnosis` calls them all and fills a `result`; `measurement` is the map alone. A `study` holds what flights are
+compared with: folders from `evidence` on take it. A `workspace` keeps what is worked out once; `second_process` shares
+work with another core.
 """
 
 import importlib

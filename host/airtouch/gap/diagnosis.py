@@ -28,8 +28,8 @@ from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_u
 from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
+from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog

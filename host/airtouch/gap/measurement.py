@@ -16,7 +16,7 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.command_power import CommandPower, MeanSpectra, command_power, mean_spectra

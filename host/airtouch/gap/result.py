@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:  # which import this module
     from airtouch.gap.answer.pictures import Pictures
     from airtouch.gap.nominal.calibrate import Calibration
-    from airtouch.gap.signals.study import Study
+    from airtouch.gap.study import Study
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from airtouch.gap.evidence.likelihood import Likelihood, tail, tailed
+from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, log_likelihood
 
 
 @pytest.mark.parametrize("exponents", [(-3.0, 3.0), (-60.0, -40.0), (40.0, 60.0)])
@@ -16,6 +17,16 @@ def test_the_sum_is_numpys(exponents):
     known = rng.random(3000) > 0.1
     expected = np.where(known, np.log(power) + falls * np.log1p(size / power / 12.0), 0.0).sum()
     assert tailed(size, power, np.full(3000, 12.0), falls, known) == pytest.approx(expected, rel=1e-14)
+
+
+def test_with_the_tails_of_commands_it_is_the_law_that_corrects_their_floor():
+    """The two must not part: a fit takes its slopes of commands from the one and its level from the other."""
+    rng = np.random.default_rng(6)
+    expected = rng.uniform(0.5, 2.0, (50, 3))
+    power = expected * rng.exponential(size=(8, 50, 3))
+    nu, each = np.full(power.size, COMMAND_FREEDOM), np.broadcast_to(expected, power.shape).ravel()
+    total = tailed(power.ravel(), each, nu, nu + 1.0, np.ones(power.size, bool))
+    assert log_likelihood(power, expected) == pytest.approx(-total, rel=1e-12)
 
 
 def test_no_value_gives_nothing():

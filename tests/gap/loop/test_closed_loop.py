@@ -154,10 +154,10 @@ def test_ratio_and_share_follow_whatever_an_effect_sets_in_the_plant(study, fiel
     base = activate({"inertia": {"fraction": 0.0}})[0].effect
     factor = replace(base.parameters[0], name="factor", default=1.5, low=0.5, high=2.0, neutral=1.0)
     own = replace(base, name="own", parameters=(factor,), settings=settings, wrench=None)
-    law = study.loop
-    assert law.ratio(()) == pytest.approx(1.0)
-    assert np.abs(np.log(law.ratio((Active(own, {"factor": 1.5}),)))).max() > 0.01
-    assert law.ratio((Active(own, {"factor": 1.0}),)) == pytest.approx(1.0)
+    loop = study.loop
+    assert loop.ratio(()) == pytest.approx(1.0)
+    assert np.abs(np.log(loop.ratio((Active(own, {"factor": 1.5}),)))).max() > 0.01
+    assert loop.ratio((Active(own, {"factor": 1.0}),)) == pytest.approx(1.0)
 
 
 def leaves(table):

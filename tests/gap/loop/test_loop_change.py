@@ -129,11 +129,11 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in fly([], BASELINE, v)])
                for v in (vehicle, gyro_only)]
     all_sensors, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
-    law, row = nominal().loop, prepare(vehicle, ())[0][0]
+    loop, row = nominal().loop, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
     fine = command_spectra.fine_frequencies()
     by_sensor = command_spectra.through_window(noise_spectra.noise_power(roll, axis_plant(row, "roll"), fine))
-    predicted = law.strengths[1][0] * by_sensor[0] / (law.strengths[1] @ by_sensor)
+    predicted = loop.strengths[1][0] * by_sensor[0] / (loop.strengths[1] @ by_sensor)
     f = command_spectra.command_frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):
         band = (f > low) & (f < high)

@@ -10,9 +10,9 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.records import Candidate, Selection
 from airtouch.gap.result import Control, Diagnosis, Shrink
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import CLOCK, WRONG
+from airtouch.gap.study import Study
 
 
 def control(data: Data, selection: Selection, gap: Gap) -> Control | None:

@@ -87,13 +87,13 @@ def _in_spectra(data: Data, hypothesis: Candidate, fitted: FittedTerms, term: Te
     return x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2)
 
 
-def _model_error(law: ClosedLoop | None, term: Term, read: bool) -> float:
+def _model_error(loop: ClosedLoop | None, term: Term, read: bool) -> float:
     """Fraction of its parameters by which the model of an effect may be wrong.
 
     read: whether the relations of signals measure its only parameter too.
     """
     error = REPLAY_ERROR
-    if law is not None and law.changes_loop((term.active(),)):
+    if loop is not None and loop.changes_loop((term.active(),)):
         error = LOOP_ERROR if read else MODEL_ERROR
     elif term.shows_in == SPECTRUM:
         error = MODEL_ERROR

@@ -14,9 +14,9 @@ from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, angular_acceleration
 from airtouch.gap.signals.floor import sensor_power
 from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered

@@ -11,8 +11,8 @@ from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import mean_of
+from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS

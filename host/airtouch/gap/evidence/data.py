@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
+from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, ReplayedFlight, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import signature_of
+from airtouch.gap.study import Study
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
@@ -91,12 +91,12 @@ def _by_response(data: Data, i: int, response: Response, active: Sequence[Active
     gap = _replay_spectra(data, i, replayed)
     if data.flights[i].rates is None:
         return gap
-    law = data.study.loop
-    assert law is not None  # a response is known of nominal flights, and so is their loop
-    not_loop = [a for a in replayed if not law.changes_loop((a,))]
+    loop = data.study.loop
+    assert loop is not None  # a response is known of nominal flights, and so is their loop
+    not_loop = [a for a in replayed if not loop.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
     torque = _torque(data.measured_torque[i], *(_replay_spectra(data, i, some) for some in ((), by_command, not_loop)))
-    change = law.torque_change(active, frequencies(AIR))
+    change = loop.torque_change(active, frequencies(AIR))
     return {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
 
 
@@ -123,8 +123,8 @@ def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> 
 
     None where they change nothing of it. flights: as for `gap_spectra`.
     """
-    response, law = data.study.response, data.study.loop
-    change = law.torque_change(active, frequencies(AIR)) if response is not None and law is not None else None
+    response, loop = data.study.response, data.study.loop
+    change = loop.torque_change(active, frequencies(AIR)) if response is not None and loop is not None else None
     if response is None or change is None or not change.cut.any():
         return None
     out: list[Spectra] = [{} for _ in data.flights]
@@ -155,8 +155,8 @@ def _replay_spectra(data: Data, i: int, active: Sequence[Active]) -> Spectra:
 
 def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
     """`_replay_spectra`, made anew."""
-    bridged = bridged_residual(data.flights[i], data.study.vehicle, (*data.study.calibration, *active),
-                               data.workspace.cached("residuals", i, Workspace))
+    flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
+    bridged = bridged_residual(flight, (*data.study.calibration, *active))
     out = {}
     for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
         replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, r)

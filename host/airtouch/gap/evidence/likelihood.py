@@ -106,7 +106,8 @@ def _tail(nu: float) -> float:
 def tailed(size, power, tail, falls, known):
     """Sum of log(power) + falls log(1 + size / power / tail) over those values (n,) that are known.
 
-    It is minus the log likelihood, but for a constant, of values of this squared size where this power is expected.
+    It is minus the log likelihood, but for a constant, of values of this squared size where this power is expected;
+    where `tail` is falls - 1, that is `loop.command_spectra.log_likelihood`.
     Sums of logarithms are logarithms of products; what the addition rounds off is carried along (Kahan).
     """
     total, lost = 0.0, 0.0

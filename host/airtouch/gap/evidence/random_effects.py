@@ -26,9 +26,9 @@ from airtouch.gap.signals.spectra import (
     frequencies,
     short_time_spectra,
 )
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.signature import IMU_NOISE, ROTOR_LINES, THRUST_NOISE
 from airtouch.gap.signatures.term import Term, neutral_of, parameter_of
+from airtouch.gap.study import Study
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.effects.effect import Gate
 from airtouch.simulation.flight import prepare

@@ -39,14 +39,14 @@ class TorquePower:
 
         It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
-        law = self.data.study.loop
-        loop = beside_edges(active) if law and len(self.base) else []
-        of_loop = law.torque_change(loop, frequencies(AIR)) if law and loop else None
+        loop = self.data.study.loop
+        effects = beside_edges(active) if loop and len(self.base) else []
+        of_loop = loop.torque_change(effects, frequencies(AIR)) if loop and effects else None
         if of_loop is None:
             return np.zeros(len(self.base))
         gather, flights = self.layout.gather, self.layout.flights
-        change = np.where(self.known, gather(gap_spectra(self.data, loop, flights)) - self.base, 0.0)
-        steps = step_doubt(self.data, loop, flights)
+        change = np.where(self.known, gather(gap_spectra(self.data, effects, flights)) - self.base, 0.0)
+        steps = step_doubt(self.data, effects, flights)
         doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
         return doubt + self.noise * self._noise_growth(of_loop)
 
@@ -61,8 +61,8 @@ class TorquePower:
 
 def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) -> bool:
     """Whether the loops of roll and pitch differ between two hypotheses."""
-    law = data.study.loop
-    return law is not None and not law.same_loop(before, after)
+    loop = data.study.loop
+    return loop is not None and not loop.same_loop(before, after)
 
 
 def beside_edges(active: Sequence[Active]) -> list[Active]:

@@ -19,7 +19,7 @@ from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tailed
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.simulation import replay
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import hover_speed

@@ -24,7 +24,7 @@ of the highest Whittle likelihood of the measured S_uu (`command_spectra`). `clo
 **What is compared.** Two views of a flight ask for what effects change, over what is without:
 
 - its commands: S_uu, `ClosedLoop.ratio` (compared in `signals.command_view`);
-- its torque: the share of a logged command's torque that turns the vehicle, q = S_yu / S_uu over s P, y = s w
+- its torque: the share of a logged command's torque that turns the vehicle, S_yu / S_uu over s P, y = s w
   (`command_response`, with `set_point_steps` beside the noise; with and without effects `torque_share`), and what a
   torque from outside leaves: S in the gyro, and the command that answers it (`disturbed`); both are compared in
   `signals.response`.

@@ -1,8 +1,18 @@
-"""Spectra of the logged commands, block by block, in level flight, and how blocks show a modelled spectrum."""
+"""Spectra of the logged commands, block by block, in level flight, and how blocks show a modelled spectrum.
+
+The power e of a value of a block where p is expected has the log likelihood
+
+    -log p - (nu + 1) log(1 + e / (nu p))            Student-like tails of nu = COMMAND_FREEDOM degrees of freedom
+
+(`log_likelihood`): e / p follows the F distribution of 2 and 2 nu degrees of freedom. The slope by log p is
+`counted_power` of e / p, less 1.
+"""
 
 from functools import cache
 
 import numpy as np
+from numba import float64, njit
+from numba.extending import register_jitable
 
 from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
 from airtouch.gap.flights.filters import both_ways, lowpass
@@ -86,14 +96,38 @@ def _without_step(power: np.ndarray) -> np.ndarray:
 def typical(power: np.ndarray) -> np.ndarray:
     """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), with Student-like tails.
 
-    Fixed point of the likelihood's slope, as `signals.floor_correction` has it. The mean would follow the few blocks in
-    which a set-point stepped.
+    Fixed point of the likelihood's slope. The mean would follow the few blocks in which a set-point stepped.
     """
     estimate = power.mean(axis=0)
     for _ in range(STEPS):
-        e = power / estimate
-        estimate = estimate * ((COMMAND_FREEDOM + 1.0) * e / (COMMAND_FREEDOM + e)).mean(axis=0)
+        estimate = estimate * counted_power(power / estimate).mean(axis=0)
     return estimate
+
+
+def log_likelihood(power: np.ndarray, expected: np.ndarray) -> float:
+    """Log likelihood of the power (blocks, bins, AXES) of all values, each counted in full; expected (bins, AXES)."""
+    tails = (COMMAND_FREEDOM + 1.0) * np.log1p(power / (expected * COMMAND_FREEDOM))
+    return -float((np.log(expected) + tails).sum())
+
+
+@register_jitable
+def counted_power(e):
+    """What a power e, over the expected one, counts towards the likeliest power: up to COMMAND_FREEDOM + 1."""
+    return (COMMAND_FREEDOM + 1.0) * e / (COMMAND_FREEDOM + e)
+
+
+@njit(float64[:, ::1](float64[:, :, ::1], float64[:, ::1]), cache=True, error_model="numpy")
+def log_likelihood_slope(over, factor):
+    """Slope (bins, AXES) of `log_likelihood` by the logarithm of the expected power.
+
+    over (blocks, bins, AXES): power over some expected power; factor (bins, AXES): that power over the expected one.
+    """
+    out = np.zeros(factor.shape)
+    for block in over:
+        for b in range(out.shape[0]):
+            for a in range(out.shape[1]):
+                out[b, a] += counted_power(block[b, a] * factor[b, a]) - 1.0
+    return out
 
 
 @cache

@@ -1,12 +1,24 @@
 """The torque-share decision: what part of the torque of logged commands turns the vehicle, with and without effects.
 
 A log at 100 Hz holds one command in five of a 500 Hz loop, so of the torque that the motors make of logged commands
-only a share, by frequency and axis, is in the rotation:
+only a share is in the rotation. The symbols, by frequency and axis, with S, s and P as in `gap.loop`:
 
-    q = (S_yu / S_uu) / (s P)      angular acceleration expected per logged command, over the torque per command
+    b = (S_yu / S_uu) / (s P)     share in the loop model without effects         `Change.before`
+    r                             share with effects over without                 `Change.share`
+    m                             torque per command with effects over without    `Change.motors`
+    q                             measured: rotation over the torque that a model makes of the log (`signals.response`)
+    l                             what a model makes of a logged command, over     `Change.logged`
+                                  what the vehicle's motors make of it
+    a                             fraction of the commands that follow the loop model, the others turn the vehicle as
+                                  they say
+    c                             q with effects over q without                   `response_ratio`
 
-For roll and pitch `axis_torque` has q from the loop model, level and where a set-point stepped; `change_of` compares
+For roll and pitch `axis_torque` has b from the loop model, level and where a set-point stepped; `change_of` compares
 the shares with and without effects. Yaw has no model: its share is 1.
+
+The rotation per torque is a b + 1 - a without effects and m (a r b + 1 - a) with them, and c is the second over the
+first. As b is over what the motors make of a command, and q over what a model makes of it, q l is a measurement of the
+first: a is the best fit to it, within 0 and 1, with a prior of mean 1 and standard deviation 1 (`response_ratio`).
 """
 
 from collections.abc import Sequence
@@ -23,6 +35,9 @@ from airtouch.gap.loop.set_point_steps import NO_STEP, Step, step_under
 SMOOTH = 2.0  #: bins, standard deviation of the Gaussian over frequency: a block's Hann window and `response.SMOOTH`
 #: largest ratio that effects may make of a share; beyond, the loop model is not trusted; chosen
 MOST_CHANGE = 5.0
+#: standard deviation of q l around the loop model's, for a prior of standard deviation 1 of the fraction a: the
+#: difference in twelve pairs of simulated flights of its own loop (host/docs/looks.md, 2026-11-24 03:20)
+SHARE_DOUBT = 0.2
 QUIET, STEPPED = 0, 1  #: places in `Change.before` and `.share`: of level blocks, of those in which a set-point stepped
 
 
@@ -86,6 +101,21 @@ def change_of(loop: AxisLoop, before: Sequence[AxisTorque], after: Sequence[Axis
         motors=(after[0].motors / before[0].motors)[:, None], share=share[:2], before=share_before[:2],
         cut=np.abs(stepped - stepped_as_nominal), logged=logged_over_flown(loop.firmware, f)[:, None],
         incoherent=np.stack([_with_yaw([x.incoherent for x in torques]) for torques in (before, after)]))
+
+
+def response_ratio(change: Change, kind: int, measured: np.ndarray) -> np.ndarray:
+    """Ratio c (bins, 3) of the response to logged commands with effects to that without, in the module's symbols.
+
+        c = m (a r b + 1 - a) / (a b + 1 - a),    a minimises |q l - (a b + 1 - a)|^2 + SHARE_DOUBT^2 (a - 1)^2
+
+    kind: of blocks, QUIET or STEPPED; measured: q, complex (bins, 3), in nominal flights' blocks of that kind.
+    """
+    before = change.before[kind]
+    after = change.motors * change.share[kind] * before
+    off_one = before - 1.0
+    along = ((measured * change.logged - 1.0) * off_one.conj()).real
+    follows = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(off_one) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
+    return (follows * after + (1.0 - follows) * change.motors) / (follows * before + 1.0 - follows)
 
 
 def _with_yaw(roll_and_pitch: Sequence[np.ndarray]) -> np.ndarray:

@@ -145,10 +145,10 @@ def allowed_columns(data: Data, terms: Sequence[Term], channel: int) -> np.ndarr
     """
     out = np.ones(WIDEST, bool)
     out[len(BASIS):] = data.study.same_models
-    law, yaw = data.study.loop, TORQUE.stop - 1
+    loop, yaw = data.study.loop, TORQUE.stop - 1
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
         out[len(BASIS):] = False
-    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in mean_of(terms)]):
+    elif channel == yaw and loop is not None and loop.changes_loop([t.active() for t in mean_of(terms)]):
         out[OF_COMMAND[yaw]] = False
     return out

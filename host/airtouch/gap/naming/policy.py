@@ -7,7 +7,7 @@ parameter is at its bound in `judging`, steps and iterations in `screening.first
 
 from dataclasses import dataclass
 
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 
 # -- Gains required, nats of held-out data --
 

@@ -19,12 +19,12 @@ from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import gated_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.second_process import map_on_two_cores
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 
 FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more adds time, and the table knows the rest
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none

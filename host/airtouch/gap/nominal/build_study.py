@@ -13,11 +13,11 @@ from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
-from airtouch.gap.signals.floor import Floor, NominalBlocks, floor_of, sensor_power
+from airtouch.gap.signals.floor import UNKNOWN_FLOOR, Floor, NominalBlocks, floor_of, sensor_power
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, frequencies, short_time_spectra, starts
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -25,8 +25,6 @@ from airtouch.vehicle import Vehicle
 #: floor without baseline flights, unit^2/Hz, of a channel that then says nothing: above any gap. A command's and a
 #: rate's nominal power is known from nominal flights alone; chosen
 NO_COMMAND, NO_RATE = 1e12, 1e6
-#: power of the floor without baseline flights over that of the declared sensor noise; chosen
-SENSOR_MARGIN = 2.0
 #: blocks of each state that the floor without baseline flights is as sure as; chosen
 DECLARED_BLOCKS = 8
 
@@ -53,7 +51,7 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
 
 def study_without_flights(vehicle: Vehicle, calibration: tuple[Active, ...] = ()) -> Study:
     """The study of a vehicle of which no flight is declared nominal: its floor is the declared noise of its sensors."""
-    power = {r: SENSOR_MARGIN * sensor_power(sensor_noise(vehicle), r) for r in (AIR, REST)}
+    power = {r: UNKNOWN_FLOOR * sensor_power(sensor_noise(vehicle), r) for r in (AIR, REST)}
     for table in power.values():
         table[:, COMMAND] = NO_COMMAND
         table[:, RATE] = NO_RATE

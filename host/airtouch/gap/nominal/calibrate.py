@@ -1,6 +1,6 @@
 """The vehicle's parameters from flights declared nominal.
 
-"System identification can manufacture agreement": a diagnosis is therefore made in two
+A fit to flights can hide an effect that all of them have: a diagnosis is therefore made in two
 arms, with the vehicle as declared and as calibrated here. Only the vehicle is calibrated
 (rotors, lag, delay, drag, IMU), never its surroundings, each with a prior; lag and delay by
 what thrust does, as aliases of the commands drown the torque (gap.signals.response). Inertia shows
@@ -26,9 +26,9 @@ from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, sp
 from airtouch.gap.nominal.kept_scatter import kept_scatter
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -41,7 +41,7 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
-ROUNDS = 2  #: fits of the vehicle, the second against the floor that the first leaves
+ROUNDS = 2  #: fits of the vehicle, the second against the floor that the first leaves; chosen
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COLUMN, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.robust import deviation
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle

@@ -15,7 +15,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, cost_of_stretch
 from airtouch.gap.signals.channels import residual
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.simulation.effects.effect import Gate
 
 UNSTEADY_YAW = "unsteady_yaw"  #: of `Scatter.passing`, what nominal flights have of `unsteady_yaw`

@@ -14,9 +14,9 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, effect_within
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
+from airtouch.gap.study import Study
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
 from airtouch.simulation.effects.effect import Gate

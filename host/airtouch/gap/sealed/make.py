@@ -19,9 +19,9 @@ from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
 from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
+from airtouch.gap.study import Study
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown

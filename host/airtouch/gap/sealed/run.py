@@ -17,8 +17,8 @@ from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
 from airtouch.gap.sealed.key import SEALED, answers_sha256, open_key
 from airtouch.gap.sealed.make import Say
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures.alike import names_alike
+from airtouch.gap.study import Study
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order

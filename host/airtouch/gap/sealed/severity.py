@@ -20,11 +20,11 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import ready_flights
-from airtouch.gap.signals.study import Study
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.random_draws import KINDS, Kind
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import Active

@@ -7,5 +7,5 @@ as only a part of a logged command's torque turns the vehicle, another part in b
 
 Commands are not replayed but judged by their spectra: `command_view`. Their floor is `ClosedLoop.floor`, which
 `loop.identify` measures, not the columns of commands in `floor.Floor.power`; each flight may correct it:
-`floor_correction`. `study` holds all that flights are compared with.
+`command_floor_correction`. All that flights are compared with is a `study`, beside the folders.
 """

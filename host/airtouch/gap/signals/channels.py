@@ -6,7 +6,7 @@ right model leaves the spectrum of nominal flights.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             loop: ClosedLoop | None = None, seed: int = 0, workspace: Workspace | None = None) -> np.ndarray:
+             loop: ClosedLoop | None = None, seed: int = 0) -> np.ndarray:
     """What a flight has beyond the model, (n, COUNT), in the channels' units; NaN in channels that it cannot have.
 
     - force and torque: measured minus modelled, where the logged commands drive the model;
@@ -75,25 +75,45 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     active: effects that the model has; loop: makes the commands, which are NaN without it; seed: of the noise that
     effects draw. In the phase GROUND the model is a vehicle at rest, whether the motors run or
     not: samples there with running motors are never usable (`contact.near_ground`). Without a gyro the angular
-    acceleration is taken as zero, which holds at low frequency (the floor says how low). workspace: keeps the residuals
-    that gates are put together from, for the next gate of the same effects in this flight.
+    acceleration is taken as zero, which holds at low frequency (the floor says how low).
     """
-    gated = [a for a in active if a.gate]
-    if not gated:
-        return _ungated_residual(flight, vehicle, active, loop, seed)
-    always, cache = [a for a in active if not a.gate], workspace or Workspace()
+    return ReplayedFlight(flight, vehicle, loop, seed).residual(active)
 
-    def cached_residual(effects: Sequence[Active]) -> np.ndarray:
-        """Residual (n, COUNT) of effects that always act."""
-        return cache.cached("residual", tuple(a.key for a in effects),
-                            lambda: _ungated_residual(flight, vehicle, effects, loop, seed), KEPT_RESIDUALS)
 
-    out = cached_residual(always).copy()
-    for a in gated:
-        acts = inside(a.gate, flight)
-        if acts.any():
-            out[acts] += cached_residual([*always, replace(a, gate=())])[acts] - cached_residual(always)[acts]
-    return out
+@dataclass(frozen=True, eq=False)
+class ReplayedFlight:
+    """A flight beside the model of its vehicle, for its residual under one hypothesis after another.
+
+    vehicle, loop, seed: see the function `residual`. Residuals that gates are put together from are cached by effects;
+    whatever else they depend on belongs to the object.
+    """
+
+    flight: Flight
+    vehicle: Vehicle
+    loop: ClosedLoop | None = None
+    seed: int = 0
+    workspace: Workspace = field(default_factory=Workspace, init=False, repr=False)
+
+    def residual(self, active: Sequence[Active] = ()) -> np.ndarray:
+        """The function `residual`: a gated effect adds in its seconds what it adds there when it always acts."""
+        gated, always = [a for a in active if a.gate], [a for a in active if not a.gate]
+        if not gated:
+            return self._ungated(active)
+        out = self._cached(always).copy()
+        for a in gated:
+            acts = inside(a.gate, self.flight)
+            if acts.any():
+                out[acts] += self._cached([*always, replace(a, gate=())])[acts] - self._cached(always)[acts]
+        return out
+
+    def _cached(self, active: Sequence[Active]) -> np.ndarray:
+        """Residual of effects that always act, cached; not to be changed."""
+        return self.workspace.cached("residual", tuple(a.key for a in active), lambda: self._ungated(active),
+                                     KEPT_RESIDUALS)
+
+    def _ungated(self, active: Sequence[Active]) -> np.ndarray:
+        """Residual of effects that always act."""
+        return _ungated_residual(self.flight, self.vehicle, active, self.loop, self.seed)
 
 
 def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], loop: ClosedLoop | None,

@@ -2,12 +2,10 @@
 
 All compared values stand one after another (elements,). First the spectra (blocks, bins, AXES) of the commands of each
 flight: the power e of a value against p = floor x ratio x correction, (bins, AXES) each: of nominal flights, of the
-hypothesis over none (`ClosedLoop.ratio`), of this flight (`floor_correction`). Then the whitened responses at edges
-(edges, COUNT): each value less what effects add to it, of power 1. The log likelihood of a value of a spectrum is
-
-    -log p - (nu + 1) log(1 + e / (nu p))            Student-like tails of nu = COMMAND_FREEDOM degrees of freedom
-
-less the correction's cost; each block is counted half, as half overlapping blocks hold every sample twice.
+hypothesis over none (`ClosedLoop.ratio`), of this flight (`command_floor_correction`). Then the whitened responses at
+edges (edges, COUNT): each value less what effects add to it, of power 1. The log likelihood of the spectra is the sum
+of `command_spectra.log_likelihood` over flights, less the corrections' cost; each block is counted half, as half
+overlapping blocks hold every sample twice.
 """
 
 from collections.abc import Sequence
@@ -19,10 +17,10 @@ import numpy as np
 from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, COMMAND_LENGTH, command_frequencies
+from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, COMMAND_LENGTH, command_frequencies, log_likelihood
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.channels import COMMAND
-from airtouch.gap.signals.floor_correction import correction_of, smooth_shapes
+from airtouch.gap.signals.command_floor_correction import correction_of, smooth_shapes
 from airtouch.gap.signals.spectra import AIR, LENGTH, OVERLAP_WEIGHT
 from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.workspace import Workspace
@@ -85,7 +83,7 @@ class CommandView:
     def power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Expected power (elements,) with the floor's correction fitted anew, and what that costs, nats.
 
-        wide: the floor is as uncertain as random effects make it (`floor_correction.WIDE`).
+        wide: the floor is as uncertain as random effects make it (`command_floor_correction.WIDE`).
         """
         loop = self.loop
         if loop is None or not self.powers:
@@ -100,7 +98,7 @@ class CommandView:
         for s in self.powers:
             correction = correction_of(s, floor, ratio, wide)
             cost += correction.cost
-            powers.append(np.broadcast_to(floor * ratio * np.exp(correction.log_power), s.shape).ravel())
+            powers.append(np.broadcast_to(correction.power, s.shape).ravel())
         powers.append(np.ones(len(self.edges) * edge_response.COUNT))
         return np.concatenate(powers), cost
 
@@ -135,14 +133,12 @@ class CommandView:
     def _log_likelihood(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> float:
         """Log likelihood of the spectra, less the costs of the floor's correction.
 
-        floor, ratio (bins, AXES): power in nominal flights, and by what effects multiply it.
+        floor, ratio (bins, AXES): power in nominal flights, and what effects multiply it by.
         """
         total = 0.0
         for s in self.powers:
             correction = correction_of(s, floor, ratio, wide)
-            power = floor * ratio * np.exp(correction.log_power)
-            tails = (COMMAND_FREEDOM + 1.0) * np.log1p(s / (power * COMMAND_FREEDOM))
-            total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + correction.cost
+            total += OVERLAP_WEIGHT * log_likelihood(s, correction.power) - correction.cost
         return total
 
 

@@ -18,7 +18,8 @@ from airtouch.gap.signals.spectra import AIR, LEAKED, LEAST_POWER, LENGTH, REST,
 
 # A measured floor
 FEWEST_BLOCKS = 4  #: blocks of nominal flights that a floor is measured on; chosen
-#: power of the floor where nominal flights have fewer than FEWEST_BLOCKS, over that of the sensors' noise; chosen
+#: power of a floor that no flight measures, over that of the sensors' noise: in a state of which nominal flights have
+#: fewer than FEWEST_BLOCKS, and without any nominal flight; chosen
 UNKNOWN_FLOOR = 2.0
 LEAST_FLOOR = 0.5  #: least power of a measured floor over that of the sensors' noise; chosen
 LEAST_LEFT = 0.1  #: share of a block's power that is left at least when the power of lost rows is taken off; chosen

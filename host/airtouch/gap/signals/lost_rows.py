@@ -13,10 +13,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
+from airtouch.gap.signals.channels import COUNT, TORQUE, ReplayedFlight, angular_acceleration
 from airtouch.gap.signals.response import Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, LENGTH, SMOOTH, short_time_spectra, squared
-from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -33,11 +32,12 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))  # of the shifts with room
     if not flight.lost.any() or not len(first):
         return total
-    gap, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
+    gap = bridged_residual(ReplayedFlight(flight, vehicle), calibration)
+    turning = angular_acceleration(flight)
     for k in range(1, SHIFTS + 1):
         offset = k * len(flight) // (SHIFTS + 1)
         poorer = _without(flight, np.roll(flight.lost, offset))
-        change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - gap)
+        change = np.nan_to_num(bridged_residual(ReplayedFlight(poorer, vehicle), calibration) - gap)
         begin = (first + offset) % len(flight)
         room = _in_flight(flight, begin)
         spectrum = short_time_spectra(change, begin[room], AIR)
@@ -58,14 +58,9 @@ def _in_flight(flight: Flight, begin: np.ndarray) -> np.ndarray:
     return room
 
 
-def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active],
-                     workspace: Workspace | None = None) -> np.ndarray:
-    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor.
-
-    workspace: see `residual`.
-    """
-    gap = residual(flight, vehicle, active, workspace=workspace)
-    return interpolate_missing(np.where(flight.bridged[:, None], np.nan, gap))
+def bridged_residual(replayed: ReplayedFlight, active: Sequence[Active]) -> np.ndarray:
+    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor."""
+    return interpolate_missing(np.where(replayed.flight.bridged[:, None], np.nan, replayed.residual(active)))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

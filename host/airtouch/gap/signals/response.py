@@ -12,7 +12,8 @@ dilution: Fuller, Measurement Error Models, 1987, chapter 1).
 
     E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal: `Law.transfer`
     q~ = q clip((coherence - NOISE) / NOISE, 0, 1)               0 where gyro noise in both makes q: `Law.coherent`
-    residual = y - q~ c w + what effects add                     c: ratio of q with effects to q without, `Law.ratio`
+    residual = y - q~ c w + what effects add                     c: ratio of q with effects to q without, `Law.ratio`,
+                                                                 derived in `loop.torque_share`
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
@@ -29,7 +30,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import Disturbed
-from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
+from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change, response_ratio
 from airtouch.gap.signals import quiet_blocks
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.quiet_blocks import QuietPower
@@ -43,10 +44,6 @@ CUT_DOUBT = 0.3
 #: relative error of the loop model in the commands that answer a torque: that in eight pairs of simulated flights with
 #: and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz)
 ANSWER_DOUBT = 0.2
-#: standard deviation of q around that of the loop model, for a prior of standard deviation 1 of the share of commands
-#: that follows the model (`Law.ratio`): the difference in twelve pairs of simulated flights of its own loop
-#: (host/docs/looks.md, 2026-11-24 03:20)
-SHARE_DOUBT = 0.2
 #: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this on it is
 #: believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says less of
 #: effects that act through the commands; with a smaller one noise of the gyro counts as a response
@@ -107,29 +104,12 @@ class Law:
         return self.coherent / np.maximum(np.abs(self.coherent), 1.0)
 
     def ratio(self, change: Change) -> np.ndarray:
-        """Ratio c (bins, 3) of q with effects that change the loop to q without.
-
-        A share a of the commands follows the loop model, the others turn the vehicle as they say. With b, the loop
-        model's share of torque that turns it (`Change.before`), m = `Change.motors` and s = `Change.share`, the ratio
-        is
-
-            c = (a m s b + (1 - a) m) / (a b + 1 - a)
-
-        q is over what the model makes of a logged command, b over what the vehicle's motors make of it. So q times
-        l = `disturbed.logged_over_flown` (`Change.logged`), the former over the latter, is what a b + 1 - a should be.
-        The share minimises, bin by bin and axis by axis, within 0 and 1,
-
-            |q l - (a b + 1 - a)|^2 + SHARE_DOUBT^2 (a - 1)^2
+        """Ratio c (bins, 3) of q with effects that change the loop to q without: `torque_share.response_ratio`.
 
         In yaw c becomes 1 + (c - 1) / max(|q~|, 1)^2: where |q~| exceeds 1 it is mostly noise of the gyro, which
         effects do not change.
         """
-        before = change.before[self.kind]
-        after = change.motors * change.share[self.kind] * before
-        off_one = before - 1.0
-        along = ((self.transfer * change.logged - 1.0) * off_one.conj()).real
-        a = np.clip((along + SHARE_DOUBT ** 2) / (np.abs(off_one) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
-        out = (a * after + (1.0 - a) * change.motors) / (a * before + 1.0 - a)
+        out = response_ratio(change, self.kind, self.transfer)
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.coherent[:, 2]), 1.0) ** 2
         return out
 

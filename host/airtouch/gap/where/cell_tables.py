@@ -20,9 +20,10 @@ INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
 #: true rms in 85 of 100 cells or more (test_map.py)
 BLOCK_FREEDOM = 4.0
 FLOOR_SEED = 100  #: of the floors' bootstrap, no phase's number, which is that of a phase's own
-AIR = "air"  #: key of the floor of phases in which no nominal flight was
+ANY_AIR = "air"  #: key of the floor of all phases in the air together, for those in which no nominal flight was
+AIRBORNE = 1  #: number that stands for every phase in the air where they are put together; GROUND is another
 
-#: phase, or AIR: floor and its upper end, (regimes, bands, COUNT) each
+#: phase, or ANY_AIR: floor and its upper end, (regimes, bands, COUNT) each
 Floors = dict[int | str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -114,16 +115,17 @@ def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.nda
 
 
 def floors_of(nominal: Sums, sensor: np.ndarray) -> Floors:
-    """The floors by phase, of nominal flights; that of AIR serves phases in which none was.
+    """The floors by phase, of nominal flights; that of ANY_AIR serves phases in which none was.
 
     sensor: `sensor_rms`, below which no floor lies.
     """
     shape = (len(REGIMES), *sensor.shape)
     least = np.broadcast_to(sensor, shape)
-    floors: Floors = {GROUND: (least, least), AIR: (least, least)}
-    air = Sums(np.where(nominal.phase == GROUND, GROUND, 1), nominal.flight, nominal.weight, nominal.power,
+    floors: Floors = {GROUND: (least, least), ANY_AIR: (least, least)}
+    air = Sums(np.where(nominal.phase == GROUND, GROUND, AIRBORNE), nominal.flight, nominal.weight, nominal.power,
                nominal.mean)
-    sources: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
+    sources: list[tuple[int | str, Sums, int]] = [(ANY_AIR, air, AIRBORNE),
+                                                  *((k, nominal, k) for k in range(len(KINDS)))]
     for key, source, phase in sources:
         spread = _without_common(source, phase)
         table = table_of(spread, phase, seed=FLOOR_SEED) if spread is not None else None
@@ -139,8 +141,8 @@ def floors_of(nominal: Sums, sensor: np.ndarray) -> Floors:
 
 
 def phase_floor(floors: Floors, phase: int) -> tuple[np.ndarray, np.ndarray]:
-    """The floor of a phase and its upper end; where no nominal flight has it, that of AIR or of the ground."""
-    return floors[phase] if phase in floors else floors[GROUND if phase == GROUND else AIR]
+    """The floor of a phase and its upper end; where no nominal flight has it, that of ANY_AIR or the ground."""
+    return floors[phase] if phase in floors else floors[GROUND if phase == GROUND else ANY_AIR]
 
 
 def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
@@ -158,7 +160,7 @@ def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
             values[:, 0] = part.mean[long, 0] / weight
             spreads[k] = np.nan_to_num(values.std(axis=0, ddof=1))
     air = [v for k, v in spreads.items() if k != GROUND]
-    spreads[AIR] = np.mean(air, axis=0) if air else np.zeros(sensor.shape)
+    spreads[ANY_AIR] = np.mean(air, axis=0) if air else np.zeros(sensor.shape)
     spreads.setdefault(GROUND, np.zeros(sensor.shape))
     shape = (len(REGIMES), *sensor.shape)
     return {k: (np.broadcast_to(np.hypot(sensor, v), shape),) * 2 for k, v in spreads.items()}

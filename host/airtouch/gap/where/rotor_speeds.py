@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.signals.study import Study
+from airtouch.gap.study import Study
 from airtouch.logs.flight_log import RPM
 from airtouch.simulation import replay
 

@@ -5,8 +5,8 @@ import pytest
 
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
-from airtouch.gap.signals import floor_correction
-from airtouch.gap.signals.floor_correction import COMMAND_DOUBT, SPREAD, WIDE, correction_of
+from airtouch.gap.signals import command_floor_correction
+from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SPREAD, WIDE, correction_of
 
 BLOCKS = 3
 STEP = np.linspace(-0.004, 0.004, len(AXES))  # nepers by which the floor is off, by axis
@@ -15,8 +15,8 @@ STEP = np.linspace(-0.004, 0.004, len(AXES))  # nepers by which the floor is off
 @pytest.fixture
 def level_alone(monkeypatch):
     """One shape: the level."""
-    monkeypatch.setattr(floor_correction, "SHAPES", 1)
-    monkeypatch.setattr(floor_correction, "smooth_shapes", lambda: np.ones((1, len(command_frequencies()))))
+    monkeypatch.setattr(command_floor_correction, "SHAPES", 1)
+    monkeypatch.setattr(command_floor_correction, "smooth_shapes", lambda: np.ones((1, len(command_frequencies()))))
 
 
 def tables(factor):

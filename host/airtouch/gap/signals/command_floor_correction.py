@@ -10,9 +10,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, njit
 
-from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
+from airtouch.gap.loop.command_spectra import command_frequencies, log_likelihood_slope
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
@@ -34,10 +33,12 @@ COMMAND_DOUBT = 0.1
 class Correction(NamedTuple):
     """What the floor is off by in one flight, under a hypothesis.
 
-    log_power (bins, AXES): added to the logarithm of the floor's power; cost: nats; weight: of all blocks together,
-    OVERLAP_WEIGHT each; covariance (SHAPES, SHAPES): of the amounts of the shapes, the same for every axis.
+    power (bins, AXES): expected in the flight, floor x ratio x correction; log_power (bins, AXES): logarithm of the
+    correction; cost: nats; weight: of all blocks together, OVERLAP_WEIGHT each; covariance (SHAPES, SHAPES): of the
+    amounts of the shapes, the same for every axis.
     """
 
+    power: np.ndarray
     log_power: np.ndarray
     cost: float
     weight: float
@@ -59,11 +60,12 @@ def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, wide:
     covariance = np.linalg.inv(normal)
     amount = np.zeros((SHAPES, len(AXES)))
     for _ in range(ROUNDS):
-        push = OVERLAP_WEIGHT * _push(over_floor, np.exp(-shapes.T @ amount))
-        amount += covariance @ (shapes @ push - amount / spread[:, None] ** 2)
+        slope = OVERLAP_WEIGHT * log_likelihood_slope(over_floor, np.exp(-shapes.T @ amount))
+        amount += covariance @ (shapes @ slope - amount / spread[:, None] ** 2)
     cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
     cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
-    return Correction(shapes.T @ amount, cost, weight, covariance)
+    log_power = shapes.T @ amount
+    return Correction(floor * ratio * np.exp(log_power), log_power, cost, weight, covariance)
 
 
 @cache
@@ -72,18 +74,3 @@ def smooth_shapes() -> np.ndarray:
     x = np.log(command_frequencies())
     x = (x - x[0]) / (x[-1] - x[0])
     return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])
-
-
-@njit(float64[:, ::1](float64[:, :, ::1], float64[:, ::1]), cache=True, error_model="numpy")
-def _push(over, factor):
-    """Slope (bins, axes) of the log likelihood of all blocks by the logarithm of their power.
-
-    over (blocks, bins, axes): power over the floor's, times a factor.
-    """
-    out = np.zeros(factor.shape)
-    for block in over:
-        for b in range(out.shape[0]):
-            for a in range(out.shape[1]):
-                e = block[b, a] * factor[b, a]
-                out[b, a] += (COMMAND_FREEDOM + 1.0) * e / (COMMAND_FREEDOM + e) - 1.0
-    return out
