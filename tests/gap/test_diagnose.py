@@ -13,14 +13,14 @@ from airtouch.gap.signatures.candidates import terms
 
 
 @dataclass(frozen=True)
-class Chosen:
+class PartOfSelection:
     """As much of a selection as is asked for here."""
 
-    named: list
-    chosen: SimpleNamespace
-    singles: dict
-    least_gain: dict
-    parts: tuple = field(default=())
+    named_steps: list
+    named_hypothesis: SimpleNamespace
+    single_effects: dict
+    least_nats: dict
+    halves: tuple = field(default=())
     policy: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(must_close_gap=True))
 
 
@@ -39,16 +39,16 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
     """With slow motors 0.6 of the gap closes; without them as much as `alone`."""
     def of(*effects):
         steps = [SimpleNamespace(name=n, passing_key=None) for n in effects]
-        chosen = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
-                                             for n in effects))
-        return Chosen(steps, chosen, dict.fromkeys(effects), dict.fromkeys(effects))
+        hypothesis = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
+                                                 for n in effects))
+        return PartOfSelection(steps, hypothesis, dict.fromkeys(effects), dict.fromkeys(effects))
 
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without: of(
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
-    monkeypatch.setattr(diagnosis, "gap_of", lambda data, parts, chosen: SimpleNamespace(named=SimpleNamespace(
-        before=1.4, share=Quantity(0.6 if len(chosen.terms) == 2 else alone))))
+    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(shrink=SimpleNamespace(
+        before=1.4, share=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
     loop = SimpleNamespace(changes_loop=lambda active: True)
     data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop))
     selection, _ = diagnosis.selection_and_gap(data, ())
-    assert [s.name for s in selection.named] == names
-    assert "motor_lag" in set(selection.singles) & set(selection.least_gain), "the ranking lists every candidate tried"
+    assert [s.name for s in selection.named_steps] == names
+    assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"

@@ -120,14 +120,14 @@ def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
 
 def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control."""
-    verdict, before = verdict_of(data, selection, gap), gap.named.before
+    verdict, before = verdict_of(data, selection, gap), gap.shrink.before
     is_effect = verdict == "effect"
     effects = named_effects(data, selection) if is_effect else []
     ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection),
-        where=(), gap={"before": before, "after": gap.named.after if is_effect else before, "floor": 1.0},
-        shrink=gap.named.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
+        where=(), gap={"before": before, "after": gap.shrink.after if is_effect else before, "floor": 1.0},
+        shrink=gap.shrink.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
 
 
 def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
@@ -205,16 +205,17 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     """
     variants = candidates.all_candidates(without)
     selection = select(data, variants, say, without)
-    gap = gap_of(data, selection.parts, selection.chosen)
+    gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
-        gap_of_rest = gap_of(data, rest.parts, rest.chosen)
-        if gap_closure.loop_closes_too_little(gap.named.share.value, gap_of_rest.named.share.value):
-            selection = replace(rest, singles={**selection.singles, **rest.singles}, least_gain=selection.least_gain)
+        gap_of_rest = gap_of(data, rest.halves, rest.named_hypothesis)
+        if gap_closure.loop_closes_too_little(gap.shrink.share.value, gap_of_rest.shrink.share.value):
+            selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
+                                least_nats=selection.least_nats)
             gap = gap_of_rest
-    closed = gap.named.share.value
-    if gap_closure.closes_too_little(data, selection, gap.named.before, closed):
+    closed = gap.shrink.share.value
+    if gap_closure.closes_too_little(data, selection, gap.shrink.before, closed):
         selection = gap_closure.with_none_named(selection, closed)
-        gap = gap_of(data, selection.parts, None)
+        gap = gap_of(data, selection.halves, None)
     return selection, gap

@@ -16,6 +16,7 @@ from airtouch.gap.naming.records import (
     Step,
     TakenBack,
 )
+from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
 from hovers import FLOOR
 
@@ -33,14 +34,15 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
 
     Of several that are named, each adds a quarter of its gain to the others. beside: nats that speak against them.
     """
-    singles = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
+    single_effects = {n: judged(n, g, 3.0 if n == "wind" else g) for n, g in EVIDENCE.items()}
     steps, total = [], 0.0
     for n in named:
         total += EVIDENCE[n]
         steps.append(replace(Step.of(judged(n, total)), leave_one_out_gain=0.25 * EVIDENCE[n]))
     related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
-    return Selection(singles, tuple(steps), NamelessGain(150.0, beside), (None, None), dict.fromkeys(EVIDENCE, 8.0),
-                     POLICY, assumed=False, over_prediction=OverPrediction(*lost), inference=related)
+    return Selection(single_effects, tuple(steps), NamelessGain(150.0, beside), (None, None),
+                     dict.fromkeys(EVIDENCE, 8.0), POLICY, assumed=False, over_prediction=OverPrediction(*lost),
+                     inference=related)
 
 
 def test_the_answer_needs_no_reason():
@@ -93,12 +95,12 @@ def test_effects_are_alike_by_what_each_gains_alone():
     """Of two that are named the first is weighed by its own gain, not by that of both."""
     near = {"gust": judged("gust", 198.0), "mass": judged("mass", 200.0), "wind": judged("wind", 40.0)}
     for named in (("mass",), ("mass", "wind"), ("wind", "mass")):
-        assert alike_of(replace(selection(named), singles=near)) == (("gust", "mass"),)
+        assert alike_of(replace(selection(named), single_effects=near)) == (("gust", "mass"),)
 
 
 def test_where_nothing_is_named():
     nothing = selection((), beside=40.0)
-    assert not nothing.explained
+    assert not is_explained(nothing)
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
     assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, a model without names 150"
     back = replace(nothing, taken_back=TakenBack("mass", -0.2))

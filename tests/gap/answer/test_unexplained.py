@@ -114,4 +114,4 @@ def test_seven_blocks_that_do_not_overlap_are_not_tested(seconds, names):
 
 def selection():
     """A selection without candidates, of which only those are asked here."""
-    return SimpleNamespace(last_step=None, singles={})
+    return SimpleNamespace(last_step=None, single_effects={})

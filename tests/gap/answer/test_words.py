@@ -8,7 +8,6 @@ import made_diagnosis
 from airtouch.cli.gap import show as gap_show
 from airtouch.cli.shared import scores
 from airtouch.gap.answer import advice, words
-from airtouch.gap.answer.ranking import agreeing
 from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Shrink
 from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
 from airtouch.gap.where import summary
@@ -95,14 +94,6 @@ def test_a_diagnosis_prints_as_one_line():
                                                      "gap 4 before, 1.3 after (floor 1))")
     none = replace(diagnosis(cells, "none", ()), ranking=(), gap={})
     assert str(none) == "Diagnosis(none)"
-
-
-def test_probabilities_agree_with_the_verdict():
-    chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
-    adjusted = agreeing(chance, "unknown")
-    assert adjusted == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5} and agreeing(chance, "mass") == chance
-    # one that was found in stretches of time alone
-    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}
 
 
 def test_closing_figures_are_one(pushed_flights, tmp_path):

@@ -33,7 +33,7 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
     chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
-                              for train, test in problem.ROUND_TRIP) for wide in (False, True))
+                              for train, test in problem.TWO_FOLDS) for wide in (False, True))
     assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
     vibration = judging.PricedVariant("vibration", (candidates.terms("vibration")[0],), 0.0)
     both = judging.cross_validated(on, vibration, chosen)

@@ -15,9 +15,10 @@ LAW = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator
 DATA = SimpleNamespace(study=SimpleNamespace(loop=LAW))
 
 
-def selection(chosen, named, recorded=True):
+def selection(hypothesis, steps, recorded=True):
     """A selection in recorded flights, or in others."""
-    return SimpleNamespace(chosen=chosen, named=named, policy=SimpleNamespace(must_close_gap=recorded))
+    policy = SimpleNamespace(must_close_gap=recorded)
+    return SimpleNamespace(named_hypothesis=hypothesis, named_steps=steps, policy=policy)
 
 
 def named(name, gate=(), key=None, recorded=True):
@@ -36,7 +37,7 @@ OVER = STANDS_OUT + 0.1
     (selection(None, ()), OVER, None)])
 def test_recorded_flights_hold_names_against_the_gap(of, gap, least):
     assert least_closed(DATA, of, gap) == least
-    assert least_closed(DATA, selection(of.chosen, of.named, recorded=False), gap) is None
+    assert least_closed(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
 
 
 @pytest.mark.parametrize(("name", "closed", "too_little"), [

@@ -58,4 +58,4 @@ def test_of_two_weak_rotors_one_is_left_without_the_other():
 
 def test_an_effect_that_is_named_alone_and_a_deviation_have_none(late):
     latency, bias = added(late, LATE, BIAS)
-    assert with_leave_one_out_gains(late, [latency, replace(bias, named=False)])[0].leave_one_out_gain is None
+    assert with_leave_one_out_gains(late, [latency, replace(bias, is_named=False)])[0].leave_one_out_gain is None

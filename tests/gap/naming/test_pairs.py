@@ -8,6 +8,7 @@ import airtouch.gap.diagnosis as diagnose
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
+from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.result import Quantity, Shrink
 from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import fly
@@ -25,9 +26,9 @@ CANDIDATES = ("actuator_delay", "com_offset", "controller_gain", "imu_bias", "im
 ])
 def test_both_effects_are_named_and_nothing_else(study, effects):
     """Each was missed beside the other once: by the fit, by screening, by what the first must leave."""
-    chosen = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
-    assert {s.name for s in chosen.named} == set(effects)
-    assert chosen.against.nats < chosen.against.limit
+    selection = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
+    assert {s.name for s in selection.named_steps} == set(effects)
+    assert is_explained(selection)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(delayed,
     monkeypatch.setattr(diagnose, "select", lambda *of, **_: requests.append(of[0]) or selection)  # it looks at no gap
     if not closes:
         little = Shrink(1.4, 1.36, Quantity(0.1))
-        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), named=little))
+        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), shrink=little))
     diagnosis = diagnose.diagnose_with_study(recorded, data.flights, data=data)
     assert requests == [data]
     assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])

@@ -27,7 +27,7 @@ def test_a_share_of_what_effects_gain_may_be_left(kind, same_models, assumed, sh
     assert policy(kind, same_models=same_models).unknown.nats(1000.0, 5000.0, assumed) == pytest.approx(share * 1000.0)
 
 
-def test_however_little_effects_gain_more_may_be_left_the_fewer_nominal_flights_there_are():
+def test_least_limit_falls_with_nominal_flights():
     for count in (2, 6):
         limit = policy(SIMULATED, count).unknown
         assert limit.nats(0.0, 5000.0, False) == limit.least == pytest.approx(12.0 * (count + 1) / (count - 1))
@@ -39,7 +39,7 @@ def test_recorded_flights_may_leave_what_nominal_ones_leave():
 
 
 @pytest.mark.parametrize("kind", [RECORDED, NO_BASELINE])
-def test_without_two_nominal_flights_a_fifth_of_what_is_gained_over_no_effect_may_be_left(kind):
+def test_limit_without_two_nominal_flights(kind):
     limit = policy(kind, count=1).unknown
     assert limit.nats(9000.0, 1000.0, False) == limit.nats(9000.0, 1000.0, True) == pytest.approx(200.0)
     assert limit.nats(9000.0, 10.0, False) == 25.0
@@ -60,5 +60,5 @@ def test_flights_without_a_baseline_count_as_recorded():
     assert replace(alone, unknown=recorded.unknown) == recorded
 
 
-def test_without_a_model_of_the_loop_the_first_effect_must_gain_as_much_as_a_further_one():
+def test_first_gain_without_a_loop():
     assert (policy(RECORDED).first_gain, policy(RECORDED, loop=False).first_gain) == (8.0, 12.0)

@@ -31,24 +31,24 @@ def test_one_rotor_may_be_named_and_another_a_deviation(named):
     both = selection(Step.of(hypothesis("weak_motor", one), named[0]),
                      Step.of(hypothesis("weak_motor", one, three), named[1]))
     expected = [t for t, its in zip((one, three), named, strict=True) if its]
-    assert list(both.chosen.terms) == expected
-    assert [list(f.terms) for f in both.chosen.fits] == [expected, expected]
+    assert list(both.named_hypothesis.terms) == expected
+    assert [list(f.terms) for f in both.named_hypothesis.fits] == [expected, expected]
 
 
 def test_the_companion_of_a_named_effect_is_told_from_a_deviation_of_its_name():
     drag, wind = terms("rotor_drag")[0], terms("wind")[0]
     companion = replace(drag, companion=True)
-    both = selection(Step.of(hypothesis("rotor_drag", drag), named=False),
+    both = selection(Step.of(hypothesis("rotor_drag", drag), is_named=False),
                      Step.of(hypothesis("wind", drag, wind, companion)))
-    assert list(both.chosen.terms) == [wind, companion]
+    assert list(both.named_hypothesis.terms) == [wind, companion]
 
 
 def test_a_random_part_belongs_to_the_effect_named():
     mean, part = next(v for v in all_candidates()["downwash"] if len(v) == 2 and v[1].shows_in == SPECTRUM)
     named = selection(Step.of(hypothesis("downwash", mean, part)))
-    assert list(named.chosen.terms) == [mean, part]
+    assert list(named.named_hypothesis.terms) == [mean, part]
 
 
 def test_nothing_is_chosen_where_only_deviations_stand():
-    assert selection(Step.of(hypothesis("weak_motor", rotor(1)), named=False)).chosen is None
-    assert selection().chosen is None
+    assert selection(Step.of(hypothesis("weak_motor", rotor(1)), is_named=False)).named_hypothesis is None
+    assert selection().named_hypothesis is None

@@ -18,13 +18,13 @@ def held(name, number=0):
     return CANDIDATES[name][number]
 
 
-def test_a_variant_pays_for_the_choice_among_those_of_as_many_terms():
+def test_choice_cost_counts_variants_of_as_many_terms():
     costs = {(len(v.terms), v.choice_cost) for v in addable("gust", CANDIDATES["gust"], ())}
     assert costs == {(1, np.log(3.0)), (2, np.log(3.0))}, "three lengths, without and with drag"
     assert [v.choice_cost for v in addable("mass", CANDIDATES["mass"], ())] == [0.0]
 
 
-def test_what_is_held_is_not_added_again_but_for_another_rotor():
+def test_term_of_the_base_is_not_addable():
     assert addable("mass", CANDIDATES["mass"], held("mass")) == []
     others = addable("weak_motor", CANDIDATES["weak_motor"], held("weak_motor", 2))
     assert [v.terms[0].values["rotor"] for v in others] == [1.0, 2.0, 4.0]
@@ -34,17 +34,17 @@ def test_what_is_held_is_not_added_again_but_for_another_rotor():
 @pytest.mark.parametrize(("name", "beside", "some"), [
     ("thrust_coefficient", "mass", False), ("mass", "thrust_coefficient", False),
     ("blade_flapping", "rotor_drag", False), ("inertia", "mass", True)])
-def test_another_name_for_the_same_thing_is_not_added(name, beside, some):
+def test_interchangeable_effect_is_not_addable(name, beside, some):
     assert bool(addable(name, CANDIDATES[name], held(beside))) is some
 
 
-def test_a_companion_is_not_held_by_itself():
+def test_companion_leaves_its_effect_addable():
     """Gusts with drag beside them leave the rotors' drag a candidate."""
     gust_with_drag = next(v for v in CANDIDATES["gust"] if len(v) == 2)
     assert addable("rotor_drag", CANDIDATES["rotor_drag"], gust_with_drag)
 
 
-def test_mean_terms_that_screening_cannot_tell_apart_are_all_fitted_with_a_random_part():
+def test_mean_terms_about_as_good_are_fitted_with_the_random_part():
     """Three shapes of a lift: the second is nearly as good as the best, the third is not."""
     start = start_of(trial_of(Data(FLOOR, [hover(7, length_s=10.0)])), None)
     variants = addable("ground_effect", CANDIDATES["ground_effect"], ())

@@ -41,16 +41,16 @@ def gains(*cells):
 
 
 @pytest.mark.parametrize(("held", "further"), SAME_SENSOR)
-def test_what_is_gained_on_one_axis_counts_where_a_further_effect_gains_on_another(held, further):
+def test_axes_of_a_sensor_count_as_one_cell(held, further):
     assert thresholds.gain_in_improved_cells(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 50.0
 
 
 @pytest.mark.parametrize(("held", "further"), ELSEWHERE)
-def test_what_is_gained_in_another_sensor_band_or_view_does_not_count(held, further):
+def test_other_sensor_band_or_view_does_not_count(held, further):
     assert thresholds.gain_in_improved_cells(gains((held, 50.0)), gains((held, 50.0), (further, 20.0))) == 0.0
 
 
-def test_gains_of_the_axes_are_added_and_a_cell_counts_from_a_gain_of_one_nat():
+def test_cell_counts_from_one_nat():
     x, z, other = (REPLAY_VIEW, 0, FORCE_X), (REPLAY_VIEW, 0, FORCE_Z), (REPLAY_VIEW, 0, TORQUE_X)
     held = gains((x, 50.0), (z, -8.0), (other, -30.0))
     assert thresholds.gain_in_improved_cells(held, held + gains((x, 3.0), (z, -1.9), (other, 5.0))) == 42.0
@@ -75,7 +75,7 @@ def cells(monkeypatch):
     monkeypatch.setattr(thresholds, "held_out_cell_gains", lambda on, j: held if j.gain == 10_000.0 else more)
 
 
-def test_in_simulated_flights_effects_are_wrong_by_a_share_of_what_they_gain_where_the_further_one_gains(cells):
+def test_misfit_by_cell(cells):
     held, more = fitted(10_000.0), fitted(10_030.0)
     assert thresholds.misfit(trial(), held, more, 0.01) == pytest.approx(30.0)
     assert thresholds.misfit(trial(), held, more, 0.0001) == LEAST_GAIN
@@ -84,7 +84,7 @@ def test_in_simulated_flights_effects_are_wrong_by_a_share_of_what_they_gain_whe
 @pytest.mark.parametrize(("recorded", "everywhere", "full", "gain"), [
     (True, False, True, 10_030.0), (False, True, True, 10_030.0), (False, False, False, 10_030.0),
     (False, False, True, 10_100.0)])
-def test_else_by_a_share_of_all_that_they_gain(cells, recorded, everywhere, full, gain):
+def test_misfit_of_the_whole_gain(cells, recorded, everywhere, full, gain):
     """Recorded flights, a random effect, one that was not fitted, or one that gains as much as the whole share."""
     more = fitted(gain, full)
     assert thresholds.misfit(trial(recorded), fitted(10_000.0), more, 0.01, everywhere) == pytest.approx(100.0)

@@ -92,9 +92,9 @@ def test_what_adds_most_to_the_others_is_told_first(study, nominal_flight):
     both = pushed(nominal_flight, 0.06)
     both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
     selection = select(Data(study, [both]), candidates.all_candidates(LOOP))
-    shares = {s.name: s.leave_one_out_gain for s in selection.named}
+    shares = {s.name: s.leave_one_out_gain for s in selection.named_steps}
     assert set(shares) == {"downwash", "imu_bias"}
-    assert [s.name for s in selection.named] == sorted(shares, key=lambda n: -shares[n])
+    assert [s.name for s in selection.named_steps] == sorted(shares, key=lambda n: -shares[n])
     assert all(share > 12.0 for share in shares.values())
 
 

@@ -78,12 +78,12 @@ def test_nominal_flights_lie_as_far_as_their_covariance_says(nominal):
 def test_weak_effects_are_named_and_withheld_ones_are_not(study, effects):
     """Each too weak for the replay of a single flight; the other names of one that is withheld do not get it."""
     data, candidates = Data(study, fly(1, 78, effects)), all_candidates()
-    chosen = select(data, candidates)
-    assert chosen.inference is not None and [s.name for s in chosen.named] == list(effects)
+    selection = select(data, candidates)
+    assert selection.inference is not None and [s.name for s in selection.named_steps] == list(effects)
     left_out = {n: v for n, v in candidates.items() if n not in effects}
     inference = inference_of(data, list(left_out))
     assert not set(effects) & set(inference.evidence)
-    assert max(inference.evidence.values()) < chosen.inference.evidence[next(iter(effects))]
+    assert max(inference.evidence.values()) < selection.inference.evidence[next(iter(effects))]
 
 
 def test_it_is_not_asked_where_it_cannot_answer(study):

@@ -48,6 +48,6 @@ def test_lost_rows_alone_are_named_alone(pairs, study):
     for flight in pairs[0][:3]:
         data = Data(study, [flight])
         selection = select(data, all_candidates())
-        assert [s.name for s in selection.steps if s.named] == ["packet_loss"]
+        assert [s.name for s in selection.steps if s.is_named] == ["packet_loss"]
         share = named_effects(data, selection)[0].parameters["share"]
         assert share.high > 1.2 * share.value, "48 rows in 12 bursts say the share to a quarter at best"

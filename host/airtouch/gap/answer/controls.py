@@ -17,13 +17,13 @@ from airtouch.gap.study import Study
 
 def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
     """The gap with a deliberately wrong effect in the model; None where none of WRONG is wrong."""
-    right = {name for group in alike_of(selection) for name in group} | {s.name for s in selection.named}
+    right = {name for group in alike_of(selection) for name in group} | {s.name for s in selection.named_steps}
     variants = candidates.all_candidates()
     name = next((n for n in WRONG if n in variants and n not in right), None)
     if name is None:
         return None
-    fits = tuple(fit(data, part, variants[name][0]) for part in selection.parts)
-    return Control(name, shrink_of(data, selection.parts, Candidate(name, fits[0].terms, 0.0, fits), gap))
+    fits = tuple(fit(data, part, variants[name][0]) for part in selection.halves)
+    return Control(name, shrink_of(data, selection.halves, Candidate(name, fits[0].terms, 0.0, fits), gap))
 
 
 def arms(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
@@ -33,14 +33,14 @@ def arms(declared: Study | None, judged: Sequence[Flight], selection: Selection,
     declared: the study of the vehicle as declared, None where the answer is held against that already; judged: the
     flights that the answer comes from; answer: names an effect.
     """
-    assert answer.shrink is not None and selection.chosen is not None  # it names an effect
+    assert answer.shrink is not None and selection.named_hypothesis is not None  # it names an effect
     overall = Shrink(answer.gap["before"], answer.gap["after"], answer.shrink)
     if declared is None:
         return {"declared": overall}
     data = Data(declared, judged)
     parts = halves(data)
-    terms = tuple(t for t in selection.chosen.terms if t.shows_in != CLOCK)
-    start = mean_parameters(selection.chosen.fits[0].terms if selection.chosen.fits else ())
+    terms = tuple(t for t in selection.named_hypothesis.terms if t.shows_in != CLOCK)
+    start = mean_parameters(selection.named_hypothesis.fits[0].terms if selection.named_hypothesis.fits else ())
     fits = tuple(fit(data, part, terms, start) for part in parts)
-    gap = gap_of(data, parts, Candidate(selection.chosen.name, terms, 0.0, fits))
-    return {"declared": gap.named, "calibrated": overall}
+    gap = gap_of(data, parts, Candidate(selection.named_hypothesis.name, terms, 0.0, fits))
+    return {"declared": gap.shrink, "calibrated": overall}

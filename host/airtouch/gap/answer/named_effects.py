@@ -36,8 +36,8 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
 
     Their order is that of the selection, so that the first is the first of the ranking.
     """
-    hypothesis, chosen = selection.last_step, selection.chosen
-    if hypothesis is None or chosen is None:
+    hypothesis, named = selection.last_step, selection.named_hypothesis
+    if hypothesis is None or named is None:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
@@ -47,8 +47,8 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
                for t in shown if not t.companion]
     for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, part) for e in effects]
-    effects += [_named(t, *_in_times(data, t), readings) for t in chosen.terms if t.shows_in == CLOCK]
-    order = [s.name for s in selection.named]
+    effects += [_named(t, *_in_times(data, t), readings) for t in named.terms if t.shows_in == CLOCK]
+    order = [s.name for s in selection.named_steps]
     return sorted(effects, key=lambda e: order.index(e.name))
 
 
@@ -188,7 +188,7 @@ def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Rea
     return np.clip(x + gain @ apart, low, high), wider * (covariance - gain @ covariance[read])
 
 
-def _mean_of_halves(chosen: Candidate) -> np.ndarray | None:
+def _mean_of_halves(hypothesis: Candidate) -> np.ndarray | None:
     """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
-    scaled = [f.scaled for f in chosen.fits]
+    scaled = [f.scaled for f in hypothesis.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None

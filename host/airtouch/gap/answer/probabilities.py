@@ -6,6 +6,7 @@ import numpy as np
 
 from airtouch.gap.naming.policy import TEMPERATURE
 from airtouch.gap.naming.records import Selection
+from airtouch.gap.naming.unknown import against_over_limit, is_explained
 
 LEAD = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
 #: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAD
@@ -20,13 +21,13 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
     effect or `none` is the answer it stays below that.
     """
-    names = list(selection.singles)
+    names = list(selection.single_effects)
     weight = _weights(selection, names)
     total = weight.sum()
-    odds = selection.against_over_limit ** 2
+    odds = against_over_limit(selection) ** 2
     unknown = odds / (1.0 + odds)
-    if selection.chosen is not None and selection.explained:
-        unknown = _limited(unknown, weight[names.index(selection.named[0].name)] / total)
+    if selection.named_hypothesis is not None and is_explained(selection):
+        unknown = _limited(unknown, weight[names.index(selection.named_steps[0].name)] / total)
     if at_floor:
         unknown = _limited(unknown, weight[-1] / total)
     known = (1.0 - unknown) * weight / total
@@ -52,15 +53,15 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
 
     The first effect named leads them by LEAD at least.
     """
-    singles = selection.singles
-    out = [_against_none(singles[n].evidence, selection.least_gain[n], len(names)) for n in names]
-    if not selection.named or selection.named[0].name not in names:
+    single_effects = selection.single_effects
+    out = [_against_none(single_effects[n].evidence, selection.least_nats[n], len(names)) for n in names]
+    if not selection.named_steps or selection.named_steps[0].name not in names:
         return out
-    first = names.index(selection.named[0].name)
+    first = names.index(selection.named_steps[0].name)
 
     def beside_first(i: int) -> float:
         """Score of a candidate that could be named, or of the first effect itself."""
-        behind = max(singles[names[first]].gain - singles[names[i]].gain, LEAD) if i != first else 0.0
+        behind = max(single_effects[names[first]].gain - single_effects[names[i]].gain, LEAD) if i != first else 0.0
         return max(out[first] - behind, -TEMPERATURE)
 
     return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]

@@ -8,6 +8,7 @@ from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
+from airtouch.gap.naming.unknown import against, is_explained
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
@@ -31,19 +32,19 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     """
     if selection.inference is None and _at_its_floor(data, selection, gap):
         return "none"
-    if not selection.explained:
+    if not is_explained(selection):
         return "unknown"
-    return "none" if selection.chosen is None else "effect"
+    return "none" if selection.named_hypothesis is None else "effect"
 
 
 def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
     """Whether there is no gap, and nothing that would be outside it or within calmer bands; see `verdict_of`."""
-    chosen = selection.chosen
-    outside_the_gap = chosen is not None and all(t.shows_in == CLOCK or t.gate for t in chosen.terms)
-    if gap.named.before > AT_FLOOR or outside_the_gap:
+    hypothesis = selection.named_hypothesis
+    outside_the_gap = hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms)
+    if gap.shrink.before > AT_FLOOR or outside_the_gap:
         return False
-    odd_times = selection.nameless.of_times > selection.against.limit
-    return not data.study.simulated or not (odd_times or nearer(data, selection.parts, chosen, gap))
+    odd_times = selection.nameless.of_times > against(selection).limit
+    return not data.study.simulated or not (odd_times or nearer(data, selection.halves, hypothesis, gap))
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:
@@ -53,15 +54,15 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
     """
     out = []
     for name, p in agreeing(probabilities(selection, verdict == "none"), answer).items():
-        single = selection.singles.get(name)
+        single = selection.single_effects.get(name)
         share = Quantity(0.0)
-        if name == answer and verdict == "effect" and len(selection.named) == 1:
-            share = gap.named.share
+        if name == answer and verdict == "effect" and len(selection.named_steps) == 1:
+            share = gap.shrink.share
         elif single is not None and single.full and single.gain > FIRST_GAIN:
-            share = shrink_of(data, selection.parts, single, gap).share
+            share = shrink_of(data, selection.halves, single, gap).share
         nats = None if single is None else selection.gained(single)
         out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
-    order = {n: c.gain for n, c in selection.singles.items()}
+    order = {n: c.gain for n, c in selection.single_effects.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out
 
@@ -79,15 +80,15 @@ def agreeing(probability: Mapping[str, float], answer: str) -> dict[str, float]:
 
 def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     """Sets of names that these logs cannot tell apart: names of one thing, and candidates as good as the best."""
-    if not selection.named:
+    if not selection.named_steps:
         return ()
     groups = []
-    first = selection.singles[selection.named[0].name]
-    same = [n for n, c in selection.singles.items() if (c.full or selection.inference is not None)
+    first = selection.single_effects[selection.named_steps[0].name]
+    same = [n for n, c in selection.single_effects.items() if (c.full or selection.inference is not None)
             and selection.gained(first) - selection.gained(c) < CLOSE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
-    for step in selection.named:
+    for step in selection.named_steps:
         alike = names_alike(step.name)
         if alike and not any(step.name in g for g in groups):
             groups.append(tuple(sorted(alike.effects)))

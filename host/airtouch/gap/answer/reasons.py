@@ -2,6 +2,7 @@
 
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Candidate, Selection, Step
+from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
@@ -13,8 +14,8 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
 
     name: an effect, "none" or "unknown". verdict: see `ranking.verdict_of`.
     """
-    first = selection.named[0].name if selection.named else ""
-    step = next((s for s in selection.named[1:] if s.name == name), None)
+    first = selection.named_steps[0].name if selection.named_steps else ""
+    step = next((s for s in selection.named_steps[1:] if s.name == name), None)
     if name == verdict or (verdict == "effect" and name == first):
         return ""
     if step is not None and verdict == "effect":
@@ -23,12 +24,12 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
         return _why_not_unknown(selection)
     if name == "none":
         return _why_not_none(selection)
-    return shortfall(selection, selection.singles[name])
+    return shortfall(selection, selection.single_effects[name])
 
 
 def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
-    gaining = (c for c in selection.singles.values() if selection.gained(c) > 0.0)
+    gaining = (c for c in selection.single_effects.values() if selection.gained(c) > 0.0)
     most = sorted(gaining, key=lambda c: -selection.gained(c))
     return [Rejected(c.name, shortfall(selection, c)) for c in most[:NEAREST]]
 
@@ -37,9 +38,9 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, candidate.name)
-    least = selection.least_gain[candidate.name]
-    if candidate.name in {s.name for s in selection.named}:  # the best there is, and not enough
-        return against(selection)
+    least = selection.least_nats[candidate.name]
+    if candidate.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
+        return _against_in_words(selection)
     if candidate.gain < least:
         return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
     if candidate.evidence < FIRST_GAIN:
@@ -47,18 +48,18 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
                 f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {FIRST_GAIN:.0f} are needed")
     if candidate.name == selection.taken_back.name:
         return f"closes {max(selection.taken_back.closed, 0.0):.0%} of the gap, too little to be its cause"
-    if selection.chosen:
-        return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
-                f"{selection.chosen.gain:.0f}")
+    if selection.named_hypothesis:
+        return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named_steps)} "
+                f"{selection.named_hypothesis.gain:.0f}")
     return f"gains {candidate.gain:.0f} nats, a model without names {selection.nameless.over_none:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
     """What an effect lacks to be named by the relations of the signals, in nats."""
     gain = inference.evidence[name]
-    first = [s.name for s in selection.named]
+    first = [s.name for s in selection.named_steps]
     if name in first:
-        return against(selection)
+        return _against_in_words(selection)
     if gain < LEAST_EVIDENCE:
         return f"the relations of the signals gain {gain:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
     if not first:
@@ -66,10 +67,10 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
     return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
 
 
-def against(selection: Selection) -> str:
+def _against_in_words(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
     lost, worst = selection.over_prediction
-    if selection.over_prediction_ratio == selection.against_over_limit:
+    if over_prediction_ratio(selection) == against_over_limit(selection):
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")
@@ -80,17 +81,17 @@ def _left(selection: Selection, gains: str, off: str) -> str:
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
-    against = selection.against
-    nats = f"{max(against.nats, 0.0):.0f}"
-    if against.of_distance:
+    left = against(selection)
+    nats = f"{max(left.nats, 0.0):.0f}"
+    if left.of_distance:
         farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
-        return f"the flight lies {nats} nats farther {farther}, up to {against.limit:.0f} may be chance"
-    return f"{gains.format(nats)}, up to {against.limit:.0f} may be left"
+        return f"the flight lies {nats} nats farther {farther}, up to {left.limit:.0f} may be chance"
+    return f"{gains.format(nats)}, up to {left.limit:.0f} may be left"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:
     """The reason why an effect named beside the first has no more probability than the ranking says."""
-    first = selection.named[0].name
+    first = selection.named_steps[0].name
     if selection.inference is not None:
         return f"named beside {first}: the probability is that it acts alone"
     assert step.leave_one_out_gain is not None  # several are named
@@ -100,16 +101,16 @@ def _why_beside(selection: Selection, step: Step) -> str:
 
 def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
-    if not selection.explained:
+    if not is_explained(selection):
         return "the gap as a whole is at its floor"
-    names = " and ".join(s.name for s in selection.named)
+    names = " and ".join(s.name for s in selection.named_steps)
     return _left(selection, "a model without names adds {} nats", names)
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
-    if selection.chosen is None:
+    if selection.named_hypothesis is None:
         return _left(selection, "a model without names gains {} nats", "")
-    first = selection.named[0].name
-    gain = selection.inference.evidence[first] if selection.inference else selection.chosen.gain
+    first = selection.named_steps[0].name
+    gain = selection.inference.evidence[first] if selection.inference else selection.named_hypothesis.gain
     return f"{first} gains {gain:.0f} nats over it"

@@ -40,23 +40,24 @@ class Gap:
 
     cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; calm: by how much the
     energy there (floor 1) is below nominal flights' once the effects named are in the model; energies_before
-    (n,): energies without any effect, calm added; named: the shrink of the effects named.
+    (n,): energies without any effect, calm added; shrink: by the effects named.
     """
 
     cells: tuple[np.ndarray, np.ndarray]
     calm: float
     energies_before: np.ndarray
-    named: Shrink
+    shrink: Shrink
 
 
-def gap_of(data: Data, parts: Sequence[BlockSet], named: Candidate | None) -> Gap:
-    """The gap of two halves of the data, each in the cells that the other shows. named: the effects named."""
-    terms = _terms(named)
+def gap_of(data: Data, parts: Sequence[BlockSet], hypothesis: Candidate | None) -> Gap:
+    """The gap of two halves of the data, each in the cells that the other shows. hypothesis: the effects named."""
+    terms = _terms(hypothesis)
     cells = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
     after = _energies(data, parts, terms, cells)
     calm = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
     before = calm + _energies(data, parts, ((), ()), cells)
-    return Gap(cells, calm, before, shrink_of_jitter(data) if _only_jitter(named) else _shrink(before, calm + after))
+    shrink = shrink_of_jitter(data) if _only_jitter(hypothesis) else _shrink(before, calm + after)
+    return Gap(cells, calm, before, shrink)
 
 
 def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:

@@ -24,7 +24,7 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
-ROUND_TRIP = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
+TWO_FOLDS = ((0, 1), (1, 0))  #: the half that is fitted, the half that is judged
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 #: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
 FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0

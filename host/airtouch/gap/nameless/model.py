@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, whole_of
+from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet, whole_of
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
 from airtouch.gap.nameless.powers import power_floor, power_gain
@@ -30,7 +30,7 @@ def held_out_gains(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequen
     """
     floor = data.study.nameless_floor or no_floor()
     linear = power = 0.0
-    for train, test in ROUND_TRIP:
+    for train, test in TWO_FOLDS:
         trained, held_out = (PartResiduals(data, parts[half], terms[train]) for half in (train, test))
         fitted = np.array([coefficients(trained, channel, floor, allowed_columns(data, terms[train], channel))
                            for channel in range(CHANNELS)])
@@ -47,7 +47,7 @@ def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
     halves = [PartResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
     return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
-               for train, test in ROUND_TRIP)
+               for train, test in TWO_FOLDS)
 
 
 def nameless_floor(data: Data) -> NamelessFloor:

@@ -30,11 +30,12 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
     return infer(library.without(library.effects - set(names)), library.coordinates(np.array(known)))
 
 
-def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]], singles: Mapping[str, Candidate],
-                           inference: Inference, progress: Callable[[str], None]) -> Selection:
+def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms]],
+                           single_effects: Mapping[str, Candidate], inference: Inference,
+                           progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
-    candidates: variants by name; singles: every candidate judged alone; progress: called with every name.
+    candidates: variants by name; single_effects: every candidate judged alone; progress: called with every name.
     """
     steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
@@ -44,8 +45,8 @@ def selection_by_relations(trial: Trial, candidates: Mapping[str, Sequence[Terms
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     return Selection(
-        singles=singles, steps=tuple(steps), nameless=NamelessGain(), parts=trial.parts,
-        least_gain=dict.fromkeys(singles, trial.policy.first_gain), assumed=False, inference=inference,
+        single_effects=single_effects, steps=tuple(steps), nameless=NamelessGain(), halves=trial.halves,
+        least_nats=dict.fromkeys(single_effects, trial.policy.first_gain), assumed=False, inference=inference,
         policy=trial.policy)
 
 
@@ -53,7 +54,7 @@ def signs_not_shown(selection: Selection) -> list[str]:
     """A note on each effect named by the relations of signals whose parameter may have the other sign as well."""
     if selection.inference is None:
         return []
-    names = {s.name for s in selection.named}
+    names = {s.name for s in selection.named_steps}
     return [f"{name}: the flights do not show the sign of its strength; it may be the other one"
             for name in selection.inference.without_sign if name in names]
 

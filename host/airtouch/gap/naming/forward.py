@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from airtouch.gap.naming.judging import Trial
-from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.policy import (
     CERTAIN,
     FIRST_GAIN,
@@ -27,15 +27,22 @@ from airtouch.gap.signatures.term import Terms
 class Search:
     """The flights, and the candidates among which effects are searched.
 
-    candidates: variants of each effect by name; singles: every candidate judged alone; least_gain: nats that each must
-    gain as the first effect; progress: called with each name that is judged.
+    candidates: variants of each effect by name; single_effects: every candidate judged alone; least_nats: what each
+    must gain to be the first step; progress: called with each name that is judged.
     """
 
     trial: Trial
     candidates: Mapping[str, Sequence[Terms]]
-    singles: Mapping[str, Candidate]
-    least_gain: Mapping[str, float]
+    single_effects: Mapping[str, Candidate]
+    least_nats: Mapping[str, float]
     progress: Callable[[str], None]
+
+
+class Extension(NamedTuple):
+    """A candidate judged beside the last step, and the nats that it must gain over that step to be added."""
+
+    candidate: Candidate
+    required_gain: float
 
 
 @dataclass(frozen=True)
@@ -43,15 +50,14 @@ class State:
     """Where a forward selection stands.
 
     steps: the hypotheses so far, each with the effects of those before it; extensions: candidates judged beside the
-    last step, by name; least_further_gain: nats that each of these must gain over it; singles: the best variant of
-    every candidate, as judged before an effect was named; least_gain: nats that each must gain as the first effect.
+    last step, by name; single_effects: the best variant of every candidate, as judged before an effect was named;
+    least_nats: what each must gain to be the first step.
     """
 
     steps: tuple[Step, ...]
-    extensions: Mapping[str, Candidate]
-    least_further_gain: Mapping[str, float]
-    singles: Mapping[str, Candidate]
-    least_gain: Mapping[str, float]
+    extensions: Mapping[str, Extension]
+    single_effects: Mapping[str, Candidate]
+    least_nats: Mapping[str, float]
 
     @property
     def gain(self) -> float:
@@ -59,49 +65,50 @@ class State:
         return self.steps[-1].gain if self.steps else 0.0
 
     @property
-    def named(self) -> list[str]:
+    def names(self) -> list[str]:
         """Names of the effects that are named, in the order of the steps."""
-        return [s.name for s in self.steps if s.named]
+        return [s.name for s in self.steps if s.is_named]
 
     @property
     def deviations(self) -> int:
         """How many steps are not named: deviations that nominal flights have as well."""
-        return len(self.steps) - len(self.named)
+        return len(self.steps) - len(self.names)
 
 
 def forward(search: Search, passing: Candidate | None) -> State:
-    """The state in which a forward selection ends, its steps with their leave-one-out gains.
+    """The state in which a forward selection ends.
 
     passing: an effect that comes and goes, which is the first step; None for none.
     """
     state = _begun(search, passing)
-    while len(state.named) < MOST_EFFECTS:
+    while len(state.names) < MOST_EFFECTS:
         best = _best_of(_worth_adding(state), state.gain)
         if best is None:
             break
         state = _added(search, state, best)
-    return replace(state, steps=tuple(with_leave_one_out_gains(search.trial, state.steps)))
+    return state
 
 
 def _begun(search: Search, passing: Candidate | None) -> State:
     """The state before the first effect is added, with an effect that comes and goes as a step already."""
     if passing is None:
-        return State((), search.singles, search.least_gain, search.singles, search.least_gain)
-    singles = {**search.singles, passing.name: passing}
+        extensions = {n: Extension(c, search.least_nats[n]) for n, c in search.single_effects.items()}
+        return State((), extensions, search.single_effects, search.least_nats)
+    single_effects = {**search.single_effects, passing.name: passing}
     steps = (Step.of(passing),)
-    extensions, least_further = _beside(search, steps, singles, {n: c.gain for n, c in singles.items()})
-    return State(steps, extensions, least_further, singles, {**search.least_gain, passing.name: PASSING_GAIN})
+    extensions = _extensions(search, steps, single_effects, {n: c.gain for n, c in single_effects.items()})
+    return State(steps, extensions, single_effects, {**search.least_nats, passing.name: PASSING_GAIN})
 
 
-def _worth_adding(state: State) -> dict[str, Candidate]:
+def _worth_adding(state: State) -> list[Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = {n: c for n, c in state.extensions.items() if c.gain - state.gain >= state.least_further_gain[n]}
+    enough = [e.candidate for e in state.extensions.values() if e.candidate.gain - state.gain >= e.required_gain]
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
-        enough = {n: c for n, c in enough.items() if c.evidence >= FIRST_GAIN}
+        return [c for c in enough if c.evidence >= FIRST_GAIN]
     return enough
 
 
-def _best_of(judged: Mapping[str, Candidate], before: float) -> Candidate | None:
+def _best_of(candidates: Sequence[Candidate], before: float) -> Candidate | None:
     """The best of the candidates that were fitted in full; None where there is none.
 
     Likelihoods of real flights are too sure of themselves (TEMPERATURE). So of two that gain nearly as much the one is
@@ -110,7 +117,7 @@ def _best_of(judged: Mapping[str, Candidate], before: float) -> Candidate | None
 
     before: nats that the last step gains over no effect.
     """
-    full = [c for c in judged.values() if c.full]
+    full = [c for c in candidates if c.full]
 
     def merit(candidate: Candidate) -> float:
         return candidate.gain / TEMPERATURE + min(candidate.evidence, CERTAIN)
@@ -125,32 +132,32 @@ def _best_of(judged: Mapping[str, Candidate], before: float) -> Candidate | None
 
 def _added(search: Search, state: State, best: Candidate) -> State:
     """The state with a further step: named, or a deviation where its evidence or its gain is too small for a name."""
-    singles = state.singles
-    if not state.named:  # what nominal flights have as well stands beside every candidate
+    beside_last = {n: e.candidate for n, e in state.extensions.items()}
+    single_effects = state.single_effects
+    if not state.names:  # what nominal flights have as well stands beside every candidate
         added = {s.name for s in state.steps}
-        singles = {**singles, **{n: c for n, c in state.extensions.items() if n not in added}}
-    left_by_another = bool(state.named) and is_random_misfit(search.trial, state.steps[-1], best)
-    steps = (*state.steps, Step.of(best, named=best.evidence >= FIRST_GAIN and not left_by_another))
-    after = replace(state, steps=steps, singles=singles)
-    if len(after.named) >= MOST_EFFECTS:  # nothing is added to these
+        single_effects = {**single_effects, **{n: c for n, c in beside_last.items() if n not in added}}
+    left_by_another = bool(state.names) and is_random_misfit(search.trial, state.steps[-1], best)
+    steps = (*state.steps, Step.of(best, is_named=best.evidence >= FIRST_GAIN and not left_by_another))
+    after = replace(state, steps=steps, single_effects=single_effects)
+    if len(after.names) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    further_gains = {n: c.gain - state.gain for n, c in state.extensions.items()}
-    extensions, least_further = _beside(search, steps, state.extensions, further_gains)
-    return replace(after, extensions=extensions, least_further_gain=least_further)
+    further_gains = {n: c.gain - state.gain for n, c in beside_last.items()}
+    return replace(after, extensions=_extensions(search, steps, beside_last, further_gains))
 
 
-def _beside(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate], further_gains: Mapping[str, float],
-            ) -> tuple[dict[str, Candidate], dict[str, float]]:
-    """Candidates judged beside the steps so far, and the nats that each must gain.
+def _extensions(search: Search, steps: Sequence[Step], before: Mapping[str, Candidate],
+                further_gains: Mapping[str, float]) -> dict[str, Extension]:
+    """Candidates judged beside the steps so far, with the nats that each must gain.
 
     before: candidates as judged before the newest step; further_gains: nats that each of them gained over the steps
     then. Beside a deviation of nominal flights only those are judged again that gained something without it, as a
     deviation takes gain from others and seldom adds any.
     """
-    trial, named = search.trial, any(s.named for s in steps)
+    trial, any_named = search.trial, any(s.is_named for s in steps)
     gained = {n for n, gain in further_gains.items() if gain > WORTH_AGAIN * FIRST_GAIN}
-    worth = {n: v for n, v in search.candidates.items() if named or n in gained}
+    worth = {n: v for n, v in search.candidates.items() if any_named or n in gained}
     sure = {n for n, c in before.items() if c.full and c.evidence >= SURE_EVIDENCE and not is_random(n)}
-    extensions = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return extensions, {n: least_further_gain(trial, steps[-1], c) if named else trial.policy.first_gain
-                        for n, c in extensions.items()}
+    best = round_of(trial, worth, steps[-1], search.progress, promising=sure)
+    return {n: Extension(c, least_further_gain(trial, steps[-1], c) if any_named else trial.policy.first_gain)
+            for n, c in best.items()}

@@ -23,13 +23,13 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     other must close more than 0: an effect that leaves the whole gap is not its cause. Effects of the logged times, and
     one whose seconds are known from another vehicle's log, need close nothing.
     """
-    chosen = selection.chosen
-    of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named)
-    if not selection.policy.must_close_gap or chosen is None or of_known_seconds:
+    hypothesis = selection.named_hypothesis
+    of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named_steps)
+    if not selection.policy.must_close_gap or hypothesis is None or of_known_seconds:
         return None
     if names_one_of_the_loop(data, selection):
         return LEAST_CLOSED
-    if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in chosen.terms):
+    if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in hypothesis.terms):
         return None
     return LEAST_CLOSED if names_one_that_passes(selection) else 0.0
 
@@ -49,20 +49,20 @@ def with_none_named(selection: Selection, closed: float) -> Selection:
     closed: share of the gap that they close. Beside none the nameless model gains what it gains over none.
     """
     nameless = replace(selection.nameless, over_last_step=selection.nameless.over_none)
-    first = selection.named[0].name
+    first = selection.named_steps[0].name
     return replace(selection, steps=(), nameless=nameless, assumed=False, taken_back=TakenBack(first, closed))
 
 
 def names_one_that_passes(selection: Selection) -> bool:
     """Whether one effect is named, and it comes and goes."""
-    chosen = selection.chosen
-    return chosen is not None and len(selection.named) == 1 and all(t.gate for t in chosen.terms)
+    hypothesis = selection.named_hypothesis
+    return hypothesis is not None and len(selection.named_steps) == 1 and all(t.gate for t in hypothesis.terms)
 
 
 def names_one_of_the_loop(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
-    chosen = selection.chosen
-    return chosen is not None and len(selection.named) == 1 and _of_the_loop(data, chosen.terms)
+    hypothesis = selection.named_hypothesis
+    return hypothesis is not None and len(selection.named_steps) == 1 and _of_the_loop(data, hypothesis.terms)
 
 
 def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
@@ -70,11 +70,11 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
 
     Whether those of the loop stay beside them: `loop_closes_too_little`.
     """
-    chosen = selection.chosen
-    if not selection.policy.must_close_gap or chosen is None:
+    hypothesis = selection.named_hypothesis
+    if not selection.policy.must_close_gap or hypothesis is None:
         return []
-    names = [s.name for s in selection.named]
-    others = [n for n in names if not _of_the_loop(data, [t for t in chosen.terms if t.name == n])]
+    names = [s.name for s in selection.named_steps]
+    others = [n for n in names if not _of_the_loop(data, [t for t in hypothesis.terms if t.name == n])]
     return others if len(others) < len(names) else []
 
 

@@ -4,7 +4,8 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
 
     gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
            + clock_gains                        log likelihood of the logged times, by effects that show there alone
-           - price_of                           PRICE of each parameter beyond an effect's first
+           - price_of                           PRICE of each free parameter of a term beyond its first; a random part
+                                                or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
            + gained_while_certain               what effects lose beside the first random one, given back (`Charges`)
 """
@@ -18,7 +19,7 @@ import numpy as np
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet
+from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Candidate, Charges, Strength
 from airtouch.gap.signals.spectra import AIR, REST
@@ -43,13 +44,13 @@ class PricedVariant(NamedTuple):
 class Trial:
     """What hypotheses are judged on.
 
-    parts: the two halves of the flights; policy: what they must show; none_certain, none_uncertain: log likelihood of
-    no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
+    halves: the blocks of the flights, in two; policy: what they must show; none_certain, none_uncertain: log likelihood
+    of no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
     them.
     """
 
     data: Data
-    parts: tuple[BlockSet, BlockSet]
+    halves: tuple[BlockSet, BlockSet]
     policy: NamingPolicy
     none_certain: Sequence[float]
     none_uncertain: Sequence[float]
@@ -57,9 +58,9 @@ class Trial:
 
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
-    parts = halves(data)
-    none_certain, none_uncertain = ([judge(data, p, (), wide) for p in parts] for wide in (False, True))
-    return Trial(data, parts, policy_of(data.study, data.seconds), none_certain, none_uncertain)
+    of_data = halves(data)
+    none_certain, none_uncertain = ([judge(data, half, (), wide) for half in of_data] for wide in (False, True))
+    return Trial(data, of_data, policy_of(data.study, data.seconds), none_certain, none_uncertain)
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
@@ -91,7 +92,7 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None
     terms, before = variant.terms, base.terms if base else ()
     charges = _charges(trial, variant, base)
     if base and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
-        gain, fits = base.gain, base.fits
+        gain, fits = base.gain - variant.choice_cost, base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
@@ -122,7 +123,7 @@ def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, o
 
     fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
-    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in ROUND_TRIP), of_clock)
+    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), of_clock)
     return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
 
 
@@ -132,21 +133,21 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
     The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
     fewer effects.
     """
-    start, part = _start(base, terms, half), trial.parts[half]
+    start, part = _start(base, terms, half), trial.halves[half]
     key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
     return trial.data.workspace.cached(
         "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
 
 
 def price_of(terms: Sequence[Term]) -> float:
-    """Held-out nats that parameters beyond an effect's first must earn."""
+    """Nats that free parameters of a term beyond its first must gain; one that shows in the times alone pays none."""
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
 def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
     """Held-out nats that effects, fitted on each half, lose where the commands' floor is as beside a random effect."""
     return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, True)
-               for train, test in ROUND_TRIP)
+               for train, test in TWO_FOLDS)
 
 
 def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
@@ -155,13 +156,13 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
     none = trial.none_uncertain if wide or random_of(terms) else trial.none_certain
-    return judge(trial.data, trial.parts[half], terms, wide) - none[half]
+    return judge(trial.data, trial.halves[half], terms, wide) - none[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
-    return np.sum([cell_gains(trial.data, trial.parts[test], hypothesis.fits[train].terms)
-                   for train, test in ROUND_TRIP], axis=0)
+    return np.sum([cell_gains(trial.data, trial.halves[test], hypothesis.fits[train].terms)
+                   for train, test in TWO_FOLDS], axis=0)
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms]) -> Strength:

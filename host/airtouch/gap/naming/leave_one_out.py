@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
-from airtouch.gap.evidence.problem import ROUND_TRIP
+from airtouch.gap.evidence.problem import TWO_FOLDS
 from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
 from airtouch.gap.naming.records import Step, new_terms
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -24,11 +24,11 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     These are all that are named, where there are several, and one that comes and goes beside any other: what is as
     strong as in nominal flights may have its seconds as well. Seconds that another vehicle's log tells are sure.
     """
-    several_named = sum(s.named for s in steps) > 1
+    several_named = sum(s.is_named for s in steps) > 1
 
     def stands_beside_others(step: Step) -> bool:
         searched_for = step.passing_key not in (None, KNOWN_OVERHEAD)
-        return step.named and (several_named or (searched_for and len(steps) > 1))
+        return step.is_named and (several_named or (searched_for and len(steps) > 1))
 
     return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
             if stands_beside_others(s) else s for place, s in enumerate(steps)]
@@ -39,13 +39,14 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
     last, dropped = steps[-1], _new_slots(steps, place)
     others = _without(last.terms, dropped)
     gain = clock_gains(trial.data, others)
-    if all(t.shows_in == CLOCK for t in others):
-        return gain
-    refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
-    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in ROUND_TRIP)
     cost_of_dropped = steps[place].charges.choice_cost - (steps[place - 1].charges.choice_cost if place else 0.0)
+    cost_of_others = last.charges.choice_cost - cost_of_dropped
+    if all(t.shows_in == CLOCK for t in others):
+        return gain - cost_of_others
+    refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
+    gain += sum(gain_of(trial, test, refits[train].terms) for train, test in TWO_FOLDS)
     gain += _gained_while_certain(trial, steps, place)
-    return gain - price_of(refits[-1].terms) - (last.charges.choice_cost - cost_of_dropped)
+    return gain - price_of(refits[-1].terms) - cost_of_others
 
 
 def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:
@@ -69,7 +70,7 @@ def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> fl
 
 def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     """Effects fitted to a half anew, from their values on."""
-    return fit(trial.data, trial.parts[half], terms, mean_parameters(terms))
+    return fit(trial.data, trial.halves[half], terms, mean_parameters(terms))
 
 
 def _new_slots(steps: Sequence[Step], place: int) -> frozenset[Hashable]:

@@ -8,14 +8,14 @@ from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
 from airtouch.gap.naming.records import Candidate, OverPrediction
 
 
-def over_prediction_of(trial: Trial, named: Candidate | None) -> OverPrediction:
+def over_prediction_of(trial: Trial, hypothesis: Candidate | None) -> OverPrediction:
     """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing.
 
-    named: these effects as one hypothesis, None where none is named.
+    hypothesis: these effects together, None where none is named.
     """
-    if named is None or not named.fits:
+    if hypothesis is None or not hypothesis.fits:
         return OverPrediction()
-    gains = held_out_cell_gains(trial, named)
+    gains = held_out_cell_gains(trial, hypothesis)
     lost = over_prediction_by_channel(gains)
     if not lost.any():
         return OverPrediction()

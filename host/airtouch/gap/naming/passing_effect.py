@@ -16,21 +16,21 @@ from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(trial: Trial, singles: Mapping[str, Candidate], least_gain: Mapping[str, float],
+def passing_effect(trial: Trial, single_effects: Mapping[str, Candidate], least_nats: Mapping[str, float],
                    without: Sequence[str]) -> Candidate | None:
     """The effect that comes and goes and explains most; None where none is news.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
     (`passing_evidence`). Seconds in which another vehicle is known to be overhead go before others, which are only
-    likely. singles: candidates judged alone; least_gain: nats of evidence that each needs; without: names that are
-    left out.
+    likely. single_effects: candidates judged alone; least_nats: of evidence, for one to count here; without: names that
+    are left out.
     """
     if trial.data.study.scatter is None:
         return None
     data = trial.data
-    of_steady_effects = [c.gain for name, c in singles.items() if c.evidence >= least_gain[name]]
-    steady = max([height_gain(data, trial.parts), *of_steady_effects])
+    of_steady_effects = [c.gain for name, c in single_effects.items() if c.evidence >= least_nats[name]]
+    steady = max([height_gain(data, trial.halves), *of_steady_effects])
     passing = [g for g in gated_effects(data, without).values()
                if g.gain >= steady + PASSING_GAIN and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
     if not passing:
@@ -53,7 +53,7 @@ def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step])
     key = passing.passing_key
     assert key is not None  # it comes and goes
     return any(passing_evidence(data, key, s.leave_one_out_gain, passing.strength.mean) < PASSING_GAIN
-               for s in steps if s.name == passing.name and s.named and s.leave_one_out_gain is not None)
+               for s in steps if s.name == passing.name and s.is_named and s.leave_one_out_gain is not None)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:

@@ -26,7 +26,9 @@ SURE_EVIDENCE = LEAST_GAIN
 #: that the first effect must gain, where nominal flights gave a loop; chosen, after 6 nats had given 4 false alarms on
 #: 46 flights of a fresh set (2026-11-21)
 FIRST_GAIN = 8.0
-PRICE = 0.9  #: of each further parameter of an effect; chosen, near Akaike's 1 (1974)
+#: that each free parameter of a term beyond its first must gain; a random part or a companion, a term of its own, must
+#: gain LONGER_GAIN instead. Chosen, near Akaike's 1 (1974)
+PRICE = 0.9
 #: that count as one where candidates are compared, as log likelihoods of real flights are too sure of themselves;
 #: chosen 2026-11-21. With a larger number the rarer strength outweighs the gain, and probabilities are nearer to one
 #: another

@@ -1,4 +1,4 @@
-"""The result of a selection of effects: candidates judged, the steps, and what speaks against the effects named."""
+"""The result of a selection of effects: the candidates with what they gain, and the steps."""
 
 from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,7 +9,7 @@ import numpy as np
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.policy import NamingPolicy
-from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term, Terms
 
@@ -40,8 +40,9 @@ class Strength:
 class Charges:
     """What the gain of a hypothesis is charged with beside its parameters, and what is given back to it, nats.
 
-    choice_cost: charged for the choice among the variants of its effects; gained_while_certain: given back, what the
-    effects before the first random one lose because beside it the commands' floor is less certain.
+    choice_cost: charged for the choice among the variants of its effects: of all of them, but of the newest alone where
+    the hypothesis was only screened, whose base has paid already; gained_while_certain: given back, what the effects
+    before the first random one lose because beside it the commands' floor is less certain.
     """
 
     choice_cost: float = 0.0
@@ -80,19 +81,18 @@ class Candidate:
 class Step(Candidate):
     """A candidate that a selection has added to the steps before it.
 
-    named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights have
-    as well, and stands beside the effects named. leave_one_out_gain: what the newest adds to the
-    others, nats: of effects that are named where there are several, and of one that comes and goes beside any step;
-    else None.
+    is_named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights
+    have as well, and stands beside the effects named. leave_one_out_gain: what the newest adds to the others, nats: of
+    effects that are named where there are several, and of one that comes and goes beside any step; else None.
     """
 
-    named: bool = True
+    is_named: bool = True
     leave_one_out_gain: float | None = None
 
     @classmethod
-    def of(cls, candidate: Candidate, named: bool = True) -> "Step":
+    def of(cls, candidate: Candidate, is_named: bool = True) -> "Step":
         """The step that adds a candidate."""
-        return cls(**vars(candidate), named=named)
+        return cls(**vars(candidate), is_named=is_named)
 
 
 @dataclass(frozen=True)
@@ -126,19 +126,20 @@ class TakenBack(NamedTuple):
 class Selection:
     """The result of a selection of effects; gains are in held-out nats.
 
-    singles: the best variant of every candidate, by name; steps: effects added one after another; nameless: what the
-    nameless model gains; parts: the two halves that effects were fitted and judged on; least_gain: nats that each
-    candidate must gain as the first; policy: what the flights must show; assumed: whether the spectrum of a chosen
-    effect is assumed, as it is random or changes the loop of recorded flights; over_prediction: over-prediction of the
-    effects named; inference: what named the effects, where the relations of signals did; taken_back: what recorded
-    flights name no more.
+    single_effects: the best variant of every candidate, by name, beside the deviations alone; steps: effects added one
+    after another; nameless: what the nameless model gains; halves: the blocks that effects were fitted and judged on;
+    least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely than
+    none; policy: what the flights must show; assumed: whether the spectrum of an effect of the last step is assumed, as
+    it is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects named;
+    inference: what named the effects, where the relations of signals did; taken_back: what recorded flights name no
+    more.
     """
 
-    singles: Mapping[str, Candidate]
+    single_effects: Mapping[str, Candidate]
     steps: tuple[Step, ...]
     nameless: NamelessGain
-    parts: tuple[BlockSet, BlockSet]
-    least_gain: Mapping[str, float]
+    halves: tuple[BlockSet, BlockSet]
+    least_nats: Mapping[str, float]
     policy: NamingPolicy
     assumed: bool
     over_prediction: OverPrediction = OverPrediction()
@@ -151,13 +152,13 @@ class Selection:
         return self.steps[-1] if self.steps else None
 
     @property
-    def named(self) -> tuple[Step, ...]:
+    def named_steps(self) -> tuple[Step, ...]:
         """The steps whose effects are named: what adds most to the others first, faults of the log's own times last."""
-        named = (s for s in self.steps if s.named)
-        return tuple(sorted(named, key=lambda s: (s.of_the_log, -(s.leave_one_out_gain or 0.0))))
+        steps = (s for s in self.steps if s.is_named)
+        return tuple(sorted(steps, key=lambda s: (s.of_the_log, -(s.leave_one_out_gain or 0.0))))
 
     @property
-    def chosen(self) -> Candidate | None:
+    def named_hypothesis(self) -> Candidate | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
         last, slots = self.last_step, self.named_slots
         if last is None or not slots:
@@ -168,40 +169,11 @@ class Selection:
     @property
     def named_slots(self) -> frozenset[Hashable]:
         """Slots (`Term.slot`) of the terms of the effects named: a deviation may have the same name."""
-        return frozenset(t.slot for i, s in enumerate(self.steps) if s.named for t in new_terms(self.steps, i))
+        return frozenset(t.slot for i, s in enumerate(self.steps) if s.is_named for t in new_terms(self.steps, i))
 
     def gained(self, candidate: Candidate) -> float:
         """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
         return float(self.inference.evidence[candidate.name] if self.inference is not None else candidate.gain)
-
-    @property
-    def against(self) -> Against:
-        """Nats that speak against the effects named, with those that may where they are right.
-
-        By the relations of signals where these decide, else the gain of the nameless model beside the effects.
-        """
-        if self.inference is not None:
-            return self.inference.against
-        gain = self.last_step.gain if self.last_step else 0.0
-        limit = self.policy.unknown.nats(gain, self.nameless.over_none, self.assumed)
-        return Against(self.nameless.over_last_step, limit, of_distance=False)
-
-    @property
-    def against_over_limit(self) -> float:
-        """How much speaks against the effects named over its limit: by `against`, or by over-prediction."""
-        against = self.against
-        never_negative = float(np.logaddexp(against.nats, 0.0))  # softplus: the nats where these are many, else above 0
-        return max(never_negative / against.limit, self.over_prediction_ratio)
-
-    @property
-    def over_prediction_ratio(self) -> float:
-        """Nats of over-prediction over those that may be chance."""
-        return self.over_prediction.nats / self.policy.unknown.least if self.over_prediction.nats else 0.0
-
-    @property
-    def explained(self) -> bool:
-        """Whether what is left is the floor, or close to it, and the effects named do not over-predict."""
-        return self.against_over_limit < 1.0
 
 
 def new_terms(steps: Sequence[Step], place: int) -> list[Term]:

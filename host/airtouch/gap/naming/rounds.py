@@ -9,14 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from airtouch.gap.naming.judging import PricedVariant, Trial, at_bound, cross_validated
+from airtouch.gap.naming.evidence import with_evidence
+from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
 from airtouch.gap.naming.policy import COMPANION_GAIN, FULL, LONGER_GAIN, PROMISING
 from airtouch.gap.naming.records import Candidate, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.second_process import map_on_two_cores
-from airtouch.gap.signatures.candidates import strength_term
-from airtouch.gap.signatures.scatter import Scatter
-from airtouch.gap.signatures.signature import COMPANIONS, MEAN
+from airtouch.gap.signatures.signature import COMPANIONS
 from airtouch.gap.signatures.term import Terms
 
 
@@ -31,7 +30,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Cand
     variants, not_fitted = _screened(start, candidates, progress, promising)
     fitted = map_on_two_cores(lambda v: _fitted(trial, v, base), variants)
     best = best_of_each([*fitted, *not_fitted], len(start.terms))
-    return _with_evidence(trial.data.study.scatter, best, start.gain)
+    return with_evidence(trial.data.study.scatter, best, start.gain)
 
 
 def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Candidate]:
@@ -98,13 +97,13 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
     return worth_a_fit, others
 
 
-def best_of_each(judged: Sequence[Candidate], before: int) -> dict[str, Candidate]:
+def best_of_each(candidates: Sequence[Candidate], before: int) -> dict[str, Candidate]:
     """The best hypothesis of each candidate, by name, those that only their companion carries put behind it.
 
     before: number of terms of the base.
     """
     best: dict[str, Candidate] = {}
-    for new in sorted(judged, key=lambda c: len(c.terms)):
+    for new in sorted(candidates, key=lambda c: len(c.terms)):
         old = best.get(new.name)
         if old is None or _is_better(new, old):
             best[new.name] = new
@@ -158,22 +157,3 @@ def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
                         np.diag([alone[i].variance[i] for i in range(k)]))
     return replace(best, terms=(*others, replace(own, free=own.signature.free)), strength=strength)
 
-
-def _with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], before: float) -> dict[str, Candidate]:
-    """Every candidate with its evidence: nats that it gains over `before`, but no more than its strength says.
-
-    It is at most 0 nats where a parameter lies at a bound: there the effect stands in for another. scatter: of
-    strengths in nominal flights; without one a strength says nothing.
-    """
-    out = {}
-    for name, candidate in best.items():
-        of_its_name = [t for t in candidate.terms if t.name == name]
-        with_random_part = of_its_name[-1].companion
-        own = strength_term(of_its_name[-2:]) if with_random_part else of_its_name[-1]
-        strength = candidate.strength
-        stretched = own.shows_in == MEAN and at_bound(own, strength.mean).any()
-        rarity = np.inf
-        if scatter is not None:
-            rarity = scatter.evidence(name, strength.mean, strength.covariance, strength.half_difference)
-        out[name] = replace(candidate, evidence=min(candidate.gain - before, 0.0 if stretched else rarity))
-    return out

@@ -16,12 +16,14 @@ from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
 from airtouch.gap.naming.forward import Search, State, forward
 from airtouch.gap.naming.judging import Trial, trial_of
+from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.over_prediction import over_prediction_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.policy import WAKE_SHARE
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.thresholds import assumes
+from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
@@ -44,18 +46,23 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     without: effects that are not searched for as ones that come and go.
     """
     trial = trial_of(data)
-    singles = round_of(trial, candidates, None, progress)
-    least = dict.fromkeys(singles, trial.policy.first_gain)
-    search = Search(trial, candidates, singles, least, progress)
+    single_effects = round_of(trial, candidates, None, progress)
+    least_nats = dict.fromkeys(single_effects, trial.policy.first_gain)
+    search = Search(trial, candidates, single_effects, least_nats, progress)
     inference = inference_of(data, list(candidates))
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without)
-    passing = passing_effect(trial, singles, least, without)
+    passing = passing_effect(trial, single_effects, least_nats, without)
     answer = _by_replay(search, forward(search, passing), passing)
-    own_effect_explains = answer.explained and bool(answer.named) and answer.named[0].name not in PACKAGE_EFFECTS
-    if inference is None or own_effect_explains:
+    if inference is None or _own_effect_explains(answer):
         return answer
     return _by_relations(search, inference, without)
+
+
+def _own_effect_explains(answer: Selection) -> bool:
+    """Whether a user's own effect is named first, and nothing is left unexplained."""
+    first = next(iter(answer.named_steps), None)
+    return first is not None and first.name not in PACKAGE_EFFECTS and is_explained(answer)
 
 
 def _by_relations(search: Search, inference: Inference, without: Sequence[str]) -> Selection:
@@ -64,14 +71,14 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str]) 
     The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake
     (ALWAYS_RANDOM holds `downwash` alone), or the likeliest by the relations.
     """
-    answer = selection_by_relations(search.trial, search.candidates, search.singles, inference, search.progress)
-    if answer.explained:
+    answer = selection_by_relations(search.trial, search.candidates, search.single_effects, inference, search.progress)
+    if is_explained(answer):
         return answer
-    passing = passing_effect(search.trial, search.singles, search.least_gain, without)
+    passing = passing_effect(search.trial, search.single_effects, search.least_nats, without)
     if not replay_may_name(passing, inference):
         return answer
     state = forward(search, passing)
-    first = next(iter(state.named), "")
+    first = next(iter(state.names), "")
     if first not in (*ALWAYS_RANDOM, inference.likeliest):
         return answer
     return _by_replay(search, state, passing)
@@ -100,23 +107,25 @@ def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selec
     effects it is no more than nominal flights have.
     """
     trial, policy = search.trial, search.trial.policy
-    if passing is not None and as_in_nominal_flights(trial.data, passing, state.steps):
+    steps = with_leave_one_out_gains(trial, state.steps)
+    if passing is not None and as_in_nominal_flights(trial.data, passing, steps):
         state = forward(search, None)
-    last = state.steps[-1].terms if state.steps else ()
+        steps = with_leave_one_out_gains(trial, state.steps)
+    last = steps[-1].terms if steps else ()
     over_none = nameless_nats(trial, None)
-    over_last_step = nameless_nats(trial, state.steps[-1]) if state.steps else over_none
+    over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
     selection = Selection(
-        singles=state.singles, steps=state.steps, parts=trial.parts, least_gain=state.least_gain,
+        single_effects=state.single_effects, steps=tuple(steps), halves=trial.halves, least_nats=state.least_nats,
         nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
     if not policy.judges_over_prediction:
         return selection
-    return replace(selection, over_prediction=over_prediction_of(trial, selection.chosen))
+    return replace(selection, over_prediction=over_prediction_of(trial, selection.named_hypothesis))
 
 
 def nameless_nats(trial: Trial, base: Candidate | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
-    of_spectra = max(sum(held_out_gains(trial.data, trial.parts, fits)), 0.0)
+    of_spectra = max(sum(held_out_gains(trial.data, trial.halves, fits)), 0.0)
     return of_spectra + clock_left(trial.data, base.terms if base else ())
 

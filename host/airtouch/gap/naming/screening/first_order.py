@@ -12,14 +12,14 @@ import numpy as np
 from airtouch.gap.evidence.data import Data, gap_spectra
 from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import ROUND_TRIP, BlockSet, Problem, problem_of
+from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet, Problem, problem_of
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
 STEP = 0.25  #: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen
-ROUNDS = 3  #: iterations of least squares, each with the weights of what the one before left; chosen
+REWEIGHTINGS = 3  #: least-squares fits, each with the weights of what the one before left; chosen
 NOTHING = 1e-9  #: unit/sqrt(Hz), up to which a change of a spectrum counts as rounding; chosen, far above rounding
-UNBOUNDED = 1e6  #: bound of the scaled parameters of effects beside, larger than any that is fitted; chosen
+UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any that is fitted; chosen
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,21 @@ def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder
     return Remainder(problem, values, residual, extra_power, problem.likelihood(residual, extra_power), cost)
 
 
-def judge_means(data: Data, halves: Sequence[Remainder], terms: Sequence[Term], beside: Sequence[Term] = (),
+def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Term], base: Sequence[Term] = (),
                 ) -> FirstOrder:
     """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
 
-    beside: effects of the base, free to change.
+    base: its effects, free to change.
     """
-    mean, mean_beside = _in_the_replay(terms), _in_the_replay(beside)
-    tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_beside) for i in range(len(t.free))]
-              for half in halves]
+    mean, mean_of_base = _in_the_replay(terms), _in_the_replay(base)
+    tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_of_base) for i in range(len(t.free))]
+              for half in remainders]
     k = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - k)
     gain, fitted, variances = 0.0, [], []
-    for train, test in ROUND_TRIP:
-        x, variance = _least_squares(halves[train], tables[train], bounds)
-        held_out = halves[test]
+    for train, test in TWO_FOLDS:
+        x, variance = _least_squares(remainders[train], tables[train], bounds)
+        held_out = remainders[test]
         moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
         after, cost = without_offsets(held_out.problem, held_out.values + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
@@ -88,15 +88,15 @@ def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
     return [t for t in terms if t.shows_in == MEAN and not t.signature.commands_only]
 
 
-def judge_random(halves: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
+def judge_random(remainders: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
     """Held-out nats of a random effect beside a base, and its scaled strength (k,), the mean of both halves.
 
     The base stays as it is.
     """
     gain, strengths = 0.0, []
-    for train, test in ROUND_TRIP:
-        fitted = strongest(halves[train].problem, term, halves[train].residual, halves[train].extra_power)
-        problem, residual, before = halves[test].problem, halves[test].residual, halves[test].extra_power
+    for train, test in TWO_FOLDS:
+        fitted = strongest(remainders[train].problem, term, remainders[train].residual, remainders[train].extra_power)
+        problem, residual, before = remainders[test].problem, remainders[test].residual, remainders[test].extra_power
         gain += problem.likelihood(residual, before + problem.random_power([fitted])) \
             - problem.likelihood(residual, before)
         strengths.append(fitted.scaled(fitted.values))
@@ -151,7 +151,7 @@ def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[n
     size, columns, constants = len(table), np.array(table), half.problem.offsets
     prior = np.concatenate([np.full(size, PRIOR_UNITS), [c.spread for c in constants]])
     x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.values
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         weights = weights_of(half.problem, values, half.extra_power)
         equations = normal_equations(columns, prior, values, weights, np.concatenate([x, offsets]), constants)
         change, covariance = bounded_step(equations, x, bounds)

@@ -1,7 +1,7 @@
 """Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class RoundStart:
 
     trial: Trial
     base: Candidate | None
-    halves: Sequence[Remainder]
+    remainders: Sequence[Remainder]
 
     @property
     def gain(self) -> float:
@@ -60,8 +60,8 @@ class Screened:
 def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
     fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
-    halves = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.parts)]
-    return RoundStart(trial, base, halves)
+    remainders = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.halves)]
+    return RoundStart(trial, base, remainders)
 
 
 def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
@@ -113,21 +113,21 @@ def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | No
 def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
     """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    judged = judge_means(start.trial.data, start.halves, terms, start.terms)
+    judged = judge_means(start.trial.data, start.remainders, terms, start.terms)
     gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
-    halves = np.array(judged.fitted)[:, :k]
-    strength = Strength(own.among_all(halves.mean(axis=0)),
-                        covariance_among_all(own, np.diag(_variance_of_mean(halves, judged.variances, k))))
+    of_halves = np.array(judged.fitted)[:, :k]
+    strength = Strength(own.among_all(of_halves.mean(axis=0)),
+                        covariance_among_all(own, np.diag(_variance_of_mean(of_halves, judged.variances, k))))
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
                      charges=Charges(variant.choice_cost), strength=strength)
 
 
-def _variance_of_mean(halves: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
+def _variance_of_mean(values: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
     """Variance (k,) of the mean of two values, and no less than half their difference squared.
 
-    halves (2, k): the values; variances (2, k or more): theirs, of which the first k count.
+    values (2, k); variances (2, k or more): theirs, of which the first k count.
     """
-    return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(halves, axis=0)))
+    return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(values, axis=0)))
 
 
 def _only_in_commands(trial: Trial, terms: Terms) -> bool:
@@ -139,27 +139,30 @@ def _only_in_commands(trial: Trial, terms: Terms) -> bool:
 
 
 def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], every_random: bool,
-                 ) -> tuple[list[Candidate], list[PricedVariant]]:
-    """Variants with a random effect: of candidates that promise little as hypotheses, of others those to be fitted.
+                  ) -> tuple[list[Candidate], list[PricedVariant]]:
+    """Variants with a random term: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    1. A candidate is fitted that promises more than HOPELESS nats, by its best variant here or by its best mean effect;
-       every one is if `every_random`.
-    2. Of it the variant is fitted that gains most in screening; where that begins with a mean term, also the best
-       variant with each other mean term that is about as good (ABOUT_AS_GOOD).
-    3. With each of these are fitted the longer variants that begin with the same term.
-    4. Any other candidate is a hypothesis as screened, unless it is among `means`, where it has one already.
+    A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it.
+
+    1. A candidate promises something where its random term or its best mean term gains more than HOPELESS nats; every
+       one counts as such if `every_random`.
+    2. Where its variants begin with a mean term, each is fitted whose mean term is about as good as the best; each of
+       all where no mean term was screened by itself.
+    3. Where they begin with a random term, the best of them is fitted, without companion and with it.
+    4. A candidate that promises nothing is a hypothesis as screened, unless it is among `means`, where it has one
+       already.
 
     means: mean effects judged to first order, best first.
     """
     means_of = _about_as_good(means, len(start.terms) + 1)
     unpromising, to_fit = [], []
-    for name, screened in _screened_random_by_name(start, variants, means_of).items():
-        best = max(screened, key=lambda s: s.gain)
-        mean_promises = name in means_of and means_of[name][0].gain - start.gain > HOPELESS
+    for name in dict.fromkeys(v.name for v in variants):
+        own, good_means = [v for v in variants if v.name == name], means_of.get(name, [])
+        best = max(_screened_random(start, own), key=lambda s: s.gain)
+        mean_promises = bool(good_means) and good_means[0].gain - start.gain > HOPELESS
         if every_random or best.gain > HOPELESS or mean_promises:
-            chosen = [one.variant for one in _best_by_mean_term(screened)]
-            to_fit += [v for one in chosen for v in (one, *_longer(one, variants))]
-        elif name not in means_of:
+            to_fit += _variants_to_fit(best.variant, own, [m.terms[-1] for m in good_means])
+        elif not good_means:
             unpromising.append(_as_judged(start, best))
     return unpromising, to_fit
 
@@ -178,41 +181,29 @@ def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Ca
     return out
 
 
-def _best_by_mean_term(screened: Sequence[ScreenedRandom]) -> list[ScreenedRandom]:
-    """The best variant with each mean term; the best of all where variants have none."""
-    best: list[ScreenedRandom] = []
-    for one in sorted(screened, key=lambda s: -s.gain):
-        first = one.variant.terms[0]
-        if not best or (first.shows_in == MEAN and not any(_same(first, b.variant.terms[0]) for b in best)):
-            best.append(one)
-    return best
-
-
-def _screened_random_by_name(start: RoundStart, variants: Iterable[PricedVariant],
-                             means_of: Mapping[str, Sequence[Candidate]]) -> dict[str, list[ScreenedRandom]]:
-    """By name, the variants of every candidate whose random part stands alone or beside one mean term.
-
-    means_of: the best variants of a mean effect, by name; where there are any, only these count as the mean term.
-    """
-    screened: dict[str, list[ScreenedRandom]] = {}
-    judged: dict[Hashable, tuple[float, np.ndarray]] = {}  # one random term stands beside several mean ones
+def _screened_random(start: RoundStart, variants: Sequence[PricedVariant]) -> list[ScreenedRandom]:
+    """The variants of one effect whose random term stands alone or after a mean one, screened by that random term."""
+    screened, judged = [], {}  # several variants have the same random term
     for variant in variants:
-        name, terms, cost = variant
-        if name in means_of and not any(_same(terms[0], m.terms[-1]) for m in means_of[name]):
+        first, random = variant.terms[0], random_of(variant.terms)[0]
+        if len(variant.terms) > 1 and first.shows_in != MEAN:
             continue
-        if len(terms) == 1 or terms[0].shows_in == MEAN:
-            term = random_of(terms)[0]
-            if term.key not in judged:
-                judged[term.key] = judge_random(start.halves, term)
-            gain, strength = judged[term.key]
-            screened.setdefault(name, []).append(ScreenedRandom(gain - cost, strength, variant))
+        if random.key not in judged:
+            judged[random.key] = judge_random(start.remainders, random)
+        gain, strength = judged[random.key]
+        screened.append(ScreenedRandom(gain - variant.choice_cost, strength, variant))
     return screened
 
 
-def _longer(variant: PricedVariant, variants: Iterable[PricedVariant]) -> list[PricedVariant]:
-    """The variants of the same effect that have more terms and begin with the same one."""
-    return [v for v in variants if v.name == variant.name and len(v.terms) > len(variant.terms)
-            and _same(v.terms[0], variant.terms[0])]
+def _variants_to_fit(best: PricedVariant, variants: Sequence[PricedVariant], good_means: Sequence[Term],
+                     ) -> list[PricedVariant]:
+    """The variants of a promising effect that are fitted.
+
+    best: by its random term; good_means: mean terms about as good as the best, none where none was screened.
+    """
+    if best.terms[0].shows_in != MEAN:
+        return [v for v in variants if _same(v.terms[0], best.terms[0])]
+    return [v for v in variants if not good_means or any(_same(v.terms[0], mean) for mean in good_means)]
 
 
 def _as_judged(start: RoundStart, screened: ScreenedRandom) -> Candidate:

@@ -1,0 +1,47 @@
+"""What to do next, by what the answer leaves open."""
+
+import shlex
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.answer.advice import MISSIONS, collect, steps
+from made_diagnosis import VEHICLE, cell, diagnosis
+
+WITH_GYRO = [SimpleNamespace(rates=())]
+BASELINE = ("nominal.csv",)
+
+
+def advice(answer, flights=WITH_GYRO):
+    return steps(replace(answer, baseline=BASELINE, indistinguishable=()), flights)
+
+
+def test_named_effects_are_switched_on_in_the_simulator():
+    (step,) = advice(diagnosis())
+    words = shlex.split(step.command)
+    assert words[words.index("--vehicle") + 1] == VEHICLE.name
+    assert words[words.index("--effect") + 1] == "imu_bias:acc_x=0.8m/s^2"
+
+
+def test_none_asks_for_nothing_to_be_added():
+    (step,) = advice(diagnosis(verdict="none", effects=()))
+    assert step.text.startswith("Nothing to add") and not step.command
+
+
+@pytest.mark.parametrize("phase", sorted(MISSIONS))
+def test_an_open_gap_is_flown_again_in_its_phase(phase):
+    again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))
+    assert again.command == collect(MISSIONS[phase]) and "--effects-file" in own.command
+
+
+def test_an_open_gap_at_landing_is_flown_again_as_it_was():
+    again, _ = advice(diagnosis([cell("force_z", "landing", 1.0)], "unknown", ()))
+    assert "same flight three times" in again.text and not again.command
+
+
+def test_effects_that_look_alike_come_first_and_what_is_missing_last():
+    answer = replace(diagnosis(), baseline=())
+    alike, switch_on, baseline, gyro = steps(answer, [SimpleNamespace(rates=None)])
+    assert alike.text.startswith("To tell mass from thrust_coefficient: ")
+    assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text

@@ -1,0 +1,42 @@
+"""What the answer is compared with: a wrong effect, which closes nothing, and the vehicle as declared."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.shrink import gap_of
+from airtouch.gap.signatures.signature import WRONG
+from hovers import DOWN, FLOOR, hover, select_from
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """A hover that is pushed down, whose mass is named: data, selection and gap."""
+    selection, data = select_from([hover(1, (0.0, 0.0, -DOWN))], ("mass",))
+    return data, selection, gap_of(data, selection.halves, selection.named_hypothesis)
+
+
+def test_a_wrong_effect_closes_nothing(pushed):
+    data, selection, gap = pushed
+    wrong = control(data, selection, gap)
+    assert wrong.name == WRONG[0] and wrong.shrink.before == gap.shrink.before
+    assert abs(wrong.shrink.share.value) < 0.05 < 0.8 < gap.shrink.share.value
+
+
+def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch):
+    data, selection, gap = pushed
+    monkeypatch.setattr("airtouch.gap.answer.controls.WRONG", ("thrust_coefficient", "mass", "com_offset"))
+    assert control(data, selection, gap).name == "com_offset"
+    monkeypatch.setattr("airtouch.gap.answer.controls.WRONG", ("thrust_coefficient", "mass"))
+    assert control(data, selection, gap) is None
+
+
+def test_the_vehicle_as_declared_is_an_arm_of_its_own(pushed):
+    """Against the same study it closes as much; against none there is one arm."""
+    data, selection, gap = pushed
+    answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
+    assert arms(None, data.flights, selection, answer) == {"declared": gap.shrink}
+    both = arms(FLOOR, data.flights, selection, answer)
+    assert both["calibrated"] == gap.shrink
+    assert both["declared"].share.value == pytest.approx(gap.shrink.share.value, abs=0.02)

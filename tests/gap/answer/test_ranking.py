@@ -1,0 +1,71 @@
+"""The verdict by each of its rules, and the ranking that agrees with it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.answer.ranking import AT_FLOOR, agreeing, ranking_of, verdict_of
+from airtouch.gap.naming.policy import policy_of
+from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.result import Quantity
+from airtouch.gap.signatures.candidates import terms
+from hovers import FLOOR
+
+RECORDED = SimpleNamespace(study=SimpleNamespace(simulated=False))
+POLICY = policy_of(replace(FLOOR, nominal_count=5), 30.0)
+GAINS = {"mass": 200.0, "wind": 40.0, "inertia": 2.0}
+
+
+def candidate(name, gate=()):
+    """A candidate that was not fitted in full, so that the ranking asks for no flights."""
+    term = replace(terms(name)[0], gate=gate)
+    return Candidate(name, (term,), GAINS[name], evidence=GAINS[name], full=False)
+
+
+def selection(named=("mass",), left=4.0, gate=(), by_relations=False):
+    """A selection that names effects, beside which a nameless model or disturbance gains so many nats."""
+    steps = tuple(Step.of(candidate(n, gate)) for n in named)
+    told = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
+    return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left), (None, None),
+                     dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=told)
+
+
+def gap(before):
+    return SimpleNamespace(shrink=SimpleNamespace(before=before, share=Quantity(0.8)))
+
+
+OVER = AT_FLOOR + 0.5
+
+
+@pytest.mark.parametrize(("of", "before", "verdict"), [
+    (selection(), AT_FLOOR, "none"), (selection(left=900.0), AT_FLOOR, "none"),  # no gap
+    (selection(by_relations=True), AT_FLOOR, "effect"),  # the relations decide
+    (selection(gate=(("a.csv", 1.0, 2.0),)), AT_FLOOR, "effect"),  # what comes and goes is outside the gap
+    (selection(left=900.0), OVER, "unknown"), (selection((), left=900.0), OVER, "unknown"),
+    (selection(left=900.0, by_relations=True), AT_FLOOR, "unknown"),
+    (selection(()), OVER, "none"), (selection(), OVER, "effect")])
+def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
+    assert verdict_of(RECORDED, of, gap(before)) == verdict
+
+
+@pytest.mark.parametrize(("of", "verdict", "answer"), [
+    (selection(), "effect", "mass"), (selection(("wind",)), "effect", "wind"), (selection(()), "none", "none"),
+    (selection(left=900.0), "unknown", "unknown")])
+def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
+    ranking = ranking_of(RECORDED, of, gap(OVER), verdict, answer)
+    assert ranking[0].name == answer and ranking[0].probability == max(r.probability for r in ranking)
+    assert sum(r.probability for r in ranking) == pytest.approx(1.0)
+    assert {r.name for r in ranking} == {*GAINS, "none", "unknown"}
+    probabilities = [r.probability for r in ranking]
+    assert probabilities == sorted(probabilities, reverse=True)
+    assert [bool(r.why) for r in ranking] == [False] + [True] * (len(ranking) - 1)
+    assert ranking[0].shrink.value == (0.8 if verdict == "effect" else 0.0), "of one effect named: that of the answer"
+
+
+def test_a_larger_probability_changes_places_with_the_answer():
+    chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
+    assert agreeing(chance, "unknown") == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5}
+    assert agreeing(chance, "mass") == chance
+    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}, "one that comes and goes"

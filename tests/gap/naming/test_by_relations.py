@@ -1,0 +1,97 @@
+"""The effects that the relations of signals name: which variants are fitted, and when the replay is asked instead."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming import select
+from airtouch.gap.naming.by_relations import matching, selection_by_relations, signs_not_shown
+from airtouch.gap.naming.judging import trial_of
+from airtouch.gap.naming.unknown import is_explained
+from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.signatures.candidates import all_candidates
+from hovers import DOWN, FLOOR, candidates_of, hover, scattered, with_a_push
+
+EXPLAINED, OPEN = Against(1.0, 30.0, of_distance=False), Against(90.0, 30.0, of_distance=False)
+
+
+def effect_class(effect, name=None, shape=None):
+    """As much of a class as is asked for here."""
+    return SimpleNamespace(effect=effect, name=name or effect, shape=shape)
+
+
+def inference(classes=(), against=EXPLAINED, likeliest="mass", without_sign=()):
+    """An inference with most evidence for one effect."""
+    evidence = {c.effect: 20.0 for c in classes} | {likeliest: 100.0}
+    return Inference(tuple(classes), evidence, against, without_sign=without_sign)
+
+
+def test_matching_by_parameter():
+    variants = all_candidates()["controller_gain"]
+    (only,) = matching(effect_class("controller_gain", "controller_gain attitude"), variants)
+    assert only[0].free == ("attitude",)
+
+
+def test_matching_by_shape():
+    variants = all_candidates()["weak_motor"]
+    (only,) = matching(effect_class("weak_motor", shape=3.0), variants)
+    assert only[0].values["rotor"] == 3.0
+    assert matching(effect_class("weak_motor"), variants) == list(variants), "of any shape"
+
+
+def test_selection_has_a_step_for_each_effect_with_its_evidence():
+    """A push and loud noise: both are fitted, each beside those before it, and named whatever they gain."""
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN), louder=1.5)])
+    told = inference([effect_class("imu_noise"), effect_class("mass")], likeliest="imu_noise")
+    selection = selection_by_relations(trial_of(data), candidates_of(["mass", "imu_noise"]), {}, told, lambda _: None)
+    assert [(s.name, s.is_named, s.evidence) for s in selection.steps] == [("imu_noise", True, 100.0),
+                                                                        ("mass", True, 20.0)]
+    assert {t.name for t in selection.last_step.terms} == {"mass", "imu_noise"}
+    assert selection.inference is told and is_explained(selection)
+
+
+def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
+    selection = SimpleNamespace(inference=inference(without_sign=("mass", "inertia")),
+                                named_steps=(SimpleNamespace(name="mass"),))
+    (note,) = signs_not_shown(selection)
+    assert note.startswith("mass: ")
+    assert signs_not_shown(SimpleNamespace(inference=None)) == []
+
+
+@pytest.fixture
+def relations(monkeypatch):
+    """Makes the relations of signals hold for the flights, and give an inference."""
+    def hold(told):
+        monkeypatch.setattr(select, "inference_of", lambda data, names: told)
+    return hold
+
+
+PUSHED = Data(scattered(), [with_a_push(9.0, 15.0)])  #: a push of some seconds, which a wake explains
+
+
+@pytest.mark.parametrize("against", [EXPLAINED, OPEN])
+def test_relations_name_what_always_acts(relations, against):
+    """The replay is not asked where nothing comes and goes, explained or not."""
+    told = inference([effect_class("mass")], against)
+    relations(told)
+    selection = select.select(Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass"]))
+    assert selection.inference is told and [s.name for s in selection.named_steps] == ["mass"]
+    assert selection.single_effects["mass"].gain > 100.0
+
+
+@pytest.mark.parametrize(("against", "likeliest", "by_replay"), [
+    (EXPLAINED, "downwash", False), (OPEN, "downwash", True), (OPEN, "mass", True)])
+def test_replay_names_a_wake_that_relations_leave_open(relations, against, likeliest, by_replay):
+    relations(inference([effect_class("mass")], against, likeliest))
+    selection = select.select(PUSHED, candidates_of(["mass"]))
+    assert (selection.inference is None) is by_replay
+    assert [s.name for s in selection.named_steps] == (["downwash"] if by_replay else ["mass"])
+
+
+def test_replay_names_no_wind_that_is_not_the_likeliest(relations, monkeypatch):
+    passing = select.passing_effect
+    monkeypatch.setattr(select, "passing_effect", lambda *arguments: replace(passing(*arguments), name="wind"))
+    relations(inference([effect_class("mass")], OPEN))
+    assert select.select(PUSHED, candidates_of(["mass"])).inference is not None

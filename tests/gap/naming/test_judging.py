@@ -1,0 +1,61 @@
+"""One hypothesis judged: the two halves, a parameter at its bound, covariances, and what a choice costs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.evidence.clock import loss
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming import judging
+from airtouch.gap.naming.judging import PricedVariant, covariance_among_all
+from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signatures.candidates import all_candidates, terms
+from hovers import DOWN, FLOOR, hover
+
+
+def test_at_bound():
+    mass = all_candidates()["mass"][0][0]
+    low, high = mass.bounds()
+    near = judging.NEAR_BOUND
+    for x, at in ((high, True), (high * (near + 1e-6), True), (high * 0.99, False), (low, True), (0.99 * low, False),
+                  (0.0 * high, False)):
+        assert judging.at_bound(mass, x).tolist() == [at]
+
+
+def test_halves_share_no_block_and_leave_none_out():
+    three = Data(FLOOR, [hover(8), hover(9), hover(10, length_s=3.0)])
+    first, second = judging.halves(three)
+    for (i, state, blocks), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
+        assert (i, state) == (j, of) and len(blocks) == len(three.first[i][state]) and (blocks ^ other).all()
+    (_, _, blocks), *_, (_, _, short) = first.pieces
+    assert blocks[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
+    assert 0 < short.sum() <= len(short), "a short flight is in both halves where it can be"
+    five = Data(FLOOR, [hover(k) for k in range(5)])
+    first, second = ({i for i, _, chosen in part.pieces if chosen.all()} for part in judging.halves(five))
+    assert (first, second) == ({0, 2, 4}, {1, 3})
+    assert all(chosen.dtype == bool for part in judging.halves(five) for _, _, chosen in part.pieces)
+    assert {r for _, r, _ in judging.halves(three)[0].pieces} == {AIR}
+
+
+def test_covariance_of_a_parameter_that_is_not_free_is_infinite():
+    _, *variants = all_candidates()["controller_gain"]
+    (attitude,) = next(t for t in variants if t[0].free == ("attitude",))
+    expected = np.diag([np.inf, 2.0, np.inf, np.inf])
+    np.testing.assert_array_equal(covariance_among_all(attitude, np.array([[2.0]])), expected)
+    offset = terms("com_offset")[0]
+    both = np.array([[2.0, -1.0], [-1.0, 3.0]])
+    np.testing.assert_array_equal(covariance_among_all(offset, both), both)
+
+
+@pytest.mark.parametrize("beside_mass", [False, True])
+def test_choice_of_a_clock_effect_is_charged(beside_mass):
+    """What lost rows gain, less the cost of the choice, alone and beside an effect that shows in the spectra."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    data = Data(FLOOR, [replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)])
+    trial = judging.trial_of(data)
+    mass = judging.cross_validated(trial, PricedVariant("mass", tuple(terms("mass")), 0.25), None)
+    base = mass if beside_mass else None
+    both = judging.cross_validated(trial, PricedVariant("packet_loss", tuple(terms("packet_loss")), 0.5), base)
+    assert both.gain - (base.gain if base else 0.0) == pytest.approx(loss(data).gain - 0.5)
+    assert both.charges.choice_cost == (0.75 if beside_mass else 0.5)
