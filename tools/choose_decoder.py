@@ -124,7 +124,7 @@ def main() -> None:
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
     parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
                         help="decode the flights without this sensor")
-    parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/sensor_figures.py")
+    parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/detectors/sensor_figures.py")
     options = parser.parse_args()
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
     if not flights:

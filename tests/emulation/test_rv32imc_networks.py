@@ -23,7 +23,7 @@ from airtouch.kernels.rolling import fixed_scale, rolling_size, run_rolling
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.kernels.stream import run_stream
 from airtouch.reference.networks.int8_network import quantise
-from tools import gap8_counts
+from tools.firmware import gap8_counts
 
 BUDGET = tomllib.loads(Path(__file__).with_name("gap8_budget.toml").read_text())
 CORES = (1, 2, 4, 8)

@@ -1,12 +1,13 @@
-"""tools/gap_training.py: what is flown and tested, and its figures, against closed forms and other ways round."""
+"""What `tools/diagnosis/gap_training.py` flies and tests, and its figures, against closed forms."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gap_passes
+import gap_training
 from airtouch import logs
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
@@ -19,10 +20,6 @@ from airtouch.logs.flight_log import PWM
 from airtouch.simulation import batch, effects, replay, scenario
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
-import gap_passes  # noqa: E402
-import gap_training  # noqa: E402
 
 
 def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):

@@ -140,8 +140,8 @@ def test_each_stage_is_what_it_adds(tmp_path):
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, str(ROOT / "tools" / "power.py"), *map(str, arguments)], capture_output=True,
-                          text=True)
+    command = [sys.executable, str(ROOT / "tools/power/power.py"), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
 
 
 def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):

@@ -1,4 +1,4 @@
-// Logs the power of a Crazyflie with an INA219 and any Arduino, as CSV over the serial port, for tools/power.py.
+// Logs the power of a Crazyflie with an INA219 and any Arduino, as CSV over the serial port, for tools/power/power.py.
 //
 // Wiring: battery + to VIN+, VIN- to the drone's battery +, grounds together; SDA and SCL to the Arduino's. The
 // INA219's bus voltage is then the drone's own. Library: "Adafruit INA219", from the library manager.

@@ -94,7 +94,7 @@ def gap8_mw(network: dict) -> Estimate:
         cycles = GAP8_CORES * float(network["cycles_8"]) if "window_instructions" in network else count
     except (KeyError, TypeError, ValueError):
         raise AirTouchError("the GAP8's budget has no instructions and cycles of a network; count again with "
-                            "python tools/gap8_figures.py --counts") from None
+                            "python tools/firmware/gap8_figures.py --counts") from None
     low, high = sorted(1e3 * n * SAMPLE_RATE_HZ * GAP8_J for n in (min(cycles, count), count))
     return Estimate(low, high, count)
 

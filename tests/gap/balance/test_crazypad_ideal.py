@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import crazypad_figures as pad
 import gap_crazypad_balance as balance
 import gap_crazypad_ideal as ideal
+from crazypad import figures as pad
 
 
 def test_millimetres_of_a_condition():

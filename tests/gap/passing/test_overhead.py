@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 import airtouch.gap.diagnosis as module
 import gap_real
+import recorded_cases
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
@@ -125,8 +126,8 @@ def test_where_no_wake_is_judged_a_note_says_that_the_partner_was_not_used(monke
 
 def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights, monkeypatch):
     monkeypatch.setattr(gap_real, "diagnose", partial(diagnose, without=LOOP))
-    cases = [c for c in gap_real.swarm(flights, "build") if c.flight.endswith("downwash_cf102d19_008.csv.gz")]
-    case, = gap_real.with_partners(cases, flights)
+    cases = [c for c in recorded_cases.swarm(flights, "build") if c.flight.endswith("downwash_cf102d19_008.csv.gz")]
+    case, = recorded_cases.with_partners(cases, flights)
     assert case.partner
     diagnosis = gap_real.diagnose_case(case)
     assert gap_real.answer(diagnosis) == "downwash"

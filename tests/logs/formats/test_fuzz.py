@@ -1,16 +1,11 @@
 """A short run of `tools/fuzz_logs.py`: mutated files of every format, always the same ones."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "tools"))
 
 import fuzz_logs
 from airtouch import logs
 from airtouch.logs.files import parse
-from log_fuzzing import sound, walk
+from checks.log_fuzzing import sound, walk
 
 COUNT = 80  #: inputs of each format; `tools/fuzz_logs.py` runs more
 

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch import logs
 from skips import needs
-from tools import days_apart
+from tools.calibration import days_apart
 from twin_courses import PLAIN, made_course
 
 pytestmark = needs("sklearn")

@@ -6,7 +6,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-FILE = "best_sensors.json"  #: beside the models, written by tools/sensor_figures.py
+FILE = "best_sensors.json"  #: beside the models, written by tools/detectors/sensor_figures.py
 
 
 @cache

@@ -22,7 +22,7 @@ from airtouch.gap.signatures.term import Term
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
 RESTARTS = 12  #: of a fit of several parameters, at most
 #: fraction of a parameter by which the replay may be wrong: strong effects in eight simulated flights came out up to
-#: 0.26 % off, rms 0.14 % (`python tools/replay_error.py`)
+#: 0.26 % off, rms 0.14 % (`python tools/simulation/replay_error.py`)
 REPLAY_ERROR = 0.002
 #: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong; chosen
 MODEL_ERROR = 0.1

@@ -20,7 +20,7 @@ from airtouch.gap.balance.priors import PRIORS, Priors
 
 #: power of unsteadiness (1/Hz) and heave (m^2/s^4/Hz) for one (m/s)^2 of corrected velocity, sideways and upwards:
 #: CrazyPAD's building conditions, 73 flights. E8 and E9 alone: 10^-1.65 and 10^-1.59, 10^2.16 and 10^2.17
-#: (`python tools/gap_crazypad.py FLIGHTS --corrections`)
+#: (`python tools/diagnosis/gap_crazypad.py FLIGHTS --corrections`)
 ANSWER = 10.0 ** np.array([-1.62, 2.17])
 BALANCE, POWER = slice(0, 4), slice(4, 6)  #: of the six numbers of a pattern that are judged
 

@@ -1,8 +1,8 @@
 """What the judgement of a hover takes as known beforehand, of vehicles and of defects.
 
 The values without another source were chosen with CrazyPAD's conditions in view (host/docs/gap-crazypad.md). What the
-answer loses where some of them are chosen anew without the condition judged: `python tools/gap_crazypad.py FLIGHTS
---leave-one-out`.
+answer loses where some of them are chosen anew without the condition judged: `python
+tools/diagnosis/gap_crazypad.py FLIGHTS --leave-one-out`.
 """
 
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ class Priors:
     nominal_flights: flights that this scatter is worth beside that of the baseline flights; chosen.
     maintenance (4,): standard deviations by which the balance differs besides after maintenance, as another set of
     propellers has another torque. There is maintenance before every defect, and before half of the flights without one.
-    It is what 16 of CrazyPAD's building conditions differ by beyond their cuts (`python tools/gap_crazypad_balance.py
-    FLIGHTS`).
+    It is what 16 of CrazyPAD's building conditions differ by beyond their cuts (`python
+    tools/diagnosis/gap_crazypad_balance.py FLIGHTS`).
     freedom: degrees of freedom of the Student law of the balance, as a set of propellers may be far off; chosen.
     thrust_loss: standard deviation of the half-normal prior of the fraction of thrust that a rotor loses; chosen.
     added_mass: the same of an added fraction of the mass; chosen.
@@ -51,8 +51,8 @@ class Priors:
     reach: farthest place of a weight, over the arm; chosen.
     shift_m: standard deviation of the normal prior of a centre of mass that moved; chosen.
     damaged: unsteadiness and heave with a damaged rotor, rounded from CrazyPAD's building conditions (`python
-    tools/gap_crazypad.py FLIGHTS --corrections`): 18 of rotors 0.12 +- 0.25 and -0.20 +- 0.19. Four of weights, on tape
-    or a thread, -0.03 +- 0.11 and 0.07 +- 0.10, which is nothing: a weight is STEADY.
+    tools/diagnosis/gap_crazypad.py FLIGHTS --corrections`): 18 of rotors 0.12 +- 0.25 and -0.20 +- 0.19. Four of
+    weights, on tape or a thread, -0.03 +- 0.11 and 0.07 +- 0.10, which is nothing: a weight is STEADY.
     unknown: standard deviation of each number of the balance under a nameless change; chosen.
     """
 

@@ -1,4 +1,4 @@
-"""The flights of `airtouch gap demo`, made by the project's own simulator (`python tools/gap_example.py`)."""
+"""The flights of `airtouch gap demo`, simulated by `python tools/simulation/gap_example.py`."""
 
 import tomllib
 from pathlib import Path

@@ -7,7 +7,7 @@ news only as far as its strength exceeds what nominal flights show of the same e
 The variance of a parameter's apparent strength has a scaled inverse chi-square prior
 (Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6) from the table
 `nominal_scatter.toml`, of one class of vehicles, and is updated by the baseline flights;
-the class is the one that these fit best (`scatter_estimates`). `tools/nominal_scatter.py`
+the class is the one that these fit best (`scatter_estimates`). `tools/calibration/nominal_scatter.py`
 makes the table.
 """
 

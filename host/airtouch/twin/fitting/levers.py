@@ -22,7 +22,7 @@ VEHICLE, MISSION = "vehicle", "mission"
 #: signs of rotors 1 to 4 in each direction of trim
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"  #: unit of a trim: fraction of a rotor's thrust
-#: kg m², of a Crazyflie's rotor and propeller: `python tools/rotor_inertia.py
+#: kg m², of a Crazyflie's rotor and propeller: `python tools/calibration/rotor_inertia.py
 #: ../shared/flights/imrclab/brushed_jana04.csv.gz` prints 4.1e-8
 ROTOR_INERTIA = 4e-8
 #: Hz, corner of the low-pass in the Crazyflie's firmware through which the logged acceleration passes; fits gave 33 and

@@ -1,0 +1,153 @@
+"""The table of labelled flights: no flight scored is known, a run goes on, draws add up."""
+
+import sys
+
+import pytest
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.detector.evaluation.data.dataset import Condition
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
+from airtouch.errors import AirTouchError
+from airtouch.twin import adapt
+from made_flight import SMALL, made_flight
+from tools.detectors import labelled_flights
+
+
+@pytest.fixture
+def house(tmp_path, monkeypatch):
+    """A folder of four made flights on two days, and a `best` that trains in a moment."""
+    pytest.importorskip("tensorflow")
+    monkeypatch.setattr(best, "Recipe", lambda: SMALL)
+    folder = tmp_path / "flights"
+    folder.mkdir()
+    for i in range(4):
+        logs.write(made_flight(i), folder / f"f{i}.csv")
+    (folder / "manifest.csv").write_text("file,day,speed_mps\n" + "".join(f"f{i}.csv,{i % 2},0.3\n" for i in range(4)))
+    return folder
+
+
+def run(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["labelled_flights.py", *map(str, arguments)])
+    labelled_flights.main()
+
+
+def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, monkeypatch, capsys):
+    trained, start = [], best.fit([made_flight(9)], recipe=SMALL)
+    start.save(tmp_path / "start.npz")
+
+    def fit(flights, **_):
+        """No training: which flights a model would know is what counts here."""
+        trained.append({log.source for log in flights})
+        return start
+
+    monkeypatch.setattr(best, "fit", fit)
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 2, "--seeds", 1, "--steps", SMALL.steps, "--alone-steps", SMALL.steps)
+    run(monkeypatch, *call)
+    assert len(trained) == 8 and all(len(names) == 1 for names in trained)
+    days = [int(next(iter(names)).split("/")[-1][1]) % 2 for names in trained]
+    assert days == [1, 0] * 4, "day 0 is scored by a model of a flight of day 1, and the other way round"
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ") and "---" not in line][1:]
+    assert [row.split(" | ")[0] for row in rows] == ["| as it is", "| and 1 labelled", "| 1 labelled alone"]
+    assert [row.split(" | ")[1:3] for row in rows] == [["1", "4 / 8"], ["2", "4 / 8"], ["2", "4 / 8"]]
+    run(monkeypatch, *call)
+    assert len(trained) == 8, "what is done is not done again"
+
+
+def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monkeypatch):
+    """Three flights of another folder beside the one of the pool: training goes on from the model with all four."""
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    for i in range(3):
+        logs.write(made_flight(20 + i), beside / f"g{i}.csv")
+    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
+    fits, fit = [], best.fit
+    monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
+    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: fits.append((len(flights), o)) or fit(flights, *a, **o))
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--speed", 0.3)
+    run(monkeypatch, *call, "--beside", beside)
+    assert [count for count, _ in fits] == [4, 4] and all(o["start"] is not None for _, o in fits)
+    assert all(o["emphasis"] == [3.0, 1.0, 1.0, 1.0] for _, o in fits)
+    with pytest.raises(SystemExit, match="no --twin"):
+        run(monkeypatch, *call, "--beside", beside, "--twin", tmp_path)
+
+
+def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monkeypatch, capsys):
+    """One labelled flight, the other of its day without down range; the scored day is in neither training."""
+    start = best.fit([made_flight(9)], recipe=SMALL)
+    start.save(tmp_path / "start.npz")
+    monkeypatch.setattr(labelled_flights, "twin_flights",
+                        lambda folder, pool: adapt.SimulatedFlights([made_flight(20)], [None]))
+    taught, begun = [], []
+
+    def self_train(trainer, teacher, labelled, unlabelled, progress=None):
+        taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in unlabelled]))
+        begun.append(trainer.start)
+        assert all(not f.labelled for f in unlabelled)
+        return teacher
+
+    monkeypatch.setattr(adapt.Trainer, "self_train", self_train)
+    trained = []
+    monkeypatch.setattr(best, "fit", lambda flights, *_, **__: trained.append(len(flights)) or start)
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--unlabelled")
+    run(monkeypatch, *call, "--twin", tmp_path)
+    late = [pair for pair in taught if pair[1]]
+    assert sorted(sorted(a + b) for a, b in late) == [["f0.csv", "f2.csv"], ["f1.csv", "f3.csv"]]
+    assert trained == [2, 2], "the last row goes on from the models of the row before"
+    assert "| and 1 labelled, the others without labels | 1 | 4 / 8 |" in capsys.readouterr().out
+    assert begun == [None] * 4, "random weights with a twin"
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    logs.write(made_flight(21), beside / "g.csv")
+    run(monkeypatch, *call, "--speed", 0.3, "--beside", beside)
+    assert all(x is not None for x in begun[4:]) and len(begun) == 8, "the given model's, beside other flights"
+    with pytest.raises(SystemExit, match="give --twin or --beside"):
+        run(monkeypatch, *call)
+
+
+def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
+    best.fit([made_flight(1)], recipe=SMALL).save(tmp_path / "start.npz")
+    with pytest.raises(AirTouchError, match="was trained on this flight"):
+        run(monkeypatch, house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out")
+
+
+def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
+    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
+    with pytest.raises(SystemExit, match="2 twins for 1 models"):
+        run(monkeypatch, house, "--start", tmp_path / "start.npz", "--twin", "a", "--twin", "b", "--by", "day",
+            "--out", tmp_path / "out")
+
+
+def test_draws_of_a_flight_add_up():
+    edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
+    score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
+    both = labelled_flights.merge([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
+    assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
+        ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
+    assert both[0].windows == (2, 4, 6, 8)
+
+
+def test_missed_edges_are_counted_by_height():
+    hit_edge, missed_edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
+    low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)
+                 for h, edges in (("low", (hit_edge, hit_edge)), ("h82", (hit_edge, missed_edge))))
+    assert labelled_flights.missed_by_height([low, high, high]) == "h82 2/4, low 0/2"
+    assert labelled_flights.missed_by_height([FlightScore("a", Condition(), (missed_edge,), (), 1, 30.0)]) == "-"
+
+
+def test_false_edges_are_counted_by_place():
+    edges = (EdgeScore("entry", 100), EdgeScore("exit", 200))
+    scores = [FlightScore("a", Condition(), edges, (20, 90, 150, 200, 300, 400), 6, 30.0),
+            FlightScore("b", Condition(), edges, (), 0, 30.0), FlightScore("c", Condition(), (), (5,), 1, 30.0)]
+    assert labelled_flights.false_by_place(scores) == "3 / 1 / 3"
+
+
+def test_smaller_draws_lie_within_larger_ones():
+    pool = [made_flight(0, 500) for _ in range(9)]
+    small, large = (labelled_flights.draw_flights(pool, k, draw=3) for k in (2, 5))
+    assert all(any(a is b for b in large) for a in small)
+    with pytest.raises(AirTouchError, match="ask for fewer"):
+        labelled_flights.draw_flights(pool, 10, 0)

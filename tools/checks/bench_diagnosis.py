@@ -1,0 +1,60 @@
+"""Seconds of `airtouch gap diagnose` of the packaged flight of 25 s, four baseline flights, JSON and report.
+
+    python tools/checks/bench_diagnosis.py [--runs 5]
+
+Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles: with the first
+flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else should run
+beside it.
+"""
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from importlib import resources
+from pathlib import Path
+
+from airtouch.gap.nominal.kept_scatter import VARIABLE
+
+
+def seconds(processors: set[int], out: Path, cache: str) -> float:
+    """Wall time of one diagnosis on some processors; cache: folder of the baselines' scatters, empty for none."""
+    example = resources.files("airtouch.gap.example")
+    baseline = [str(example / f"nominal_{i}.csv.gz") for i in range(4)]
+    command = [sys.executable, "-m", "airtouch", "gap", "diagnose", str(example / "real.csv.gz"),
+               "--baseline", *baseline, "--json", str(out / "it.json"),
+               "--report", str(out / "it.html"), "--force"]
+    start = time.perf_counter()
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, VARIABLE: cache},
+                   preexec_fn=lambda: os.sched_setaffinity(0, processors))
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    """Time it and print medians."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=5)
+    runs = parser.parse_args().runs
+    if runs < 1:
+        parser.error("--runs must be at least 1")
+    every = os.sched_getaffinity(0)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        cache_folder = str(out / "cache")
+        rows = {f"{flight} flight, {name}": (processors, cache)
+                for flight, cache in (("first", ""), ("further", cache_folder))
+                for name, processors in ((f"{len(every)} processors", every), ("1 processor", {min(every)}))}
+        print("warming up: the first time compiles", file=sys.stderr, flush=True)
+        seconds(every, out, cache_folder)
+        rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
+                  for _ in range(runs)]
+    for row in rows:
+        column = [times[row] for times in rounds]
+        print(f"{row}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")
+
+
+if __name__ == "__main__":
+    main()

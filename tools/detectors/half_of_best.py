@@ -1,0 +1,59 @@
+"""How much `best` hangs on which half of the samples it computes at: `python tools/detectors/half_of_best.py [FOLDER]`.
+
+`best` computes at every second sample. A log that begins one sample later makes it compute at the others, which
+parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean flights.
+"""
+
+import argparse
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.logs.flight_log import ACC_WORLD, FlightLog
+
+FOLDS = ("0", "1", "2")  #: of the manifest, on which numbers may be chosen
+CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same; no source: round number
+
+
+def without_first_sample(log: FlightLog) -> FlightLog:
+    """The log without its first sample."""
+    return FlightLog({name: values[1:] for name, values in log.columns.items()}, log.meta)
+
+
+def turn(log: FlightLog) -> FlightLog:
+    """The same flight at a heading of 90 degrees more, as a log of world axes would show it."""
+    x, y, _ = ACC_WORLD
+    return FlightLog({**log.columns, x: -log[y], y: log[x]}, log.meta)
+
+
+def same(one: list, other: list, shift: int = 0) -> bool:
+    """Whether two lists of edges have the same kinds in the same order, each within CLOSE samples."""
+    return [e.kind for e in one] == [e.kind for e in other] and all(
+        abs(a.sample - b.sample - shift) <= CLOSE for a, b in zip(one, other, strict=True))
+
+
+def main(folder: Path) -> None:
+    """Read, detect twice, and print how often the edges are the same."""
+    with open(folder / "manifest.csv") as file:
+        chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
+    halves, headings = [], []
+    for name in chosen:
+        log = logs.read(folder / name)
+        edges = best.run(log).edges
+        halves.append(same(edges, best.run(without_first_sample(log)).edges, 1))
+        if log.has(*ACC_WORLD):
+            headings.append(same(edges, best.run(turn(log)).edges))
+    for what, results in (("a log one sample shorter at its start", halves),
+                          ("a heading of 90 degrees more", headings)):
+        print(f"{what}: the same edges within {CLOSE / 100:.1f} s in {np.sum(results)} of {len(results)} flights")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+    main(parser.parse_args().folder)

@@ -1,0 +1,54 @@
+"""What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
+of.
+
+    python tools/choose_decoder.py out/folds --json out/all.json
+    python tools/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
+    airtouch evaluate ../shared/flights/airtouch-november --speed 0.3 --json out/november.json
+    python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
+        rates=out/rates.json=folds acceleration=out/november.json="another month"
+
+`out/folds` and `out/any` are what `airtouch crossval` kept, the second with --any-sensor. All figures are of flights
+that neither the weights nor the decoder's settings have seen; the text after the second = says which.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from airtouch.detector.shared import sensors
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+
+FILE = Path(__file__).parents[2] / "host" / "airtouch" / "models" / "best_sensors.json"  #: where the figures go
+#: figures that the notes use, by their names in a score's JSON
+FIGURES = ("edges", "missed", "false_per_minute", "mean_abs_error_s")
+
+
+def figures(path: Path, where: str) -> dict[str, float | str]:
+    """The figures that the notes use. Raises AirTouchError for another file, and for flights that the model knew."""
+    try:
+        table = json.loads(path.read_text())
+        if table.get("in_training"):
+            raise AirTouchError(f"{path}: the model was trained on these flights; score others")
+        return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise AirTouchError(f"{path}: not the JSON of tools/choose_decoder.py or `airtouch evaluate`: "
+                            f"{error}") from None
+
+
+def main() -> None:
+    """Read, check, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pairs", nargs="+", metavar="NAME=JSON=WHERE",
+                        help="all, and each sensor that may be missing")
+    parser.add_argument("--out", type=Path, default=FILE)
+    options = parser.parse_args()
+    content = {name: figures(Path(path), where) for name, path, where in (pair.split("=") for pair in options.pairs)}
+    if set(content) != {"all", *sensors.SENSORS}:
+        raise SystemExit(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
+    write_bytes((json.dumps(content, indent=1) + "\n").encode(), options.out, force=True)
+    print(f"written: {options.out}")
+
+
+if __name__ == "__main__":
+    main()

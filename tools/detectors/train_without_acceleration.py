@@ -1,0 +1,74 @@
+"""Train the detector that serves logs without acceleration: recorded flights, simulated edges over shorter platforms.
+
+    python tools/detectors/train_without_acceleration.py ../shared/flights/airtouch --twin twin012 --out without.npz
+        [--free-air FOLDER] [--hold-out FOLD] [--least 0.3] [--seed 0] [--force]
+
+The twin's edges are laid over the flights' free air as `airtouch adapt` does, but its platforms are 0.3 to 1 times as
+long as the recorded ones: a detector of recorded passes alone misses shorter ones of another month. Acceleration is
+left out of all flights; recorded and simulated flights have half of the crops each. --hold-out: not trained on the
+flights of this fold of the manifest, for a cross-validation.
+"""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from airtouch import vehicle
+from airtouch.detector import best
+from airtouch.detector.best import free_air
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.evaluation import crossval
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.shared import sensors
+from airtouch.errors import in_one_line
+from airtouch.logs.files import check_free
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import scenario
+from airtouch.twin import adapt, files
+from airtouch.twin.recorded.missions import shorten
+
+COMMAND = "tools/detectors/train_without_acceleration.py"  #: in the model's metadata
+ABSENT = ("acceleration",)  #: sensors that the detector does without
+
+
+def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightLog], least: float,
+        seed: int) -> BestModel:
+    """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
+    scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
+    twin_flights, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
+    recorded, simulated = ([sensors.without(log, ABSENT) for log in logs]
+                           for logs in ([f.log for f in flights], twin_flights.logs))
+    own = [None] * len(recorded)
+    weights = [len(simulated) / len(recorded)] * len(recorded) + [1.0] * len(simulated)
+    return best.fit([*recorded, *simulated], seed, pseudo_labels=[*own, *twin_flights.edges], emphasis=weights,
+                    free_air=air, decoder=adapt.DECODER, steps=adapt.STEPS["scratch"], command=COMMAND,
+                    lag_of=(recorded, own))
+
+
+def main() -> None:
+    """Read, train, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--twin", type=Path, required=True, help="folder of `airtouch twin`")
+    parser.add_argument("--free-air", type=Path, action="append", default=[], help="folder of flights without edges")
+    parser.add_argument("--hold-out", type=int, metavar="FOLD")
+    parser.add_argument("--least", type=float, default=0.3, help="of a platform's length (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--force", action="store_true")
+    options = parser.parse_args()
+    check_free(options.out, options.force)
+    listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]
+    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
+    if left_out:
+        raise SystemExit(f"not usable: {left_out[0][1]}")
+    air = free_air.read(options.free_air) if options.free_air else []
+    flights = [adapt.LoadedFlight(f, readable[f.path]) for f in listed]
+    model = fit(flights, options.twin, air, options.least, options.seed)
+    model.save(options.out, options.force)
+    print(f"written: {options.out}")
+
+
+if __name__ == "__main__":
+    with in_one_line("train_without_acceleration"):
+        main()

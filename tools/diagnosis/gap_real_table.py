@@ -1,0 +1,63 @@
+"""The table of `gap_real.py`: what each diagnosis says first, counts by row and truth, lift, CrazyPAD's figures.
+
+A case is a dict: row, truth, condition, flight and, from its diagnosis, verdict, effects and seconds.
+"""
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+import gap_lift
+from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.signatures.alike import interchangeable
+from crazypad import figures as pad
+
+COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
+
+
+def answer(case: dict) -> str:
+    """What a diagnosis says first, in the words of its row's truths."""
+    if case["row"] == "crazypad":
+        return pad.answer(case)[0]
+    if case["verdict"] != "effect":
+        return case["verdict"]
+    first = case["effects"][0]
+    if case["row"] == "fan" and first["name"] in COMES_AND_GOES and first.get("seconds"):
+        return "comes and goes"
+    if case["row"] == "peers" and interchangeable(first["name"], case["truth"]):
+        return case["truth"]
+    return first["name"]
+
+
+def print_table(cases: list[dict], folder: Path) -> None:
+    """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
+    table = defaultdict(lambda: defaultdict(int))
+    for c in cases:
+        kind = f"{c['row']}, {c['condition']}" if c["row"] in ("swarm", "nominal") else c["row"]
+        peers = c["row"] == "peers"
+        word = "right" if peers and answer(c) == c["truth"] else answer(c)
+        table[kind, "any effect" if peers else c["truth"]][word] += 1
+    print("| flights | truth | right | every answer |\n|---|---|---|---|")
+    for (row, truth), answers in sorted(table.items()):
+        n, hits = sum(answers.values()), answers["right" if row == "peers" else truth]
+        share = wilson(hits, n)
+        counts = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]) if k)
+        print(f"| {row} | {truth} | {hits} of {n} [{share['low']:.0%}, {share['high']:.0%}] | {counts} |")
+    near = [gap_lift.close(c, folder / "neuralswarm") for c in cases
+            if (c["row"], c["truth"]) == ("swarm", "ground_effect")]
+    if near:
+        share = wilson(sum(near), len(near))
+        print(f"neural-swarm, lift within {gap_lift.CLOSE:.0%} of the measured at 2 and 4 cm: "
+              f"{sum(near)} of {len(near)} [{share['low']:.0%}, {share['high']:.0%}]")
+    seconds = [c["seconds"] for c in cases if "seconds" in c]
+    if seconds:
+        middle, most = np.quantile(seconds, [0.5, 0.9])
+        print(f"{len(seconds)} diagnoses: {middle:.0f} s in the middle, {most:.0f} s at most in nine of ten")
+    pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
+    if pads:
+        figures = {"family, balanced": pad.balanced_accuracy, "only damaged rotors named": pad.only_damaged_rotors,
+                   "severity, Spearman": pad.severity}
+        for text, figure in figures.items():
+            low, high = pad.interval(pads, figure)
+            print(f"CrazyPAD, {len(pads)} flights: {text} {figure(pads):.2f} (90 % interval {low:.2f} to {high:.2f})")

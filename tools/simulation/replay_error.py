@@ -1,0 +1,54 @@
+"""By how much the replay errs on strong effects, where chance is small: `named_effects.REPLAY_ERROR`.
+
+    python tools/simulation/replay_error.py    # a minute: eight simulated flights against five nominal ones
+
+Weak motors of 5 to 16 % and masses of 5 to 20 % are switched on in the scenario `diagnosis`, one a flight, and fitted.
+"""
+
+import argparse
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.gap.diagnosis import diagnose_with_study
+from airtouch.gap.flights.flight import ready_flights
+from airtouch.gap.sealed.make import SCENARIO, VEHICLE, stripped, study_of
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import batch
+
+NOMINAL_SEED, FIRST_SEED = 8801, 8900  #: of the nominal flights, and of the first flight with an effect; chosen
+NOMINAL = 5  #: flights
+#: effect, its parameters, and which of them is compared
+CASES = [*(("weak_motor", {"rotor": r, "thrust_loss": x}, "thrust_loss")
+           for r, x in ((1, 0.05), (2, 0.08), (3, 0.12), (4, 0.16), (1, 0.12))),
+         *(("mass", {"fraction": x}, "fraction") for x in (0.05, 0.1, 0.2))]
+
+
+def main() -> None:
+    """Print each fitted value with its error, then the largest and the rms of the relative errors."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args()
+    vehicle = vehicles.load(VEHICLE)
+    study = study_of(vehicle, [stripped(log) for log in batch.flights(SCENARIO, NOMINAL, seed=NOMINAL_SEED, workers=1)
+                               if isinstance(log, FlightLog)])
+    errors = []
+    for seed, (name, values, parameter) in enumerate(CASES, FIRST_SEED):
+        (log,) = batch.flights(SCENARIO, 1, effects=[(name, values)], seed=seed, workers=1)
+        if not isinstance(log, FlightLog):
+            print(f"{name} {values}: {log}")
+            continue
+        diagnosis = diagnose_with_study(study, list(ready_flights([stripped(log)], vehicle, [])))
+        named = next((e for e in diagnosis.effects if e.name == name), None)
+        if named is None:
+            print(f"{name} {values}: {diagnosis.verdict}")
+            continue
+        fitted = named.parameters[parameter].value
+        errors.append(fitted / values[parameter] - 1.0)
+        print(f"{name} {parameter} {values[parameter]:g}: {fitted:.5f}, {errors[-1]:+.2%}", flush=True)
+    if errors:
+        print(f"{len(errors)} of {len(CASES)} flights: at most {np.abs(errors).max():.2%} off, "
+              f"rms {np.sqrt(np.mean(np.square(errors))):.2%}")
+
+
+if __name__ == "__main__":
+    main()
