@@ -43,7 +43,7 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
                                                  for n in effects))
         return PartOfSelection(steps, hypothesis, dict.fromkeys(effects), dict.fromkeys(effects))
 
-    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without: of(
+    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without, *_: of(
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
     monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(shrink=SimpleNamespace(
         before=1.4, share=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))

@@ -8,6 +8,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import select
 from airtouch.gap.naming.by_relations import matching, selection_by_relations, signs_not_shown
+from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import Against, Inference
@@ -45,7 +46,8 @@ def test_selection_has_a_step_for_each_effect_with_its_evidence():
     """A push and loud noise: both are fitted, each beside those before it, and named whatever they gain."""
     data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN), louder=1.5)])
     told = inference([effect_class("imu_noise"), effect_class("mass")], likeliest="imu_noise")
-    selection = selection_by_relations(trial_of(data), candidates_of(["mass", "imu_noise"]), {}, told, lambda _: None)
+    search = Search(trial_of(data), candidates_of(["mass", "imu_noise"]), lambda _: None)
+    selection = selection_by_relations(search, told)
     assert [(s.name, s.is_named, s.evidence) for s in selection.steps] == [("imu_noise", True, 100.0),
                                                                         ("mass", True, 20.0)]
     assert {t.name for t in selection.last_step.terms} == {"mass", "imu_noise"}
@@ -79,6 +81,17 @@ def test_relations_name_what_always_acts(relations, against):
     selection = select.select(Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass"]))
     assert selection.inference is told and [s.name for s in selection.named_steps] == ["mass"]
     assert selection.single_effects["mass"].gain > 100.0
+
+
+def test_without_a_whole_ranking_no_candidate_is_judged_alone(relations):
+    relations(inference([effect_class("mass")]))
+    data, candidates = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass", "imu_bias"])
+    judged = []
+    whole, short = (select.select(data, candidates, judged.append, rank_all=every) for every in (True, False))
+    assert judged == ["mass", "mass", "imu_bias", "mass"], "for a name, for the whole ranking, for a name"
+    assert [s.terms for s in short.steps] == [s.terms for s in whole.steps]
+    assert list(short.single_effects) == list(whole.single_effects)
+    assert not any(c.full for c in short.single_effects.values())
 
 
 @pytest.mark.parametrize(("against", "likeliest", "by_replay"), [

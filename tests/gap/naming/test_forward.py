@@ -33,7 +33,9 @@ def select(monkeypatch):
             gain, evidence = candidates[name]
             return Candidate(name, (), base_gain + gain, full=name not in screened, evidence=evidence)
 
-        def round_of(trial, variants, base, progress, promising):
+        def round_of(trial, variants, base, progress, promising=()):
+            if base is None:
+                return {n: candidate(n) for n in variants}
             added.append(base.name)
             rounds.append([n for n in variants if n not in added])
             return {n: candidate(n, base.gain) for n in rounds[-1]}
@@ -42,9 +44,7 @@ def select(monkeypatch):
         monkeypatch.setattr(module, "round_of", round_of)
         trial = SimpleNamespace(policy=replace(POLICY, first_gain=first_gain),
                                 data=SimpleNamespace(study=SimpleNamespace(loop=None)))
-        search = Search(trial, dict.fromkeys(candidates, [()]), {n: candidate(n) for n in candidates},
-                        dict.fromkeys(candidates, first_gain), lambda _: None)
-        return forward(search, passing), rounds
+        return forward(Search(trial, dict.fromkeys(candidates, [()]), lambda _: None), passing), rounds
 
     return run
 

@@ -21,7 +21,6 @@ from airtouch.gap.naming.over_prediction import over_prediction_of
 from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
 from airtouch.gap.naming.policy import WAKE_SHARE
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection
-from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import Inference
