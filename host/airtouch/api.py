@@ -7,7 +7,8 @@ names. Heavy modules are imported at their first use, so `import airtouch` is fa
 
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from airtouch.gap.result import Diagnosis
     from airtouch.simulation.scenario import Scenario
     from airtouch.twin.adapt import Adapted, Progress
+    from airtouch.twin.fitting.calibrate import Bars
     from airtouch.vehicle import Vehicle
 
     Flight: TypeAlias = str | Path | FlightLog | DataFrame
@@ -192,36 +194,50 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
 
 @in_python
 def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin: str | Path | None = None,
-          speed_mps: float | None = None, seed: int = 0, hold_out: bool = True, force: bool = False,
-          progress: "Progress | None" = None) -> "Adapted":
+          vehicle: "Vehicle | str | Path | None" = None, speed_mps: float | None = None, seed: int = 0,
+          hold_out: bool = True, force: bool = False, progress: "Progress | None" = None) -> "Adapted":
     """Train a detector for the drone of these flights, and write it to `out`. The same call continues after a stop.
 
-    twin: a folder of `airtouch twin`, None for the plain simulator. speed_mps: commanded speed, if no manifest states
-    it. hold_out: also measure the errors by cross-validation. progress: called as progress(stage, done, total, note),
-    since this takes minutes. The result's `plain()` says what was done. Raises AirTouchError without the extra
-    'train', without a flight that crosses an edge, and for an `out` that exists, without `force`.
+    twin: a folder of `airtouch twin`; without, one is fitted to the flights, as `airtouch adapt` does. vehicle: what
+    this fit starts from. speed_mps: commanded speed, if no manifest states it. hold_out: also measure the errors by
+    cross-validation. progress: called as progress(stage, done, total, note), since this takes minutes. The result's
+    `plain()` says what was done. Raises AirTouchError without the extra 'train', without a flight that crosses an edge,
+    for a twin and a vehicle together, and for an `out` that exists, without `force`.
     """
-    from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
     from airtouch.extras import need
     from airtouch.logs.files import check_free
-    from airtouch.simulation import scenario
     from airtouch.twin import adapt as module
-    from airtouch.twin import adapt_report, files
+    from airtouch.twin import adapt_report
+    from airtouch.twin.fitting import calibrate
+    from airtouch.vehicle import DEFAULT_VEHICLE
 
     need("train", "training")
     out = Path(out)
     check_free(out, force)
+    if twin is not None and vehicle is not None:
+        raise AirTouchError("a twin has a vehicle of its own; leave vehicle out")
     usable, left_out = adapt_report.readable(dataset.collect(_several(flights), speed_mps))
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
-    scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
-    craft = vehicles.load(Path(twin) / files.VEHICLE if twin else vehicles.DEFAULT_VEHICLE)
-    adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed,
+    work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
+    found = calibrate.of_folder(Path(twin)) if twin is not None else calibrate.of_flights(
+        adapt_report.for_a_twin(usable), craft, work, speed_mps=speed_mps, seed=seed, bar=_stages(progress))
+    adapted = module.adapt(usable, found.scenario, found.vehicle, work, start=best.load(None), seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)
+
+
+def _stages(progress: "Progress | None") -> "Bars":
+    """Stages of a fit as bars (`calibrate.Bars`), reported as progress(stage, done, total, note)."""
+    @contextmanager
+    def bar(stage: str) -> Iterator[Callable[[int, int, str], None]]:
+        """One stage."""
+        yield (lambda done, total, note: progress(stage, done, total, note)) if progress else (lambda *_: None)
+
+    return bar
 
 
 def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import airtouch as at
 from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.cli import airtouch
@@ -21,6 +22,7 @@ from airtouch.detector.trace import Detection
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt, adapt_report, overlay
+from airtouch.twin.fitting import calibrate
 from skips import needs
 from twin_courses import PLAIN
 
@@ -279,3 +281,23 @@ def test_the_result_says_what_was_done():
                               "left_out": [["bad.csv", "bad.csv: no gyro"]],
                               "twin_only": None, "held_out_half": None, "held_out": None}
     assert len(repr(result)) < 200 and "3 flights labelled" in repr(result) and "1 left out" in repr(result)
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_python_fits_a_twin_as_the_command_does(sweeps, tmp_path, monkeypatch, given):
+    """Unless it is given one. What is trained is the test of the stages above: here a stub stands for it."""
+    folder = write(tmp_path / "flights", flights_of(sweeps, 5))
+    fitted = calibrate.Twin(replace(scenario.load(calibrate.PLAIN), name="fitted"), vehicles.load(), "fitted")
+    asked, seen = [], []
+    monkeypatch.setattr(calibrate, "of_folder", lambda path: asked.append(path) or fitted)
+    monkeypatch.setattr(calibrate, "of_flights", lambda paths, *of, **_: asked.append(sorted(paths)) or fitted)
+    monkeypatch.setattr(adapt, "adapt", lambda flights, scene, *of, **_: seen.append((len(flights), scene.name))
+                        or adapt.Adapted(best.load(None), [], [], []))
+    at.adapt(folder, tmp_path / "mine.npz", twin=tmp_path / "twin" if given else None)
+    assert seen == [(5, "fitted")]
+    assert asked == [tmp_path / "twin" if given else sorted(folder.iterdir())]
+
+
+def test_python_refuses_a_twin_beside_a_vehicle(sweeps, tmp_path):
+    with pytest.raises(at.AirTouchError, match="vehicle"):
+        at.adapt(tmp_path, tmp_path / "mine.npz", twin=tmp_path, vehicle="crazyflie-2.1-flow")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate, summary
 from airtouch.detector.evaluation.data.dataset import FlightFile
+from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.twin.adapt import Adapted, LoadedFlight
 from airtouch.twin.recorded.course import course
@@ -39,6 +41,11 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
         except AirTouchError as error:
             left_out.append((str(file.path), str(error)))
     return usable, left_out
+
+
+def for_a_twin(usable: Sequence[LoadedFlight]) -> list[Path]:
+    """Files of the flights to which a twin can be fitted: over a platform, with every sensor."""
+    return [f.file.path for f in usable if f.labelled and not sensors.missing_sensors(f.log)]
 
 
 def expected_error(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:

@@ -56,8 +56,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
-    from airtouch.detector.shared import sensors
-    from airtouch.twin import adapt
+    from airtouch.twin import adapt, adapt_report
     from airtouch.twin.fitting import calibrate
 
     need("train", "training")
@@ -70,8 +69,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
     twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
-        [f.file.path for f in labelled if not sensors.missing_sensors(f.log)], vehicles.load(vehicle) if vehicle else
-        vehicles.load(), work, speed_mps=speed, seed=seed, bar=Bar)
+        adapt_report.for_a_twin(usable), vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed, seed=seed,
+        bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])
