@@ -54,6 +54,10 @@ class Study:
         """Residual (n, COUNT) of a flight, with effects in the model: `channels.residual`."""
         return residual(flight, self.vehicle, (*self.calibration, *active), self.loop)
 
+    def measured_blocks(self, state: str) -> int:
+        """Number of nominal blocks of a state on which its floor is measured; 0 where the floor is only declared."""
+        return self.floor.block_counts.get(state, 0) if self.nominal_count else 0
+
     @property
     def simulated(self) -> bool:
         """Whether its nominal flights are those of a simulator, which are all drawn alike.

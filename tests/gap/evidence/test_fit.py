@@ -38,4 +38,4 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     vibration = judging.PricedVariant("vibration", (candidates.terms("vibration")[0],), 0.0)
     both = judging.cross_validated(on, vibration, chosen)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
-    assert both.charges.gained_while_certain == pytest.approx(certain - uncertain)
+    assert both.charges.certainty_refund == pytest.approx(certain - uncertain)

@@ -178,7 +178,7 @@ def test_leave_one_out_gain_after_six_parameters():
     assert shares["imu_noise"] == pytest.approx(selection.last_step.gain - bias_gain, abs=0.3)
 
 
-def test_gained_while_certain_is_given_back_once(flying):
+def test_certainty_refund_is_given_back_once(flying):
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
@@ -187,11 +187,11 @@ def test_gained_while_certain_is_given_back_once(flying):
     both = judging.cross_validated(on, judging.PricedVariant("imu_noise", all_candidates()["imu_noise"][0], 0.5), late)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
-    assert sure - unsure > 5.0 and late.charges.gained_while_certain == 0.0 and both.charges.choice_cost == 0.5
-    assert both.charges.gained_while_certain == pytest.approx(sure - unsure)
+    assert sure - unsure > 5.0 and late.charges.certainty_refund == 0.0 and both.charges.choice_cost == 0.5
+    assert both.charges.certainty_refund == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
     third = judging.cross_validated(on, judging.PricedVariant("vibration", all_candidates()["vibration"][0], 0.0), both)
-    assert third.charges.gained_while_certain == both.charges.gained_while_certain, "paid once"
+    assert third.charges.certainty_refund == both.charges.certainty_refund, "paid once"
 
 
 @pytest.mark.parametrize("simulated", [True, False])

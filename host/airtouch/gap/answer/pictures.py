@@ -23,7 +23,9 @@ from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
 MOST_SPECTRA = 3  #: channels whose spectra are drawn
-FEWEST_BLOCKS = 8  #: blocks of nominal flights above which their mean power is the floor of a spectrum
+#: blocks of nominal flights from which on the power measured there is drawn as the floor of a spectrum; with fewer the
+#: declared noise of the sensors is; chosen
+FEWEST_DRAWN_BLOCKS = 9
 LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel's unit squared/Hz; chosen
 
 
@@ -138,7 +140,7 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
-    floor = np.maximum(study.floor.power[AIR] if study.floor.block_counts.get(AIR, 0) > FEWEST_BLOCKS else
+    floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_DRAWN_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
     after = _power_after(study, flown, effects, floor) if effects else None

@@ -13,10 +13,11 @@ LEAD = 1.0  #: nats that others lie behind the effect that is the answer, at lea
 MOST_UNKNOWN = 0.9
 
 
-def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
+def probabilities(selection: Selection, is_none: bool = False) -> dict[str, float]:
     """The probability of every single candidate, of `none` and of `unknown`; they sum to 1.
 
-    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
+    is_none: whether the verdict is `none`, which it is for a gap at its floor even where the selection names effects
+    (`ranking.verdict_of`).
 
     `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
     effect or `none` is the answer it stays below that.
@@ -28,7 +29,7 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     unknown = odds / (1.0 + odds)
     if selection.named_hypothesis is not None and is_explained(selection):
         unknown = _limited(unknown, weight[names.index(selection.named_steps[0].name)] / total)
-    if at_floor:
+    if is_none:
         unknown = _limited(unknown, weight[-1] / total)
     known = (1.0 - unknown) * weight / total
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))

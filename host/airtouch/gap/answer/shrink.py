@@ -24,7 +24,7 @@ from airtouch.gap.signatures.term import Term
 
 SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
-FEWEST = 12  #: values that a cell needs; chosen
+FEWEST_VALUES = 12  #: values that a cell needs; chosen
 DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
 PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws; chosen
 SEED = 0  #: of the bootstrap
@@ -168,4 +168,4 @@ def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarr
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
-    return out & (count >= FEWEST)
+    return out & (count >= FEWEST_VALUES)

@@ -19,7 +19,7 @@ from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
 MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
-FEWEST = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
+FEWEST_RANKED = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
 CHANCE = 0.01  #: probability of a correlation by chance alone, all signals together (Bonferroni); chosen
 LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; far below any measured
 
@@ -27,6 +27,10 @@ LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; f
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
                 ) -> list[OpenCell]:
     """What the effects leave in the cells with most of the gap before any, with the flight in which it is largest.
+
+    The effects are those of the last step, deviations included, with the values fitted to the first half of the data,
+    as `Candidate.terms` has them. The parameters in the answer are fitted to all of it (`named_effects`). So here the
+    second half is held out and the first is not: where halves are whole flights, less is left in those of the first.
 
     cells: the headline, then the others, largest first. The stretch of time lies in the phase of the cell.
     """
@@ -101,7 +105,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
 
     power = np.concatenate([np.log(np.maximum(ratio, LEAST_RATIO)) for _, ratio in ratios])[::2]  # they overlap by half
     known = np.isfinite(power)
-    if known.sum() < FEWEST:
+    if known.sum() < FEWEST_RANKED:
         return []
     means = [_block_means(study, flight) for flight, _ in ratios]
     names = list(dict.fromkeys(name for of_flight in means for name in of_flight))

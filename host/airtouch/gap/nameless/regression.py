@@ -11,7 +11,7 @@ from airtouch.gap.nameless.powers import Powers, gain_at_even_odds
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
-ROUNDS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
+REWEIGHTINGS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
 OWN_ROUNDS = 2  #: the same of one channel of a flight under fitted coefficients; chosen
 RIDGE, LEAST_RIDGE = 1e-9, 1e-12  #: added to a normal matrix, over its diagonal and at least, to invert it; chosen
 MOST_COLUMNS = 4  #: columns of one channel that may be used; chosen
@@ -92,7 +92,7 @@ def coefficients(part: PartResiduals, channel: int, floor: NamelessFloor, among:
         return fitted
     allowed = [k for k in range(sets[0].free) if among is None or among[k]]
     residuals = [part.values[c.places] for c in sets]
-    for _ in range(ROUNDS):  # of weights
+    for _ in range(REWEIGHTINGS):
         normal, right = _shared_system(part, sets, residuals, floor)
         free = _selected_columns(normal, right, allowed)
         fitted = np.zeros(WIDEST)

@@ -7,7 +7,7 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
            - price_of                           PRICE of each free parameter of a term beyond its first; a random part
                                                 or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
-           + gained_while_certain               what effects lose beside the first random one, given back (`Charges`)
+           + certainty_refund                   what effects lose beside the first random one, given back (`Charges`)
 """
 
 from collections.abc import Sequence
@@ -108,14 +108,12 @@ def _charges(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Ch
     """The charges of a base and a variant.
 
     Beside the first random effect the commands' floor is less certain, so that the effects before it gain less. It is
-    not charged with that.
+    not charged with that (`Charges.certainty_refund`).
     """
-    if base is None:
-        return Charges(variant.choice_cost)
-    lost = 0.0
-    if base.fits and random_of(variant.terms) and not random_of(base.terms):
-        lost = lost_beside_random(trial, base.fits)
-    return Charges(variant.choice_cost + base.charges.choice_cost, base.charges.gained_while_certain + lost)
+    before = base.charges if base else Charges()
+    if base is None or not base.fits or random_of(base.terms) or not random_of(variant.terms):
+        return before.with_effect(variant.choice_cost)
+    return before.with_effect(variant.choice_cost, lost_beside_random(trial, base.fits))
 
 
 def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
@@ -124,7 +122,7 @@ def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, o
     fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
     held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), of_clock)
-    return held_out + (charges.gained_while_certain - price_of(fits[0].terms) - charges.choice_cost)
+    return held_out + (charges.certainty_refund - price_of(fits[0].terms) - charges.choice_cost)
 
 
 def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | None, brief: bool) -> FittedTerms:

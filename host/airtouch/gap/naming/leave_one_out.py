@@ -45,24 +45,25 @@ def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
         return gain - cost_of_others
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
     gain += sum(gain_of(trial, test, refits[train].terms) for train, test in TWO_FOLDS)
-    gain += _gained_while_certain(trial, steps, place)
+    gain += _certainty_refund(trial, steps, place)
     return gain - price_of(refits[-1].terms) - cost_of_others
 
 
-def _gained_while_certain(trial: Trial, steps: Sequence[Step], place: int) -> float:
-    """`Charges.gained_while_certain` of the last step's hypothesis without the effect of the step at a place.
+def _certainty_refund(trial: Trial, steps: Sequence[Step], place: int) -> float:
+    """`Charges.certainty_refund` of the last step's hypothesis without the effect of the step at a place.
 
     It is 0 where no other effect stands before the first random one, or none is random: nothing lost certainty. It is
     that of the last step where the dropped effect came after the first random one, which it did not change. Else the
     effects before the first random one are fitted anew by themselves, without the dropped one, for what they lose.
     """
-    none_before = 0  # as the place of the first random effect, where there is none
-    first_random = next((i for i, s in enumerate(steps) if i != place and random_of(new_terms(steps, i))), none_before)
+    first_random = next((i for i in range(len(steps)) if i != place and random_of(new_terms(steps, i))), None)
+    if first_random is None:
+        return 0.0
     earlier = [i for i in range(first_random) if i != place]
     if not earlier:
         return 0.0
     if place > first_random:
-        return steps[-1].charges.gained_while_certain
+        return steps[-1].charges.certainty_refund
     later = frozenset().union(*(_new_slots(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
     return lost_beside_random(trial, refits)

@@ -45,8 +45,9 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
-    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted), charges=Charges(effect.cost),
-                     strength=Strength(effect.strength), evidence=evidence, passing_key=effect.key)
+    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted),
+                     charges=Charges().with_effect(effect.cost), strength=Strength(effect.strength), evidence=evidence,
+                     passing_key=effect.key)
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step]) -> bool:

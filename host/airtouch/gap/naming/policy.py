@@ -45,7 +45,10 @@ ABOUT_AS_GOOD = 3.0
 #: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time: less means
 #: more fits, more loses effects that screening takes for weaker than they are
 PROMISING = 0.5 * FIRST_GAIN
-FULL = 5  #: hypotheses that are fitted in full at most, after screening all; chosen for time, as PROMISING
+#: hypotheses judged to first order, the best of them, among which those that gain PROMISING are fitted in full; others
+#: are fitted beside these: random effects that promise something, what only a fit can judge, and names that a round is
+#: told to fit (`rounds`). Chosen for time, as PROMISING
+BEST_SCREENED = 5
 #: effects that are named of one set of flights; chosen 2026-11-21. A fourth would cost one more round of fits
 MOST_EFFECTS = 3
 #: deviations of nominal flights that are added freely (`forward`); chosen 2026-11-22. With fewer, what nominal flights

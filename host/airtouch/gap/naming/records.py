@@ -40,13 +40,18 @@ class Strength:
 class Charges:
     """What the gain of a hypothesis is charged with beside its parameters, and what is given back to it, nats.
 
-    choice_cost: charged for the choice among the variants of its effects: of all of them, but of the newest alone where
-    the hypothesis was only screened, whose base has paid already; gained_while_certain: given back, what the effects
-    before the first random one lose because beside it the commands' floor is less certain.
+    choice_cost: charged for the choice among the variants of each of its effects, all together; newest_choice_cost: of
+    these, for the newest effect. certainty_refund: given back to the effects before the first random one. Beside that
+    the commands' floor is less certain, by which they lose as much without being any less right.
     """
 
     choice_cost: float = 0.0
-    gained_while_certain: float = 0.0
+    newest_choice_cost: float = 0.0
+    certainty_refund: float = 0.0
+
+    def with_effect(self, choice_cost: float, refund: float = 0.0) -> "Charges":
+        """The charges with those of a further effect."""
+        return Charges(choice_cost + self.choice_cost, choice_cost, self.certainty_refund + refund)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
-from airtouch.gap.naming.policy import COMPANION_GAIN, FULL, LONGER_GAIN, PROMISING
+from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, LONGER_GAIN, PROMISING
 from airtouch.gap.naming.records import Candidate, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.second_process import map_on_two_cores
@@ -58,7 +58,7 @@ def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     means = sorted(screened.means, key=lambda c: -c.gain)
     unpromising, random = screen_random(start, screened.random, means, every_random)
     to_fit, not_fitted = _by_promise(_best_variants(means) + unpromising, start.gain, promising)
-    means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.choice_cost) for c in to_fit]
+    means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.newest_choice_cost) for c in to_fit]
     return [*screened.unseen, *random, *means_to_fit], not_fitted
 
 
@@ -87,12 +87,12 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
                 ) -> tuple[list[Candidate], list[Candidate]]:
     """The hypotheses that are worth a full fit, and the others.
 
-    screened: to first order, those of mean effects first, the best first: of the first FULL those are worth a fit
-    that gain PROMISING over the gain of the base, nats; promising: names that are worth one at any gain.
+    screened: to first order, those of mean effects first, the best first: of the first BEST_SCREENED those are worth a
+    fit that gain PROMISING over the gain of the base, nats; promising: names that are worth one at any gain.
     """
     worth_a_fit, others = [], []
     for place, candidate in enumerate(screened):
-        gains_enough = place < FULL and candidate.gain - gain > PROMISING
+        gains_enough = place < BEST_SCREENED and candidate.gain - gain > PROMISING
         (worth_a_fit if gains_enough or candidate.name in promising else others).append(candidate)
     return worth_a_fit, others
 

@@ -41,7 +41,7 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
-ROUNDS = 2  #: fits of the vehicle, the second against the floor that the first leaves; chosen
+VEHICLE_FITS = 2  #: fits of the vehicle, the second against the floor that the first leaves; chosen
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, 
     """The study of the vehicle with the parameters of PRIORS fitted to nominal flights, and their fit."""
     chosen, prior = _terms_and_priors()
     study = declared
-    for _ in range(ROUNDS):
+    for _ in range(VEHICLE_FITS):
         data = Data(replace(study, calibration=(), loop=None, response=None), flights)
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
         fitted = fit(data, whole_of(data), chosen, start, prior)

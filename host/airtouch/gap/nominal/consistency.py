@@ -20,7 +20,7 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 TRIM = slice(0, TORQUE.stop)  #: channels of force and torque, m/s^2 and rad/s^2
-FEWEST = 3  #: flights of which one can be unlike the others
+FEWEST_FLIGHTS = 3  #: flights of which one can be unlike the others
 #: robust standard deviations off the others' median beyond which a flight's trim is odd; chosen
 ODD = 6.0
 MOST_LEFT_OUT = 3  #: at most one flight in so many is left out; where more are odd, the flights disagree and all count
@@ -38,10 +38,10 @@ PARTS = 8  #: equal parts of a flight, whose means give the trim's standard erro
 def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -> tuple[list[Flight], list[str]]:
     """The flights whose trim under the declared vehicle agrees with the others', and a note on each one left out.
 
-    far (6,): distance from the median that a trim left out has at least, m/s^2 and rad/s^2. Fewer than FEWEST flights,
+    far (6,): distance from the median that a trim left out has at least, m/s^2 and rad/s^2. Fewer than FEWEST_FLIGHTS,
     or flights of which more than one in MOST_LEFT_OUT is unlike the others, all stay.
     """
-    if len(flights) < FEWEST:
+    if len(flights) < FEWEST_FLIGHTS:
         return list(flights), []
     trim = trims(flights, vehicle)
     median = np.median(trim, axis=0)
@@ -72,7 +72,7 @@ def of_one_trim(vehicle: Vehicle, flights: Sequence[Flight]) -> bool:
 
 def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
     """A note on each flight whose trim under the calibrated vehicle is odd, with the channel in which it is most so."""
-    if len(flights) < FEWEST:
+    if len(flights) < FEWEST_FLIGHTS:
         return []
     trim = trims(flights, study.vehicle, study.calibration)
     distance = np.abs(trim - np.median(trim, axis=0)) / np.maximum(deviation(trim), 1e-9)

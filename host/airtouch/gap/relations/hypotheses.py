@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
-ROUNDS = 3  #: rounds, at most, in which the effects of a hypothesis are fitted in turn; chosen
+TURNS = 3  #: turns, at most, in which the effects of a hypothesis are fitted in turn; chosen
 SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance in nominal deviations, equally likely; chosen
 
 
@@ -93,7 +93,7 @@ class FlightHypotheses:
     def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis with its effects fitted in turn, each beside the others."""
         best, fits = hypothesis, list(hypothesis.fits)
-        for _ in range(ROUNDS):
+        for _ in range(TURNS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
                 known = self.rescaling(others)

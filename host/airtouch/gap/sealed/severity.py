@@ -37,7 +37,7 @@ APART = 0.5 * (FALSE_ALARM + POWER) ** 2
 #: share FALSE_ALARMS / len(KINDS) of flights at most, whatever d
 SEEN = 0.5 * FALSE_ALARM ** 2
 TRIES = 8  #: flights with and without the effect; chosen
-FEWEST = 3  #: of them that must fly to the end, else the effect is so strong that it is seen anyhow; chosen
+FEWEST_FLOWN = 3  #: of them that must fly to the end, else the effect is so strong that it is seen anyhow; chosen
 RANGE = 300.0  #: highest plausible strength over the weakest that is tried; chosen
 BISECTIONS = 6  #: of the logarithm of that range, so that the strength is known to a tenth; chosen
 FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most the highest plausible
@@ -95,9 +95,9 @@ def _log_ratios(actives: Sequence[Active], conditions: Conditions) -> tuple[np.n
 def detectable(with_effect: np.ndarray, without_effect: np.ndarray) -> bool:
     """Whether log ratios (n,) of flights with an effect, nats, stand over those of as many without.
 
-    True for fewer than FEWEST: an effect so strong that it cannot fly.
+    True for fewer than FEWEST_FLOWN: an effect so strong that it cannot fly.
     """
-    if len(with_effect) < FEWEST:
+    if len(with_effect) < FEWEST_FLOWN:
         return True
     alarm = without_effect.mean() + FALSE_ALARM * without_effect.std(ddof=1)
     most_over = with_effect.mean() - POWER * with_effect.std(ddof=1) > alarm

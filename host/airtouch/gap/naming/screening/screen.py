@@ -39,6 +39,11 @@ class RoundStart:
         return self.base.gain if self.base else 0.0
 
     @property
+    def charges(self) -> Charges:
+        """The charges of the base."""
+        return self.base.charges if self.base else Charges()
+
+    @property
     def terms(self) -> Terms:
         """The terms of the base."""
         return self.base.terms if self.base else ()
@@ -119,7 +124,7 @@ def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candida
     strength = Strength(own.among_all(of_halves.mean(axis=0)),
                         covariance_among_all(own, np.diag(_variance_of_mean(of_halves, judged.variances, k))))
     return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
-                     charges=Charges(variant.choice_cost), strength=strength)
+                     charges=start.charges.with_effect(variant.choice_cost), strength=strength)
 
 
 def _variance_of_mean(values: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
@@ -182,7 +187,12 @@ def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Ca
 
 
 def _screened_random(start: RoundStart, variants: Sequence[PricedVariant]) -> list[ScreenedRandom]:
-    """The variants of one effect whose random term stands alone or after a mean one, screened by that random term."""
+    """The variants of one effect whose random term stands alone or after a mean one, screened by that random term.
+
+    A gain pays for the choice, but no PRICE as that of a mean effect does: it is that of the random term alone, which
+    in the package's effects has one free parameter, and the first is free of charge (`judging.price_of`). What the mean
+    term or several parameters of a user's random effect cost is charged when the variant is fitted.
+    """
     screened, judged = [], {}  # several variants have the same random term
     for variant in variants:
         first, random = variant.terms[0], random_of(variant.terms)[0]
@@ -209,8 +219,9 @@ def _variants_to_fit(best: PricedVariant, variants: Sequence[PricedVariant], goo
 def _as_judged(start: RoundStart, screened: ScreenedRandom) -> Candidate:
     """A screened random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
     name, terms, cost = screened.variant
+    strength = Strength(strength_term(terms).among_all(screened.strength))
     return Candidate(name, (*start.terms, *terms), start.gain + min(screened.gain, 0.0), full=False,
-                     charges=Charges(cost), strength=Strength(strength_term(terms).among_all(screened.strength)))
+                     charges=start.charges.with_effect(cost), strength=strength)
 
 
 def _same(one: Term, other: Term) -> bool:
