@@ -1,9 +1,9 @@
-"""The parameters of named effects, by replay and by the relations of signals together."""
+"""The parameters of named effects: by replay and by the relations of signals together, and in the shape flown."""
 
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.named_effects import at_end_of_range, converged, with_reading
+from airtouch.gap.answer.named_effects import at_end_of_range, best_shape, converged, with_reading
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
@@ -73,3 +73,12 @@ def test_a_fit_goes_on_until_it_stands_still(study):
     assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
     assert judge(data, blocks, refit.terms) < level + SETTLED
     assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED
+
+
+@pytest.mark.parametrize("fade", [0.0, 0.06])
+def test_the_shape_that_was_flown_is_found_from_any_other(study, fade):
+    """How fast the lift of the ground dies out with height, from all the data."""
+    data = Data(study, fly(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
+    for start in terms("ground_effect"):
+        values = best_shape(data, whole_of(data), [start], None).terms[0].values
+        assert values["fade"] == fade

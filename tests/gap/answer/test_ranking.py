@@ -13,7 +13,7 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
 
-RECORDED = SimpleNamespace(study=SimpleNamespace(simulated=False))
+RECORDED, SIMULATED = (SimpleNamespace(study=SimpleNamespace(simulated=simulated)) for simulated in (False, True))
 POLICY = policy_of(replace(FLOOR, nominal_count=5), 30.0)
 GAINS = {"mass": 200.0, "wind": 40.0, "inertia": 2.0}
 
@@ -24,11 +24,11 @@ def candidate(name, gate=()):
     return Candidate(name, (term,), GAINS[name], evidence=GAINS[name], full=False)
 
 
-def selection(named=("mass",), left=4.0, gate=(), by_relations=False):
+def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0.0):
     """A selection that names effects, beside which a nameless model or disturbance gains so many nats."""
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
     told = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
-    return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left), (None, None),
+    return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
                      dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=told)
 
 
@@ -48,6 +48,22 @@ OVER = AT_FLOOR + 0.5
     (selection(()), OVER, "none"), (selection(), OVER, "effect")])
 def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
     assert verdict_of(RECORDED, of, gap(before)) == verdict
+
+
+LIMIT = 20.0  #: nats that may be left beside a mass that gains 200
+
+
+@pytest.mark.parametrize(("of", "nearer", "verdict"), [
+    (selection(), False, "none"),
+    (selection(), True, "effect"),  # some cells are calmer than nominal flights, others less calm
+    (selection(left=LIMIT + 1.0), True, "unknown"),
+    (selection(of_times=LIMIT - 1.0, left=LIMIT - 1.0), False, "none"),
+    (selection(of_times=LIMIT + 1.0, left=LIMIT + 1.0), False, "unknown")])  # odd times, which no nominal flight has
+def test_simulated_flights_at_their_floor_have_effects_that_bring_cells_nearer(monkeypatch, of, nearer, verdict):
+    monkeypatch.setattr("airtouch.gap.answer.ranking.nearer", lambda *_: nearer)
+    assert verdict_of(SIMULATED, of, gap(AT_FLOOR)) == verdict
+    assert verdict_of(RECORDED, of, gap(AT_FLOOR)) == "none"
+    assert verdict_of(SIMULATED, of, gap(OVER)) == verdict_of(RECORDED, of, gap(OVER)), "above it they are alike"
 
 
 @pytest.mark.parametrize(("of", "verdict", "answer"), [

@@ -45,7 +45,7 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
                      inference=related)
 
 
-def test_the_answer_needs_no_reason():
+def test_the_answer_has_no_reason():
     assert why_not(selection(), "mass", "effect") == ""
     assert why_not(selection(), "none", "none") == why_not(selection(), "unknown", "unknown") == ""
 
@@ -57,7 +57,7 @@ def test_the_answer_needs_no_reason():
     ("gust", "gains 20 nats, mass 200"),
     ("none", "mass gains 200 nats over it"),
     ("unknown", "a model without names adds 4 nats, up to 20 may be left")])
-def test_by_replay(name, words):
+def test_reason_by_the_replay(name, words):
     assert why_not(selection(), name, "effect") == words
 
 
@@ -70,7 +70,7 @@ def test_by_the_relations_of_the_signals(name, words):
     assert why_not(selection(inference=True), name, "effect") == words
 
 
-def test_a_distance_is_told_as_one():
+def test_reason_of_a_distance():
     far = selection(inference=True, of_distance=True, beside=70.0)
     assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from "
                                                "none, up to 30 may be chance")
@@ -82,7 +82,7 @@ def test_a_distance_is_told_as_one():
                                                    "may be chance")
 
 
-def test_a_second_effect_is_told_apart_from_one_that_acts_alone():
+def test_reason_of_a_second_named_effect():
     for named in (("mass", "wind"), ("wind", "mass")):  # in either order of the steps
         pair = selection(named)
         assert why_not(pair, "wind", "effect") == ("named beside mass: adds 10 nats to the others; the probability is "
@@ -98,7 +98,7 @@ def test_effects_are_alike_by_what_each_gains_alone():
         assert alike_of(replace(selection(named), single_effects=near)) == (("gust", "mass"),)
 
 
-def test_where_nothing_is_named():
+def test_reasons_where_nothing_is_named():
     nothing = selection((), beside=40.0)
     assert not is_explained(nothing)
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
@@ -111,7 +111,7 @@ def test_where_nothing_is_named():
     assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
 
 
-def test_what_is_named_and_not_enough_is_held_against_itself():
+def test_reason_of_the_best_effect_where_the_answer_is_unknown():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
     open_gap = selection(beside=70.0)
     assert why_not(open_gap, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"

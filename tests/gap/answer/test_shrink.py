@@ -1,12 +1,34 @@
-"""How far a gap closes: the share by its closed form, and that of a jitter in the logged times."""
+"""How far a gap closes: in which cells it is measured, its share and interval by closed forms, and that of a jitter."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.shrink import share_closed, shrink_of_jitter
+from airtouch.gap.answer.shrink import (
+    FEWEST_VALUES,
+    MARGIN,
+    Gap,
+    gap_of,
+    nearer,
+    share_closed,
+    shrink_of,
+    shrink_of_jitter,
+)
+from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, cell_numbers
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains
+from airtouch.gap.evidence.problem import problem_of
+from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.clock import LEAST_JITTER_S
+from airtouch.gap.naming.judging import PricedVariant, cross_validated, halves, trial_of
+from airtouch.gap.naming.records import Candidate
+from airtouch.gap.signals.channels import COLUMN, TORQUE
+from airtouch.gap.signals.spectra import AIR, frequencies
+from airtouch.gap.signatures.candidates import terms
+from hovers import FLOOR, hover
+
+LIFT = COLUMN["force_z"]
 
 
 @pytest.mark.parametrize(("before", "after", "share"), [
@@ -40,3 +62,97 @@ def test_what_the_halves_differ_by_stays():
 
 def test_the_floor_of_a_jitter_is_never_that_of_perfect_times():
     assert shrink_of_jitter(jittered([0.002] * 8)).before == pytest.approx(0.002 / LEAST_JITTER_S)
+
+
+def counts_of(data, part):
+    """Number of values (CELLS,) in each cell of a part."""
+    problem = problem_of(data, part)
+    return np.bincount(problem.cells, problem.known, CELLS)
+
+
+def test_cells_stand_out_that_have_enough_values():
+    """Sixteen times the power of the floor in every force and torque of a short flight."""
+    data = Data(FLOOR, [hover(7, louder=4.0, length_s=10.0)])
+    parts = halves(data)
+    gap = gap_of(data, parts, None)
+    channel = np.arange(CELLS) % 1000 % len(COLUMN)
+    for shown_by, cells in zip(parts[::-1], gap.cells, strict=True):
+        counts = np.where(channel < TORQUE.stop, counts_of(data, shown_by), 0)
+        assert (counts[counts > 0] < FEWEST_VALUES).any()
+        np.testing.assert_array_equal(cells, counts >= FEWEST_VALUES)
+    assert gap.shrink.before == pytest.approx(4.0, rel=0.1) and gap.shrink.share.value == 0.0
+
+
+@pytest.mark.parametrize("power", [1.0, 1.0 + 0.75 * MARGIN])
+def test_no_cell_stands_out_by_chance_or_by_less_than_the_margin(power):
+    data = Data(FLOOR, [hover(7 + k, louder=np.sqrt(power)) for k in range(4)])
+    gap = gap_of(data, halves(data), None)
+    assert not np.any(gap.cells) and gap.shrink.before == gap.shrink.after == 1.0
+
+
+def test_cells_count_in_which_the_effect_named_gains():
+    """A tenth more power is within the margin, but noise of that strength gains where there are many values."""
+    data = Data(FLOOR, [hover(7, louder=np.sqrt(1.1))])
+    trial = trial_of(data)
+    noise = cross_validated(trial, PricedVariant("imu_noise", tuple(terms("imu_noise")), 0.0), None)
+    assert not np.any(gap_of(data, trial.halves, None).cells)
+    gap = gap_of(data, trial.halves, noise)
+    for half, cells in enumerate(gap.cells):
+        other = trial.halves[1 - half]
+        gains = cell_gains(data, other, noise.fits[1 - half].terms)
+        np.testing.assert_array_equal(cells, (gains > CELL_GAIN) & (counts_of(data, other) >= FEWEST_VALUES))
+    assert np.any(gap.cells)
+
+
+def test_a_gap_that_one_half_alone_shows_is_not_measured_there():
+    """Every other flight has four times the power: the others are judged in those cells, and are at their floor."""
+    data = Data(FLOOR, [hover(7 + k, louder=1.0 if k % 2 else 2.0) for k in range(4)])
+    gap = gap_of(data, halves(data), None)
+    assert not gap.cells[0].any() and gap.cells[1].any()
+    assert gap.shrink.before == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_interval_is_that_of_a_mean_of_so_many_values():
+    """An energy of 9 wholly known, and n of white noise at the floor left, whose mean has the deviation 1 / sqrt(n).
+
+    So the share (3 - sqrt(mean)) / 2 has a quarter of that, and its 90 % interval is 2 * 1.645 of these wide.
+    """
+    data = Data(FLOOR, [hover(7)])
+    parts, lift = halves(data), np.zeros(CELLS, bool)
+    lift[[cell_numbers(REPLAY_VIEW, band, LIFT) for band in range(1, len(BANDS_HZ) - 1)]] = True
+    n = int(sum(counts_of(data, part)[lift].sum() for part in parts))
+    known = Gap((lift, lift), 0.0, np.full(n, 9.0), None)
+    shrink = shrink_of(data, parts, Candidate("nothing", (), 0.0), known)
+    assert (shrink.before, shrink.after) == pytest.approx((3.0, 1.0), abs=0.1)
+    assert shrink.share.low < shrink.share.value < shrink.share.high
+    assert shrink.share.high - shrink.share.low == pytest.approx(2.0 * 1.645 * 0.25 / np.sqrt(n), rel=0.3)
+
+
+def biased(mps2):
+    """The hypothesis that the accelerometer shows so much lift."""
+    (bias,) = terms("imu_bias")[:1]
+    fitted = SimpleNamespace(terms=(bias.fitted(bias.scaled({**bias.values, "acc_z": mps2})),))
+    return Candidate("imu_bias", fitted.terms, 0.0, (fitted, fitted))
+
+
+@pytest.mark.parametrize(("energy_over_floor", "is_nearer"), [(0.0, False), (1.0, True), (1.8, True), (2.2, False)])
+def test_less_than_the_floor_is_as_far_off_as_more(energy_over_floor, is_nearer):
+    """A flight with next to no noise is off by all of the floor; what a bias adds to its lowest band brings it nearer.
+
+    A constant has its power in the lowest bin, and half as much in the next, which together may be as far over.
+    """
+    data = Data(FLOOR, [hover(7, louder=0.01)])
+    parts, lift = halves(data), np.zeros(CELLS, bool)
+    lift[cell_numbers(REPLAY_VIEW, 0, LIFT)] = True
+    bins = np.flatnonzero(frequencies(AIR) < BANDS_HZ[1])
+    floor = FLOOR.floor.power[AIR][bins, LIFT]
+    energy_of_1 = (1.0 / 1.5) / frequencies(AIR)[1] / floor[0] * 1.5  # of 1 m/s^2, in both bins, over the floor
+    bias = biased(np.sqrt(energy_over_floor * len(bins) / energy_of_1))
+    assert nearer(data, parts, bias, SimpleNamespace(cells=(lift, lift))) == is_nearer
+
+
+def test_the_right_effect_is_nearer_and_none_is_not():
+    data = Data(FLOOR, [hover(7, (0.0, 0.0, 0.5))])
+    parts, all_cells = halves(data), SimpleNamespace(cells=(np.ones(CELLS, bool),) * 2)
+    assert nearer(data, parts, biased(0.5), all_cells)
+    assert not nearer(data, parts, biased(-0.5), all_cells) and not nearer(data, parts, None, all_cells)

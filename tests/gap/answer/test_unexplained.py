@@ -53,7 +53,7 @@ def test_the_worst_stretch_ends_where_the_gap_is_half_way_to_its_median():
     assert worst_stretch(np.array([2.0, 2.0, 2.0])) == (0, 2)
 
 
-def test_an_entry_tells_flight_and_seconds_of_the_strongest_gap():
+def test_open_cell_has_flight_and_seconds_of_the_largest_gap():
     strength = np.where((np.arange(4000) >= 2000) & (np.arange(4000) < 2800), 3.0, 0.1)
     flights = [hover(0.1, name="calm.csv"), hover(strength, name="windy.csv")]
     (entry,) = unexplained(STUDY, flights, selection(), [cell("force_x", "ground", 9.0), CELL,
@@ -63,7 +63,7 @@ def test_an_entry_tells_flight_and_seconds_of_the_strongest_gap():
     assert entry.to_s == pytest.approx(28.0, abs=LENGTH[AIR] / 100.0)
 
 
-def test_the_seconds_of_an_entry_are_of_its_phase():
+def test_open_cell_has_seconds_of_its_own_phase():
     """The gap is strongest in cruise; an entry of the hover tells the worst of the hover, and what goes with it there.
 
     Where no block is mostly of the phase, all count.
@@ -78,13 +78,13 @@ def test_the_seconds_of_an_entry_are_of_its_phase():
     assert landing.from_s == cruising.from_s and landing.over_floor == cruising.over_floor
 
 
-def test_five_cells_are_told_at_most():
+def test_at_most_five_cells_are_reported():
     cells = [cell("force_x", phase, 1.0, band_hz=band) for band in ((0.5, 2.0), (2.0, 6.0))
              for phase in ("hover", "cruise", "landing")]
     assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
 
 
-def test_the_signal_is_named_that_the_power_follows():
+def test_signal_that_the_power_follows_is_named():
     """A gap that grows with time; the height, which does not change, and signals of the made hover say nothing."""
     growing = hover(np.linspace(0.1, 3.0, 4000))
     assert followed_signals(STUDY, [(growing, ratio_of(growing))]) == ["time"]
@@ -107,7 +107,7 @@ def test_a_signal_that_one_flight_lacks_is_not_named():
 
 
 @pytest.mark.parametrize(("seconds", "names"), [(19.2, []), (21.8, ["time"])])
-def test_seven_blocks_that_do_not_overlap_are_not_tested(seconds, names):
+def test_fewer_than_eight_separate_blocks_are_not_tested(seconds, names):
     one = flight(seconds)
     assert followed_signals(STUDY, [(one, np.arange(1.0, len(starts(one, AIR)) + 1.0))]) == names
 

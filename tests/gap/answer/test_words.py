@@ -22,7 +22,7 @@ def pushed_flights():
     return made_diagnosis.fly_pushed()
 
 
-def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
+def test_effect_that_does_not_close_the_headline_cell_is_not_its_cause():
     cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
     sentences = words.sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
     assert sentences[1] == "The effect named, motor noise (probability 93%), does not close this cell."
@@ -31,26 +31,26 @@ def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
 
 @pytest.mark.parametrize(("other", "begin"), [(0.2, "The gap lies mostly in lift"),
                                               (9.0, "A part of the gap lies in lift")])
-def test_a_cell_that_the_effect_closes_is_not_called_most_of_the_gap_where_another_has_more(other, begin):
+def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
     cells = [cell("force_z", "hover", 1.0, after=0.1), cell("torque_x", "hover", other, after=other)]
     sentences = words.sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
                                           headline=summary.headline(cells, True)))
     assert sentences[0].startswith(begin) and sentences[1].startswith("Its cause is ground effect")
 
 
-def test_an_effect_without_a_cell_of_its_own_is_no_cause_of_one():
+def test_no_cause_is_given_without_a_headline_cell():
     where, which, _ = words.sentences(diagnosis([cell("force_z", "hover", 0.05)]))
     assert where == "In no cell of the map does the gap stand out of its floor."
     assert which.startswith("The effect named, from all cells together, is imu bias")
 
 
-def test_rotors_are_told_apart():
+def test_weak_motors_are_named_with_their_rotors():
     weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = words.sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
     assert sentence == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
 
 
-def test_what_got_worse_is_said():
+def test_cells_that_got_worse_are_counted():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
              cell("force_y", "ground", 2.6, after=8.8)]
     sentence = words.sentences(diagnosis(cells))[2]
@@ -61,7 +61,7 @@ def test_what_got_worse_is_said():
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
 
 
-def test_cells_that_stand_out_only_with_the_effect_are_counted_apart():
+def test_cells_that_newly_stand_out_are_counted_apart():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "hover", 0.1, after=0.4),
              cell("force_y", "hover", 0.5, after=0.45)]
     counts = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
@@ -96,7 +96,7 @@ def test_a_diagnosis_prints_as_one_line():
     assert str(none) == "Diagnosis(none)"
 
 
-def test_closing_figures_are_one(pushed_flights, tmp_path):
+def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
     """Sentence, JSON and page have one share and one before and after;
     the calibrated arm, which is the same, is not told again."""
     result = of_flights(pushed_flights)
@@ -120,7 +120,7 @@ def test_json_has_headline_map_and_steps(pushed_flights):
     assert fields["next"] == [{"text": "Weigh the <vehicle>.", "command": "airtouch collect --mission hover"}]
 
 
-def test_terminal_says_what_the_page_says(pushed_flights, capsys, monkeypatch):
+def test_terminal_prints_sentences_notes_and_advice(pushed_flights, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
     result = of_flights(pushed_flights)
     gap_show.diagnosis(scores.console(), result)
@@ -130,7 +130,7 @@ def test_terminal_says_what_the_page_says(pushed_flights, capsys, monkeypatch):
         assert part in out, part
 
 
-def test_advised_commands_can_be_given():
+def test_advised_commands_are_valid():
     """Every effect's command is taken by `simulate` as it stands, and every mission advised can be loaded."""
     from airtouch.crazyflie import mission
 
@@ -152,6 +152,6 @@ def test_phases_with_the_same_worst_seconds_share_a_line():
     assert [line.split(":")[0] for line in lines] == ["lift, 0-0.5 Hz, cruise and landing", "lift, 0-0.5 Hz, hover"]
 
 
-def test_an_interval_has_the_digits_that_show_it():
+def test_interval_has_enough_digits():
     assert words.quantity(Quantity(0.1203, 0.12028, 0.12034)) == "0.1203 (0.12028 to 0.12034)"
     assert words.quantity(Quantity(0.12, 0.09, 0.13)) == "0.12 (0.09 to 0.13)"

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from airtouch.gap.naming.evidence import with_evidence
+from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.records import Candidate, Strength
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.signatures.scatter import Scatter
+from gap_flights import VEHICLE
+from hovers import LIFT_N, hover, scattered, select_from
 
 FREEDOM, RMS = 8.0, 0.5
 NOMINAL = Scatter({"mass": np.array([RMS])}, FREEDOM, (0.0, 0.0))
@@ -36,3 +39,28 @@ def test_a_strength_at_its_bound_is_no_evidence(scatter):
     (high,) = terms("mass")[0].bounds()[1]
     assert evidence(scatter, high) == 0.0
     assert evidence(scatter, high, 30.0) == -10.0
+
+
+def test_halves_that_differ_lower_the_evidence():
+    """Four flights of the same mean push: alike, or 1.0 and 0.4 m/s^2 in turns."""
+    def pushed(*amounts):
+        return [hover(20 + k, (0.0, 0.0, -a), length_s=10.0) for k, a in enumerate(amounts)]
+
+    alike, apart = pushed(0.7, 0.7, 0.7, 0.7), pushed(1.0, 0.4, 1.0, 0.4)
+    (sure,), (doubted,) = (select_from(f, ("imu_bias",))[0].steps for f in (alike, apart))
+    unit = 0.1  # m/s^2, the parameter's step
+    assert doubted.strength.mean[2] == pytest.approx(sure.strength.mean[2], rel=0.02)
+    assert sure.strength.mean[2] == pytest.approx(-0.7 / unit, rel=0.02)
+    # the mean of two values that lie 0.6 apart
+    assert doubted.strength.variance[2] == pytest.approx((0.6 / unit) ** 2 / 4.0, rel=0.05)
+    assert sure.strength.variance[2] < 0.01 * doubted.strength.variance[2]
+
+    (mass,) = select_from(alike, ("mass",))[0].steps
+    nominal = scattered(mass=[abs(mass.strength.mean[0]) / 8.0])
+    (evident,), (deviation,) = (select_from(f, ("mass",), nominal)[0].steps for f in (alike, apart))
+    # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
+    assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.is_named
+    weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (0.4, 0.7))  # shares of the mass
+    assert deviation.evidence == pytest.approx(4.5 * np.log1p((8.0 * weak / between) ** 2 / 8.0), rel=0.1)
+    assert not deviation.is_named
+    assert deviation.gain > LEAST_GAIN

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from airtouch.gap.naming import forward as module
@@ -17,7 +18,7 @@ from airtouch.gap.naming.policy import (
     policy_of,
 )
 from airtouch.gap.naming.records import Candidate
-from hovers import scattered
+from hovers import DOWN, scattered, select_from, weak
 
 POLICY = policy_of(scattered(exact=True), 30.0)  #: of simulated flights
 
@@ -113,3 +114,19 @@ def test_deviation_goes_before_a_name_by_a_misfit_share(select, closer, first):
     named = 20_000.0 * (1.0 - closer * MISFIT_SHARE_DEVIATION)
     state, _ = select({"deviation": (20_000.0, FIRST_GAIN - 0.1), "named": (named, FIRST_GAIN)})
     assert names(state)[0] == first
+
+
+@pytest.mark.parametrize("nominal_loss", [True, False])
+def test_three_deviations_then_evidence_alone(nominal_loss):
+    """Four effects: lost rows, which gain least, where nominal flights lose as many as well, and where none does."""
+    flight = weak(r2=0.004, louder=1.3)
+    flight = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN],
+                     lost=np.random.default_rng(0).random(2000) < 0.02)
+    rms = {"mass": [3.0], "weak_motor": [30.0], "imu_noise": [30.0], "packet_loss": [30.0]}
+    study = scattered(**{n: r for n, r in rms.items() if n != "packet_loss" or nominal_loss})
+    selection, _ = select_from([flight], tuple(rms), study)
+    names = ["weak_motor", "mass", "imu_noise"] + ["packet_loss"] * (not nominal_loss)
+    assert [(s.name, s.is_named) for s in selection.steps] == [(n, n == "packet_loss") for n in names]
+    beside = {n: [t.name for t in j.terms] for n, j in selection.single_effects.items()}
+    assert beside["weak_motor"] == names[:1] and beside["mass"] == names[:2] and beside["imu_noise"] == names[:3]
+    assert beside["packet_loss"] == [*names[:2 if nominal_loss else 3], "packet_loss"], "as judged before the last step"

@@ -5,10 +5,16 @@ from types import SimpleNamespace
 
 import pytest
 
+import airtouch.gap.diagnosis as diagnose
+from airtouch.gap.answer.shrink import gap_of
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.gap_closure import closes_too_little, least_closed, named_beside_the_loop
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
+from airtouch.gap.naming.select import select
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
-from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.result import Quantity, Shrink
+from airtouch.gap.signatures.candidates import all_candidates, terms
+from gap_flights import fly
 
 LAW = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator_delay" for a in active))
 #: its loop model knows that this delay changes the loop
@@ -35,7 +41,7 @@ OVER = STANDS_OUT + 0.1
     (named("wind", gate=((0, 1),)), OVER, LEAST_CLOSED), (named("wind", gate=((0, 1),)), STANDS_OUT, None),
     (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), OVER, None), (named("packet_loss"), OVER, None),
     (selection(None, ()), OVER, None)])
-def test_recorded_flights_hold_names_against_the_gap(of, gap, least):
+def test_least_share_that_a_named_effect_must_close(of, gap, least):
     assert least_closed(DATA, of, gap) == least
     assert least_closed(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
 
@@ -43,11 +49,11 @@ def test_recorded_flights_hold_names_against_the_gap(of, gap, least):
 @pytest.mark.parametrize(("name", "closed", "too_little"), [
     ("actuator_delay", LEAST_CLOSED - 0.01, True), ("actuator_delay", LEAST_CLOSED, False),
     ("mass", 0.04, False), ("mass", 0.0, True), ("mass", -0.8, True)])
-def test_an_effect_that_takes_nothing_away_is_no_cause(name, closed, too_little):
+def test_effect_that_closes_too_little(name, closed, too_little):
     assert closes_too_little(DATA, named(name), OVER, closed) == too_little
 
 
-def test_beside_others_effects_of_the_loop_are_held_against_the_gap():
+def test_effects_named_beside_one_of_the_loop():
     wake = replace(terms("downwash")[0], gate=((0, 1),))
     several = [SimpleNamespace(name=n) for n in ("actuator_delay", "downwash", "mass")]
     both = SimpleNamespace(terms=(terms("actuator_delay")[0], wake, terms("mass")[0]))
@@ -56,3 +62,26 @@ def test_beside_others_effects_of_the_loop_are_held_against_the_gap():
     assert named_beside_the_loop(DATA, named("actuator_delay")) == [], "it has a rule of its own"
     no_loop = SimpleNamespace(terms=(wake, terms("mass")[0]))
     assert named_beside_the_loop(DATA, selection(no_loop, several[1:])) == []
+
+
+@pytest.fixture(scope="module")
+def delayed(study):
+    """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
+    recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    data = Data(recorded, fly(1, 93, {"actuator_delay": {"delay": 0.005}}))
+    return recorded, data, select(data, all_candidates())
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_loop_effect_that_closes_too_little_is_not_named(delayed, monkeypatch, closes):
+    """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
+    recorded, data, selection = delayed
+    requests = []
+    monkeypatch.setattr(diagnose, "select", lambda *of, **_: requests.append(of[0]) or selection)  # it looks at no gap
+    if not closes:
+        little = Shrink(1.4, 1.36, Quantity(0.1))
+        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), shrink=little))
+    diagnosis = diagnose.diagnose_with_study(recorded, data.flights, data=data)
+    assert requests == [data]
+    assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])
+    assert (diagnosis.verdict == "effect") == closes

@@ -11,6 +11,7 @@ from airtouch.gap.naming import judging
 from airtouch.gap.naming.judging import PricedVariant, covariance_among_all
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates, terms
+from gap_flights import fly
 from hovers import DOWN, FLOOR, hover
 
 
@@ -59,3 +60,19 @@ def test_choice_of_a_clock_effect_is_charged(beside_mass):
     both = judging.cross_validated(trial, PricedVariant("packet_loss", tuple(terms("packet_loss")), 0.5), base)
     assert both.gain - (base.gain if base else 0.0) == pytest.approx(loss(data).gain - 0.5)
     assert both.charges.choice_cost == (0.75 if beside_mass else 0.5)
+
+
+def test_certainty_refund_is_given_back_once(flying):
+    """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
+    data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
+    on = judging.trial_of(data)
+    latency = judging.PricedVariant("sensor_latency", all_candidates()["sensor_latency"][0], 0.0)
+    late = judging.cross_validated(on, latency, None)
+    both = judging.cross_validated(on, judging.PricedVariant("imu_noise", all_candidates()["imu_noise"][0], 0.5), late)
+    sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
+    joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
+    assert sure - unsure > 5.0 and late.charges.certainty_refund == 0.0 and both.charges.choice_cost == 0.5
+    assert both.charges.certainty_refund == pytest.approx(sure - unsure)
+    assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
+    third = judging.cross_validated(on, judging.PricedVariant("vibration", all_candidates()["vibration"][0], 0.0), both)
+    assert third.charges.certainty_refund == both.charges.certainty_refund, "paid once"

@@ -8,11 +8,11 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.judging import PricedVariant, cross_validated
-from airtouch.gap.naming.policy import HOPELESS, LEAST_GAIN
+from airtouch.gap.naming.policy import FIRST_GAIN, HOPELESS, LEAST_GAIN
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.signatures.candidates import all_candidates, terms
-from gap_flights import VEHICLE
+from gap_flights import VEHICLE, fly
 from hovers import DOWN, FLOOR, candidates_of, hover, swaying, weak
 
 
@@ -97,3 +97,18 @@ def test_unpromising_random_effect_is_not_fitted(louder, full):
     on = trial(hover(7, louder=louder))
     best = round_of(on, candidates_of(["imu_noise"]), None)["imu_noise"]
     assert best.full is full and bool(best.gain > HOPELESS) is full
+
+
+def test_every_strength_has_each_parameter_alone(flying):
+    data = Data(flying, fly(1, 62))
+    on = judging.trial_of(data)
+    best = rounds.every_strength(on, candidates_of(["controller_gain"]))["controller_gain"]
+    together = best.strength
+    _, *variants = all_candidates()["controller_gain"]
+    assert together.mean.shape == together.variance.shape == (len(variants),) == (4,)
+    for i, variant in enumerate(variants):
+        priced = PricedVariant("controller_gain", variant, np.log(len(variants)))
+        single = cross_validated(on, priced, None).strength
+        assert together.mean[i] == single.mean[i] and together.variance[i] == single.variance[i]
+        assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.mean, i).any()
+    assert best.gain < FIRST_GAIN, "a nominal flight"

@@ -5,14 +5,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from airtouch.gap.evidence.clock import clock_gain
+from airtouch.gap.evidence.clock import clock_gain, loss
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, policy, rounds
+from airtouch.gap.naming.select import nameless_nats, select
 from airtouch.gap.naming.unknown import is_explained
+from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.scatter import Scatter
-from gap_flights import VEHICLE
-from hovers import DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from
+from gap_flights import VEHICLE, fly, noise
+from hovers import DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, weak
+
+#: those that were taken for one of a pair, and the pairs' own
+CANDIDATES = ("actuator_delay", "com_offset", "controller_gain", "imu_bias", "imu_noise", "inertia", "motor_lag",
+              "motor_noise", "sensor_latency", "thrust_coefficient", "vibration", "wind")
 
 
 @pytest.fixture(scope="module")
@@ -165,3 +172,57 @@ def test_calm_is_a_gap_in_simulated_flights():
     exact, nominal = (select_from([hover(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = select_from([hover(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
     assert recorded.nameless.over_none < 12.0 and exact.nameless.over_none > nominal.nameless.over_none + 100.0
+
+
+@pytest.mark.parametrize("time_s", [0.005, 0.1])
+def test_variant_of_the_right_time_is_named(time_s):
+    """First-order noise of the lift, as motors make it; the longer is no stronger than the shorter."""
+    decay = np.exp(-0.01 / time_s)
+    lift = 0.6 * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], noise(30.0, 1.0, 3)[:, 2])
+    flight = hover(5)
+    flight = replace(flight, acceleration=flight.acceleration + lift[:, None] * [0.0, 0.0, 1.0])
+    selection, _ = select_from([flight], ("motor_noise",))
+    (step,) = selection.steps
+    assert step.terms[0].values["time"] == time_s and selection.assumed
+    assert step.charges.choice_cost == pytest.approx(np.log(3.0)), "one of three times"
+    # four motors of their own, each with a quarter of the weight
+    assert step.terms[0].values["rms"] == pytest.approx(0.6 / VEHICLE.gravity_mps2 * 2.0, rel=0.25)
+
+
+@pytest.mark.parametrize("rotor", [1, 2, 3, 4])
+def test_weak_rotor_is_named_by_its_side(rotor):
+    selection, _ = select_from([weak(**{f"r{rotor}": 0.002})], ("weak_motor",))
+    (step,) = selection.steps
+    assert step.terms[0].values["rotor"] == rotor
+    assert step.terms[0].values["thrust_loss"] == pytest.approx(0.002, rel=0.1)
+
+
+def test_two_weak_rotors():
+    selection, _ = select_from([weak(r1=0.002, r2=0.005)], ("weak_motor",))
+    first, second = selection.steps
+    losses = {t.values["rotor"]: t.values["thrust_loss"] for t in selection.last_step.terms}
+    assert losses == {2.0: pytest.approx(0.005, rel=0.1), 1.0: pytest.approx(0.002, rel=0.1)}
+    assert first.terms[0].values["rotor"] == 2.0
+    unit = losses[1.0] / second.terms[1].scaled(second.terms[1].values)[0]
+    assert second.strength.mean[0] * unit == pytest.approx(0.002, rel=0.1), "its own, not the first one's"
+
+
+def test_nameless_nats_include_the_times():
+    data = Data(FLOOR, [replace(hover(2), lost=np.random.default_rng(0).random(3000) < 0.1)])
+    on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
+    packet_loss = judging.cross_validated(on, judging.PricedVariant("packet_loss", (term,), 0.0), None)
+    assert packet_loss.gain == pytest.approx(loss(data)[1]) and packet_loss.gain > 100.0
+    assert nameless_nats(on, None) - nameless_nats(on, packet_loss) == pytest.approx(packet_loss.gain)
+
+
+@pytest.mark.parametrize("effects", [
+    {"com_offset": {"x": -0.0004, "y": -0.0006}, "actuator_delay": {"delay": 0.0045}},  # a fit that began at nothing
+    {"imu_bias": {"acc_x": 0.04, "acc_y": 0.02, "acc_z": -0.02, "gyro_x": 0.001, "gyro_y": -0.005, "gyro_z": 0.003},
+     "actuator_delay": {"delay": 0.005}},  # a screening that saw no bias
+    {"vibration": {"amplitude": 1.0}, "thrust_coefficient": {"loss": 0.004}},  # a share of what acts elsewhere
+])
+def test_both_effects_are_named_and_nothing_else(study, effects):
+    """Each was missed beside the other once: by the fit, by screening, by what the first must leave."""
+    selection = select(Data(study, fly(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
+    assert {s.name for s in selection.named_steps} == set(effects)
+    assert is_explained(selection)

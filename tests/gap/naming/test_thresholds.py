@@ -1,5 +1,6 @@
-"""In which cells a further effect is held against what the effects before it gain there."""
+"""What a further effect must gain: in which cells it is held against the effects before it, and beside made ones."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from airtouch.gap.naming import thresholds
 from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signals.channels import CHANNELS
+from hovers import DOWN, hover, scattered, select_from
 
 FORCE_X, FORCE_Z, TORQUE_X, RATE_Y = (
     [c.name for c in CHANNELS].index(name) for name in ("force_x", "force_z", "torque_x", "rate_y"))
@@ -88,3 +90,73 @@ def test_misfit_of_the_whole_gain(cells, recorded, everywhere, full, gain):
     """Recorded flights, a random effect, one that was not fitted, or one that gains as much as the whole share."""
     more = fitted(gain, full)
     assert thresholds.misfit(trial(recorded), fitted(10_000.0), more, 0.01, everywhere) == pytest.approx(100.0)
+
+
+def added_gains(selection):
+    """What each step gains over those before it, by name."""
+    so_far = [0.0, *(s.gain for s in selection.steps)]
+    return {s.name: s.gain - before for s, before in zip(selection.steps, so_far, strict=False)}
+
+
+def test_misfit_share_of_recorded_flights():
+    """A push, and noise a tenth above the floor: enough beside models that are exact, and not beside those of air."""
+    flights, names = [hover(2, (0.0, 0.0, -DOWN), louder=1.1)], ("mass", "imu_noise")
+    exact, _ = select_from(flights, names, scattered(exact=True))
+    assert [(s.name, s.is_named) for s in exact.steps] == [("mass", True), ("imu_noise", True)]
+    factor = exact.named_hypothesis.terms[1].values["factor"]
+    assert factor == pytest.approx(np.sqrt(2.0 * 1.1 ** 2 - 1.0), rel=0.03), "over the declared noise, half the floor"
+    added = added_gains(exact)
+    assert LEAST_GAIN < added["imu_noise"] < 0.1 * added["mass"]
+    recorded, _ = select_from(flights, names, scattered())
+    assert [s.name for s in recorded.steps] == ["mass"]
+    assert recorded.single_effects["imu_noise"].gain > LEAST_GAIN, "alone it would do"
+
+
+def test_misfit_counts_in_improved_cells_of_simulated_flights():
+    """Twice the noise everywhere, and a faint push that shows in the lowest band alone."""
+    flights, names = [hover(2, (0.0, 0.0, -0.06), louder=2.0)], ("mass", "imu_noise")
+    exact, _ = select_from(flights, names, scattered(exact=True))
+    assert [(s.name, s.is_named) for s in exact.steps] == [("imu_noise", True), ("mass", True)]
+    added = added_gains(exact)
+    assert LEAST_GAIN < added["mass"] < 0.01 * added["imu_noise"]
+    recorded, _ = select_from(flights, names, scattered())
+    assert [s.name for s in recorded.steps] == ["imu_noise"]
+
+
+def test_lost_rows_add_no_misfit():
+    """Of a tenth that another effect must gain in recorded flights, lost rows count for nothing."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    flight = replace(hover(2, (0.0, 0.0, -0.1), louder=1.25), lost=lost)
+    names_reported, names = [], ("mass", "imu_noise", "packet_loss")
+    selection, _ = select_from([flight], names, scattered(), progress=names_reported.append)
+    assert [s.name for s in selection.steps] == ["packet_loss", "mass", "imu_noise"]
+    added = added_gains(selection)
+    assert 0.1 * added["mass"] < added["imu_noise"] < 0.1 * (added["mass"] + added["packet_loss"])
+    assert names_reported.count("imu_noise") >= 3, "told in every round"
+
+
+@pytest.mark.parametrize(("louder", "named"), [(1.2, False), (1.25, True)])
+def test_random_effect_is_named_from_a_quarter_of_the_gain(louder, named):
+    """A model that is wrong looks random: noise that gains less stands there without a name."""
+    selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=louder)], ("mass", "imu_noise"), scattered())
+    added = added_gains(selection)
+    assert [(s.name, s.is_named) for s in selection.steps] == [("mass", True), ("imu_noise", named)]
+    assert (added["imu_noise"] > 0.25 * added["mass"]) == named and added["imu_noise"] > 0.1 * added["mass"]
+
+
+def test_few_lost_rows_are_not_named():
+    """What the log did to its own times has no cells in which it is held against the effect before it."""
+    lost = np.zeros(3000, bool)
+    lost[500:2900:200] = True
+    selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
+                                  scattered(exact=True))
+    assert 0.0 < selection.single_effects["packet_loss"].gain < LEAST_GAIN
+    assert [s.name for s in selection.steps] == ["mass"]
+
+
+def test_faint_push_beside_lost_rows_is_not_named():
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    flight = replace(hover(2, (0.0, 0.0, -0.02)), lost=lost)
+    selection, _ = select_from([flight], ("mass", "packet_loss"), scattered(exact=True))
+    assert 0.0 < selection.single_effects["mass"].gain < LEAST_GAIN
+    assert [s.name for s in selection.steps] == ["packet_loss"]

@@ -1,0 +1,63 @@
+"""Probabilities by their rules: odds of `unknown`, its limit beside an answer, and the candidates' odds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.answer.probabilities import LEAD, MOST_UNKNOWN, probabilities
+from airtouch.gap.naming.policy import TEMPERATURE, policy_of
+from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from hovers import FLOOR
+
+POLICY = policy_of(replace(FLOOR, nominal_count=5), 30.0)
+LIMIT = POLICY.unknown.least  #: nats that may be left beside effects that gain less than ten times as many
+LEAST = 8.0  #: nats of evidence that a candidate needs to be likelier than none
+
+
+def selection(gains, named=(), left=4.0):
+    """A selection among candidates whose evidence is their gain, beside which the nameless model gains `left`."""
+    candidates = {n: Candidate(n, (), g, evidence=g) for n, g in gains.items()}
+    return Selection(candidates, tuple(Step.of(candidates[n]) for n in named), NamelessGain(150.0, left), (None, None),
+                     dict.fromkeys(gains, LEAST), POLICY, assumed=False)
+
+
+@pytest.mark.parametrize("over_limit", [0.5, 1.0, 3.0])
+def test_the_odds_of_unknown_are_the_square_of_what_is_left_over_its_limit(over_limit):
+    chance = probabilities(selection({"mass": 2.0, "wind": 1.0}, left=over_limit * LIMIT))
+    assert chance["unknown"] / (1.0 - chance["unknown"]) == pytest.approx(over_limit ** 2, rel=1e-3)
+    assert sum(chance.values()) == pytest.approx(1.0) and set(chance) == {"mass", "wind", "none", "unknown"}
+
+
+def test_unknown_stays_below_the_effect_that_is_the_answer():
+    """Nearly as much is left as may be: without the limit `unknown` had nearly one half, and so had mass."""
+    gains = {"mass": 30.0, "wind": 30.0}
+    chance = probabilities(selection(gains, ("mass",), left=0.99 * LIMIT))
+    assert chance["unknown"] / chance["mass"] == pytest.approx(MOST_UNKNOWN)
+    little_left = probabilities(selection(gains, ("mass",), left=0.3 * LIMIT))["unknown"]
+    assert little_left == pytest.approx(0.09 / 1.09, rel=0.01), "far below the limit its own odds count"
+
+
+def test_unknown_is_not_limited_where_it_is_the_answer():
+    chance = probabilities(selection({"mass": 30.0}, ("mass",), left=2.0 * LIMIT))
+    assert chance["unknown"] == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize("named", [(), ("mass",)])
+def test_unknown_stays_below_none_where_that_is_the_answer(named):
+    """Also where more is left than may be, and where an effect is named: the gap is at its floor."""
+    chance = probabilities(selection({"mass": 30.0}, named, left=5.0 * LIMIT), is_none=True)
+    assert chance["unknown"] / chance["none"] == pytest.approx(MOST_UNKNOWN)
+
+
+@pytest.mark.parametrize(("other", "behind"), [(60.0, LEAD), (50.0 - 0.5 * LEAD, LEAD), (40.0, 10.0)])
+def test_the_effect_named_first_leads_by_its_gain_and_by_lead_at_least(other, behind):
+    chance = probabilities(selection({"wind": other, "mass": 50.0}, ("mass",)))
+    assert chance["mass"] / chance["wind"] == pytest.approx(np.exp(behind / TEMPERATURE))
+
+
+def test_what_is_missing_counts_in_full():
+    """Of three candidates each has the odds e^(evidence - needed) / 3 beside none."""
+    chance = probabilities(selection({"mass": 6.0, "wind": 1.0, "gust": -3.0}))
+    for name, evidence in (("mass", 6.0), ("wind", 1.0), ("gust", -3.0)):
+        assert chance[name] / chance["none"] == pytest.approx(np.exp(evidence - LEAST) / 3.0)
