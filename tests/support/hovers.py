@@ -16,7 +16,7 @@ from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import signals
 from gap_flights import VEHICLE, flight, noise
 
-ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes
+ALWAYS = ("wind", "gust", "downwash")  #: left out, so that there are no passing effects
 LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
 DOWN = 0.5  #: m/s^2, pushed where a test pushes
 FLOOR = declared_study(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise

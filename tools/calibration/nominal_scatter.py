@@ -9,7 +9,7 @@ With --keep, flights that the file holds already are not worked on again.
 
     python tools/calibration/nominal_scatter.py [FLIGHTS] --passing    # 5 min
 
-measures nothing but what comes and goes, in the same flights of the same groups, and puts that into the table that is
+measures nothing but passing effects, in the same flights of the same groups, and puts that into the table that is
 shipped.
 """
 
@@ -148,17 +148,17 @@ def _compare(task: Task) -> list[dict]:
 
 
 def passing_alone(data: Data) -> ApparentStrengths:
-    """What comes and goes in a flight, and nothing else."""
+    """Passing effects in a flight, and nothing else."""
     return ApparentStrengths({}, {}, 0.0, passing_sizes(data))
 
 
 def _passing_of(group: Group) -> list[ApparentStrengths]:
-    """What comes and goes in every flight of a group, held against the others."""
+    """Passing effects in every flight of a group, held against the others."""
     return [apparent for _, apparent in held_out(group.logs, group.vehicle, look=passing_alone)]
 
 
 def with_passing(pool: ProcessPoolExecutor, groups: list[Group]) -> dict[str, Scatter]:
-    """The classes of the table that is shipped, with what comes and goes in their flights measured anew."""
+    """The classes of the table that is shipped, with passing effects in their flights measured anew."""
     flights = defaultdict(list)
     for group, sizes in zip(groups, pool.map(_passing_of, groups), strict=True):
         flights[group.of] += sizes

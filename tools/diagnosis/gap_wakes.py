@@ -146,7 +146,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
         for seconds in seconds_of.get(kind[name], []):
             data = Data(overhead.with_overhead(study, flight, seconds), [flight])
-            wake = gates.gated_effects(data).get(gates.KNOWN_OVERHEAD)
+            wake = gates.passing_effects(data).get(gates.KNOWN_OVERHEAD)
             trials += 1
             if wake is not None and passing_evidence(data, wake.key, wake.gain, wake.strength) >= PASSING_GAIN:
                 alarms.append(name)

@@ -15,7 +15,7 @@ naming      which effects are named
 relations   these numbers compared with those of simulated flights of each effect
 features    what a flight's signals do to one another, in numbers
 nameless    what no effect explains: the nameless model, "a model without names" in answers
-passing     effects that come and go: when they act
+passing     passing effects: when they act
 evidence    how likely flights are under effects, and the fit of effects to them
 signals     what is compared, channel by channel: residuals, spectra, floors
 loop        the closed loop: what noise, set-points and torques make of the commands

@@ -42,7 +42,7 @@ OVER = AT_FLOOR + 0.5
 @pytest.mark.parametrize(("of", "before", "verdict"), [
     (selection(), AT_FLOOR, "none"), (selection(left=900.0), AT_FLOOR, "none"),  # no gap
     (selection(by_relations=True), AT_FLOOR, "effect"),  # the relations decide
-    (selection(gate=(("a.csv", 1.0, 2.0),)), AT_FLOOR, "effect"),  # what comes and goes is outside the gap
+    (selection(gate=(("a.csv", 1.0, 2.0),)), AT_FLOOR, "effect"),  # a passing effect is outside the gap
     (selection(left=900.0), OVER, "unknown"), (selection((), left=900.0), OVER, "unknown"),
     (selection(left=900.0, by_relations=True), AT_FLOOR, "unknown"),
     (selection(()), OVER, "none"), (selection(), OVER, "effect")])
@@ -84,4 +84,4 @@ def test_a_larger_probability_changes_places_with_the_answer():
     chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
     assert agreeing(chance, "unknown") == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5}
     assert agreeing(chance, "mass") == chance
-    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}, "one that comes and goes"
+    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}, "a passing effect"

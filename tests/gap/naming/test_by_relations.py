@@ -75,7 +75,7 @@ PUSHED = Data(scattered(), [with_a_push(9.0, 15.0)])  #: a push of some seconds,
 
 @pytest.mark.parametrize("against", [EXPLAINED, OPEN])
 def test_relations_name_what_always_acts(relations, against):
-    """The replay is not asked where nothing comes and goes, explained or not."""
+    """The replay is not asked where no effect passes, explained or not."""
     told = inference([effect_class("mass")], against)
     relations(told)
     selection = select.select(Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass"]))

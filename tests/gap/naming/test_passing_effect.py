@@ -1,4 +1,4 @@
-"""What comes and goes, in made flights with a push for some seconds: when it is named, and before what."""
+"""Passing effects, in made flights with a push for some seconds: when one is named, and before what."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import policy
-from airtouch.gap.passing.gates import KNOWN_OVERHEAD, gated_effects
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, passing_effects
 from airtouch.gap.signatures.scatter import FALSE_SHARE, size_of
 from hovers import ALWAYS, FLOOR, scattered, select_from, with_a_push
 
@@ -60,7 +60,7 @@ def test_passing_effect_must_gain_more_than_a_steady_one(names, nominal_sizes, m
 def test_passing_effect_must_gain_more_than_the_height(monkeypatch, less, named):
     """Something that follows the flight's own height is told to gain a little less than a push for 6 of 30 s."""
     flights, study = [with_a_push(9.0, 15.0)], scattered()
-    gain = gated_effects(Data(study, flights))["downwash"].gain
+    gain = passing_effects(Data(study, flights))["downwash"].gain
     monkeypatch.setattr("airtouch.gap.naming.passing_effect.height_gain", lambda *_: gain - less)
     assert [s.name for s in select_from(flights, (), study, ())[0].named_steps] == named
 

@@ -1,4 +1,4 @@
-"""Effects that come and go: stretches found in flights into which one was injected, and none where none was."""
+"""Passing effects: stretches found in flights into which one was injected, and none where none was."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.scatter import size_of
-from airtouch.gap.signatures.signature import GATED
+from airtouch.gap.signatures.signature import PASSING
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
@@ -42,7 +42,7 @@ def pushed(nominal, share):
 
 def test_a_wake_is_found_with_its_seconds(study, nominal_flight):
     data = Data(study, [pushed(nominal_flight, 0.1)])
-    strongest = max(gates.gated_effects(data).values(), key=lambda g: g.gain)
+    strongest = max(gates.passing_effects(data).values(), key=lambda g: g.gain)
     assert strongest.gain > 100.0
     acts = inside(strongest.fitted.terms[0].gate, nominal_flight)
     t = np.arange(len(nominal_flight)) * flight.PERIOD_S
@@ -52,7 +52,7 @@ def test_a_wake_is_found_with_its_seconds(study, nominal_flight):
 
 
 def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight):
-    for name, gated in gates.gated_effects(Data(study, [nominal_flight])).items():
+    for name, gated in gates.passing_effects(Data(study, [nominal_flight])).items():
         rate = gated.gain / (len(nominal_flight) * flight.PERIOD_S)
         assert gated.gain < PASSING_GAIN or study.scatter.unusual({name: size_of(rate, gated.strength)}) < 0.0
 
@@ -76,7 +76,7 @@ def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and
     data = Data(calm, [replace(nominal_flight, acceleration=acceleration)])
     level = [judge(data, whole_of(data), (), wide) for wide in (False, True)]
     assert level[1] - level[0] > 100.0  # else this flight tests nothing
-    assert gates.gated_effects(data)["gust"].gain < 12.0  # it pushes sideways, the burst upwards
+    assert gates.passing_effects(data)["gust"].gain < 12.0  # it pushes sideways, the burst upwards
 
 
 def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
@@ -136,8 +136,8 @@ def test_a_wake_of_some_width_pushes_under_its_axis_only():
 
 
 def test_every_gated_effect_is_one_of_the_registry():
-    assert set(candidates.gated_variants()) == set(GATED) <= set(effects.EFFECTS)
-    assert "wind" not in candidates.gated_variants(["wind"])
+    assert set(candidates.passing_variants()) == set(PASSING) <= set(effects.EFFECTS)
+    assert "wind" not in candidates.passing_variants(["wind"])
 
 
 def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
@@ -147,7 +147,7 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
     force = nominal_flight.acceleration.copy()
     force[on, 1] += 1.5 * np.sin(2.0 * np.pi * 4.0 * t[on]) + 0.1 * rng.normal(size=on.sum())
     odd = replace(nominal_flight, acceleration=force)
-    selection = select(Data(study, [odd]), {}, without=tuple(GATED))
+    selection = select(Data(study, [odd]), {}, without=tuple(PASSING))
     cell = Cell("force_y", (2.0, 6.0), "cruise", 0.5, 0.1, "m/s^2")
     first, = unexplained(study, [odd], selection, [cell])
     assert (first.channel, first.flight) == ("force_y", nominal_flight.name)
@@ -171,6 +171,6 @@ def test_nothing_comes_and_goes_in_take_off_and_landing(study, nominal_flight):
     assert ends.sum() * flight.PERIOD_S > 1.0
     force = nominal_flight.acceleration.copy()
     force[ends, 2] -= 0.1 * VEHICLE.gravity_mps2
-    for gated in gates.gated_effects(Data(study, [replace(nominal_flight, acceleration=force)])).values():
+    for gated in gates.passing_effects(Data(study, [replace(nominal_flight, acceleration=force)])).values():
         acts = inside(gated.fitted.terms[0].gate, nominal_flight)
         assert (acts & ends).sum() <= 0.5 * acts.sum()

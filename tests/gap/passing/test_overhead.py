@@ -59,7 +59,7 @@ def nominal_flight():
 def evidence(study, one):
     """Size of a wake in SECONDS beyond its limit, and its gain."""
     known = overhead.with_overhead(study, one, SECONDS)
-    wake = gates.gated_effects(Data(known, [one]))[gates.KNOWN_OVERHEAD]
+    wake = gates.passing_effects(Data(known, [one]))[gates.KNOWN_OVERHEAD]
     size = size_of(wake.gain / (len(one) * PERIOD_S), wake.strength)
     return known.scatter.unusual({wake.key: size}), wake.gain
 

@@ -1,4 +1,4 @@
-"""The residual: at the ends of a flight, of effects that come and go, and of one flight beside another."""
+"""The residual: at the ends of a flight, of passing effects, and of one flight beside another."""
 
 from dataclasses import replace
 

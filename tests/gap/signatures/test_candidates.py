@@ -9,8 +9,8 @@ from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.alike import interchangeable, names_alike
 from airtouch.gap.signatures.candidates import (
     all_candidates,
-    gated_variants,
     is_random,
+    passing_variants,
     shows_in,
     strength_term,
     term_of,
@@ -48,7 +48,7 @@ def test_a_ground_effect_is_tried_without_and_with_its_random_part():
 
 
 def test_a_wake_is_never_tried_without_its_random_part():
-    for variants in (all_candidates()["downwash"], gated_variants()["downwash"]):
+    for variants in (all_candidates()["downwash"], passing_variants()["downwash"]):
         assert [kinds(v) for v in variants] == [[("downwash", MEAN, False), ("downwash", SPECTRUM, True)]]
     assert strength_term(variants[0]) is variants[0][1]
     assert is_random("downwash") and not is_random("ground_effect")
@@ -59,7 +59,7 @@ def test_moving_air_has_drag_beside_it_unless_drag_is_left_out():
         variants = all_candidates()[name]
         assert [len(v) for v in variants] == [1] * len(terms(name)) + [2] * len(terms(name))
         assert kinds(variants[-1])[1] == ("rotor_drag", MEAN, True)
-        assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + gated_variants()[name])
+        assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + passing_variants()[name])
 
 
 @pytest.mark.parametrize(("name", "where"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])

@@ -25,10 +25,10 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     2. what is left beside the effects named is more than chance leaves: "unknown";
     3. no effect is named: "none"; else "effect".
 
-    What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
-    in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may be
-    calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no nominal
-    flight has odd times. A recorded one had calm air or a poor link.
+    What the log has done to itself shows in its times alone, and is no part of the gap; a passing effect is
+    seldom in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may
+    be calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no
+    nominal flight has odd times. A recorded one had calm air or a poor link.
     """
     if selection.inference is None and _at_its_floor(data, selection, gap):
         return "none"
@@ -70,7 +70,7 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
 def agreeing(probability: Mapping[str, float], answer: str) -> dict[str, float]:
     """The probabilities, of which the answer's is the largest: a larger one changes places with it.
 
-    The verdict weighs what the ranking of single candidates does not, as effects that come and go.
+    The verdict weighs what the ranking of single candidates does not, as a passing effect.
     """
     out = {answer: 0.0, **probability}
     best = max(out, key=out.__getitem__)

@@ -5,7 +5,7 @@
 select           the selection, by the replay or by the relations of signals
 gap_closure      the fraction of the gap that effects of recorded flights must close
 by_relations     the effects that the relations of signals name, fitted beside one another
-passing_effect   an effect that comes and goes, tried before those that always act
+passing_effect   an effect that acts for some seconds only, tried before those that always act
 forward          effects added one by one, each beside those before it
 leave_one_out    what each of several effects adds to the others
 over_prediction  where the effects named predict what the flights do not show

@@ -8,7 +8,7 @@ in them, and gains likelihood by it. So the gain alone names nothing. The rule, 
              = min(gain - gain of the base, 0)                         of a strength at its bound
 
 The rarity is the log likelihood of the strength over that of nominal scatter and chance (`Scatter.evidence`). At its
-bound the model stretches to fit what another effect does. An effect that comes and goes has the same rule for its size
+bound the model stretches to fit what another effect does. A passing effect has the same rule for its size
 (`passing_effect.passing_evidence`), and the relations of signals have an evidence of their own.
 """
 

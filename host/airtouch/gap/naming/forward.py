@@ -86,7 +86,7 @@ class State:
 def forward(search: Search, passing: Candidate | None) -> State:
     """The state in which a forward selection ends.
 
-    passing: an effect that comes and goes, which is the first step; None for none.
+    passing: a passing effect, which is the first step; None for none.
     """
     state = _begun(search, passing)
     while len(state.names) < MOST_EFFECTS:
@@ -98,7 +98,7 @@ def forward(search: Search, passing: Candidate | None) -> State:
 
 
 def _begun(search: Search, passing: Candidate | None) -> State:
-    """The state before the first effect is added, with an effect that comes and goes as a step already."""
+    """The state before the first effect is added, with a passing effect as a step already."""
     if passing is None:
         extensions = {n: Extension(c, search.least_nats[n]) for n, c in search.single_effects.items()}
         return State((), extensions, search.single_effects, search.least_nats)

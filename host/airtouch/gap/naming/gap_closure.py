@@ -19,7 +19,7 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     """Share of the gap that the effects named must close, to be named; None where they need not.
 
     gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
-    must close LEAST_CLOSED, and so must one that comes and goes if the gap is over STANDS_OUT. Over STANDS_OUT any
+    must close LEAST_CLOSED, and so must a passing one if the gap is over STANDS_OUT. Over STANDS_OUT any
     other must close more than 0: an effect that leaves the whole gap is not its cause. Effects of the logged times, and
     one whose seconds are known from another vehicle's log, need close nothing.
     """
@@ -54,7 +54,7 @@ def with_none_named(selection: Selection, closed: float) -> Selection:
 
 
 def names_one_that_passes(selection: Selection) -> bool:
-    """Whether one effect is named, and it comes and goes."""
+    """Whether one effect is named, and it is a passing one."""
     hypothesis = selection.named_hypothesis
     return hypothesis is not None and len(selection.named_steps) == 1 and all(t.gate for t in hypothesis.terms)
 

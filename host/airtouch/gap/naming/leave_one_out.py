@@ -21,7 +21,7 @@ from airtouch.gap.signatures.term import Term
 def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
     """The steps of a selection, with the leave-one-out gain of those that stand beside others.
 
-    These are all that are named, where there are several, and one that comes and goes beside any other: what is as
+    These are all that are named, where there are several, and a passing one beside any other: what is as
     strong as in nominal flights may have its seconds as well. Seconds that another vehicle's log tells are sure.
     """
     several_named = sum(s.is_named for s in steps) > 1

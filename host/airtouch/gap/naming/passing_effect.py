@@ -1,4 +1,4 @@
-"""The effect that comes and goes, tried before those that always act, and its evidence."""
+"""The passing effect, tried before those that always act, and its evidence."""
 
 from collections.abc import Sequence
 
@@ -11,14 +11,14 @@ from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.records import Candidate, Charges, Step, Strength
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
-from airtouch.gap.passing.gates import KNOWN_OVERHEAD, GatedEffect, gated_effects
+from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
 def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
-    """The effect that comes and goes and explains most; None where none is news.
+    """The passing effect that explains most; None where none is news.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
@@ -29,7 +29,7 @@ def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
     if data.study.scatter is None:
         return None
     least = height_gain(data, trial.halves) + PASSING_GAIN
-    passing = [g for g in gated_effects(data, without).values()
+    passing = [g for g in passing_effects(data, without).values()
                if g.gain >= least and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
     if passing:  # else what always acts need not be judged
         always = [c.gain for name, c in search.single_effects.items() if c.evidence >= search.least_nats[name]]
@@ -40,8 +40,8 @@ def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
     return _as_judged(trial, max(overhead or passing, key=lambda g: g.gain))
 
 
-def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
-    """An effect that comes and goes as a hypothesis; it is fitted on both halves, as it may act in one alone."""
+def _as_judged(trial: Trial, effect: PassingEffect) -> Candidate:
+    """A passing effect as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
@@ -51,21 +51,21 @@ def _as_judged(trial: Trial, effect: GatedEffect) -> Candidate:
 
 
 def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step]) -> bool:
-    """Whether an effect that comes and goes adds no more to the effects beside it than in nominal flights."""
+    """Whether a passing effect adds no more to the effects beside it than in nominal flights."""
     key = passing.passing_key
-    assert key is not None  # it comes and goes
+    assert key is not None  # it is a passing effect
     return any(passing_evidence(data, key, s.leave_one_out_gain, passing.strength.mean) < PASSING_GAIN
                for s in steps if s.name == passing.name and s.is_named and s.leave_one_out_gain is not None)
 
 
 def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
-    """Evidence, nats, for an effect that comes and goes: its gain, but no more than nominal flights leave it.
+    """Evidence, nats, for a passing effect: its gain, but no more than nominal flights leave it.
 
     They leave it PASSING_GAIN and the nats by which its size is beyond theirs.
 
-    key: `GatedEffect.key`; gain: nats; strength (k,): its scaled parameters.
+    key: `PassingEffect.key`; gain: nats; strength (k,): its scaled parameters.
     """
-    assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
+    assert data.study.scatter is not None  # no passing effect is looked for without nominal flights
     sizes = {key: size_of(gain / data.seconds, strength)}
     if key == OVERHEAD:
         of_wakes = {UNSTEADY_YAW: unsteady_yaw, DOWNWARD: downward}

@@ -18,7 +18,7 @@ LEAST_GAIN = 12.0
 LONGER_GAIN = LEAST_GAIN
 #: that an effect with its companion must gain over the companion alone, else it is put as far behind (`rounds`)
 COMPANION_GAIN = LEAST_GAIN
-#: that an effect which comes and goes must gain over those that always act, and have as evidence; what it gains up to
+#: that a passing effect must gain over those that always act, and have as evidence; what it gains up to
 #: here counts whatever nominal flights show (`passing_effect`)
 PASSING_GAIN = LEAST_GAIN
 #: evidence of a mean effect in one round from which the next fits it in full, whatever screening says (`forward`)

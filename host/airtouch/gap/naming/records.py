@@ -62,7 +62,7 @@ class Candidate:
     `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only screened;
     full: whether it was fitted to the end, not screened or fitted briefly. Of the newest effect: strength; evidence:
     nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
-    flights; passing_key: where it comes and goes, the entry of `Scatter.passing` that it is compared with,
+    flights; passing_key: of a passing effect, the entry of `Scatter.passing` that it is compared with,
     else None.
     """
 
@@ -88,7 +88,7 @@ class Step(Candidate):
 
     is_named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights
     have as well, and stands beside the effects named. leave_one_out_gain: what the newest adds to the others, nats: of
-    effects that are named where there are several, and of one that comes and goes beside any step; else None.
+    effects that are named where there are several, and of a passing one beside any step; else None.
     """
 
     is_named: bool = True

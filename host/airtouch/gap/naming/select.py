@@ -43,7 +43,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
        and leaves nothing unexplained: the effect's class was learned from few flights. Else as in 2.
 
     candidates: the variants of every effect by name; progress: called with the name of every candidate that is judged;
-    without: effects that are not searched for as ones that come and go; rank_all: judge every candidate alone where the
+    without: effects that are not searched for as passing ones; rank_all: judge every candidate alone where the
     relations name the effects as well, which the ranking needs for the share of the gap that each closes.
     """
     search = Search(trial_of(data), candidates, progress)
@@ -83,12 +83,12 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
 
 
 def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
-    """Whether the replay is asked where the relations leave something unexplained. passing: what comes and goes.
+    """Whether the replay is asked where the relations leave something unexplained. passing: the passing effect, if any.
 
-    It is asked in three cases:
+    It is asked in three cases, the first two of a passing effect:
 
-    1. what comes and goes is a wake: the relations of a whole flight dilute its seconds;
-    2. what comes and goes is the effect for which the relations have most evidence;
+    1. it is a wake: the relations of a whole flight dilute its seconds;
+    2. it is the effect for which the relations have most evidence;
     3. for a wake that fills the flight (ALWAYS_RANDOM holds `downwash` alone) they have more than WAKE_SHARE of that
        evidence, nats.
     """
@@ -101,7 +101,7 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
 def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:
     """The selection that a forward search ended in, with what it leaves.
 
-    passing: the effect that comes and goes, its first step; the search is done again without it where beside the other
+    passing: the passing effect, its first step; the search is done again without it where beside the other
     effects it is no more than nominal flights have.
     """
     trial, policy = search.trial, search.trial.policy

@@ -16,13 +16,13 @@ from airtouch.gap.naming.rounds import every_strength
 from airtouch.gap.naming.select import nameless_nats
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
-from airtouch.gap.passing.gates import gated_effects
+from airtouch.gap.passing.gates import passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
-from airtouch.gap.signatures.signature import CLOCK, GATED, SPECTRUM
+from airtouch.gap.signatures.signature import CLOCK, PASSING, SPECTRUM
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 
@@ -54,9 +54,9 @@ def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStren
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
-    """Size of each effect that comes and goes but those of `without`, and the two measures of a wake beside it."""
-    passing = gated_effects(data, without)
-    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in GATED}
+    """Size of each passing effect but those of `without`, and the two measures of a wake beside it."""
+    passing = passing_effects(data, without)
+    sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in PASSING}
     return {**sizes, UNSTEADY_YAW: unsteady_yaw(data), DOWNWARD: downward(data)}
 
 

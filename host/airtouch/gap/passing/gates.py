@@ -1,8 +1,8 @@
-"""Effects that come and go: what each explains within the stretches in which it acts, its gate.
+"""Passing effects: what each explains within its gate, the stretches in which it acts.
 
 An effect is tried in the stretches of blocks that it explains best (`stretches`) and in bursts that are shorter than a
-block (`bursts`). A stretch may lie in one half of a split, so a gated effect is judged on what it is fitted on, at the
-cost of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the choice of its gate.
+block (`bursts`). A stretch may lie in one half of a split, so a passing effect is judged on what it is fitted on, at
+the cost of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the choice of its gate.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ KNOWN_OVERHEAD = "known overhead"  #: a wake in seconds in which another vehicle
 
 
 @dataclass(frozen=True)
-class GatedEffect:
+class PassingEffect:
     """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs, nats."""
 
     name: str
@@ -43,7 +43,7 @@ class GatedEffect:
 
 @dataclass(frozen=True)
 class NoEffect:
-    """Flights without any effect, against which one that comes and goes is held.
+    """Flights without any effect, against which a passing one is held.
 
     whole: all their blocks; each (b,): log likelihood of every block in the air; level: that of the flights, as sure of
     the commands' floor as without (False) and with (True) random effects.
@@ -64,8 +64,8 @@ def no_effect(data: Data) -> NoEffect | None:
     return NoEffect(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
 
 
-def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEffect]:
-    """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
+def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, PassingEffect]:
+    """Passing effects, each in the stretches in which it explains most; not those that never act.
 
     without: names that are left out. Where another vehicle is known to be overhead, what it does there is one more,
     KNOWN_OVERHEAD.
@@ -74,7 +74,7 @@ def gated_effects(data: Data, without: Sequence[str] = ()) -> dict[str, GatedEff
     if base is None:
         return {}
     in_bursts, out = [bursts(data, signal) for signal in (FORCE, YAW)], {}
-    for name, variants in candidates.gated_variants(without).items():
+    for name, variants in candidates.passing_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best_variant(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
         acting = [_in_gate(base, name, trial) for v in variants for trial in _trials(base, v, in_bursts)]
@@ -90,18 +90,18 @@ def _trials(base: NoEffect, terms: Sequence[Term], in_bursts: Sequence[tuple[Gat
     return [trial for trial in trials if trial.gate]
 
 
-def effect_within(data: Data, name: str, gate: Gate) -> GatedEffect | None:
+def effect_within(data: Data, name: str, gate: Gate) -> PassingEffect | None:
     """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
     base = no_effect(data)
-    return _best_variant(base, name, candidates.gated_variants()[name], gate) if base is not None else None
+    return _best_variant(base, name, candidates.passing_variants()[name], gate) if base is not None else None
 
 
-def _best_variant(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> GatedEffect:
+def _best_variant(base: NoEffect, name: str, variants: Sequence[Sequence[Term]], gate: Gate) -> PassingEffect:
     """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
     return max((_in_gate(base, name, GateTrial(v, gate, 0.0)) for v in variants), key=lambda effect: effect.gain)
 
 
-def _in_gate(base: NoEffect, name: str, trial: GateTrial) -> GatedEffect:
+def _in_gate(base: NoEffect, name: str, trial: GateTrial) -> PassingEffect:
     """An effect fitted within the gate in which it is tried."""
     acting = [replace(t, gate=trial.gate) for t in trial.terms]
     fitted = fit(base.data, base.whole, acting)
@@ -109,4 +109,4 @@ def _in_gate(base: NoEffect, name: str, trial: GateTrial) -> GatedEffect:
     level_without = base.level[bool(random_of(acting))]
     cost_of_parameters = PARAMETER_COST * free * np.log(len(base.each))
     gain = judge(base.data, base.whole, fitted.terms) - level_without - trial.cost - cost_of_parameters
-    return GatedEffect(name, fitted, gain, trial.cost, name)
+    return PassingEffect(name, fitted, gain, trial.cost, name)

@@ -24,13 +24,13 @@ LEAST_WORST = 2  #: blocks that it is first fitted to at least
 ALTERNATIONS = 3  #: alternations of fitting an effect and choosing its stretches
 LEAST_BLOCKS = 6  #: blocks in the air, below which no stretch is sought
 STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
-WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
+WHOLE = 0.9  #: share of a flight's blocks above which an effect is no passing one
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 
 
 class GateTrial(NamedTuple):
-    """An effect to be tried in a gate, none where it does not come and go; cost: nats, of the gate's choice."""
+    """An effect to be tried in a gate, none where it is no passing effect; cost: nats, of the gate's choice."""
 
     terms: Sequence[Term]
     gate: Gate

@@ -95,7 +95,7 @@ class ReplayedFlight:
     workspace: Workspace = field(default_factory=Workspace, init=False, repr=False)
 
     def residual(self, active: Sequence[Active] = ()) -> np.ndarray:
-        """The function `residual`: a gated effect adds in its seconds what it adds there when it always acts."""
+        """The function `residual`: a passing effect adds in its seconds what it adds there when it always acts."""
         gated, always = [a for a in active if a.gate], [a for a in active if not a.gate]
         if not gated:
             return self._ungated(active)

@@ -6,7 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.result import NamedEffect
-from airtouch.gap.signatures.signature import ALWAYS_RANDOM, COMPANIONS, GATED, MEAN, SIGNATURES, SPECTRUM, signature_of
+from airtouch.gap.signatures.signature import (
+    ALWAYS_RANDOM,
+    COMPANIONS,
+    MEAN,
+    PASSING,
+    SIGNATURES,
+    SPECTRUM,
+    signature_of,
+)
 from airtouch.gap.signatures.term import Term, Terms
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
@@ -39,10 +47,10 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     return out
 
 
-def gated_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
-    """The variants of effects that may come and go, by name; `passing.gates` sets their gates."""
+def passing_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
+    """The variants of passing effects, by name; `passing.gates` sets their gates."""
     without, out = set(without), {}
-    for name in GATED:
+    for name in PASSING:
         if name in EFFECTS and name not in without:
             random = () if SIGNATURES[name].without_random is None else (random_part_of(name),)
             out[name] = [(t, *random) for t in terms(name)]

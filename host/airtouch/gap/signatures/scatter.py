@@ -28,7 +28,7 @@ EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is adde
 QUANTILES = 1000  #: of Student's distribution, of which sums of rarities are made; chosen
 STEPS = 12  #: iterations of the compromise between nominal scatter and chance; chosen
 LEAST_SPREAD = 0.05  #: natural steps: scatter of a size at least; chosen
-FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that come and go may be named; chosen
+FALSE_SHARE = 0.01  #: share of nominal flights in which a passing effect may be named; chosen
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ApparentStrengths:
 
 
 def size_of(rate: float, strength: np.ndarray) -> float:
-    """Size of an effect that comes and goes: the geometric mean of the root of its rate and of its strength.
+    """Size of a passing effect: the geometric mean of the root of its rate and of its strength.
 
     rate: nats a second that it gains; strength (k,): in natural steps. What nominal flights seem to have gains much
     in calm ones with hardly any strength, and has strength in hard ones but gains little: only what does both is
@@ -127,7 +127,7 @@ class Scatter:
         return least + seconds * (middle + min(deviations, MOST_DEVIATIONS) * spread) ** 2
 
     def unusual(self, sizes: Mapping[str, float]) -> float:
-        """Log likelihood (Student) by which sizes of what comes and goes, together, exceed those of nominal flights.
+        """Log likelihood (Student) by which sizes of passing effects, together, exceed those of nominal flights.
 
         sizes: by name, as in `passing`; their log likelihoods add up, as if nominal flights had them independently of
         one another. It is 0 at the sum that a share FALSE_SHARE of nominal flights exceeds, and negative below.

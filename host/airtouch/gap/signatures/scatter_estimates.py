@@ -72,7 +72,7 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
         pooled = standard_deviation(together, errors, 0.0)
         rms[name] = np.array([standard_deviation(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1
                              else [pooled])
-    # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
+    # of passing effects the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
     passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
     roots = np.sqrt([f.rate for f in alike])

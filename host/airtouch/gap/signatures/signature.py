@@ -58,7 +58,7 @@ class Signature:
     scales_torque: whether it only multiplies torque, and would shrink any trim.
     spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
     loss_runs: for what loses samples in runs, the parameters that say so.
-    comes_and_goes: whether it may act in a part of a flight only.
+    may_pass: whether it may act in a part of a flight only.
 
     What is beside it:
     without_random: values at which the effect has no random part, for a mean part whose random part is a term of its
@@ -82,7 +82,7 @@ class Signature:
     scales_torque: bool = False
     spectrum: str = ""
     loss_runs: LossRuns | None = None
-    comes_and_goes: bool = False
+    may_pass: bool = False
     without_random: Mapping[str, float] | None = None
     always_random: bool = False
     companion: str = ""
@@ -132,11 +132,11 @@ SIGNATURES: dict[str, Signature] = {
         own_scatter=0.07),
     "rotor_drag": Signature(("horizontal", "vertical")),
     "wind": Signature(
-        ("x", "y", "z"), comes_and_goes=True,
+        ("x", "y", "z"), may_pass=True,
         variants=({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
         companion="rotor_drag"),  # air moves the vehicle through its rotors' drag
     "gust": Signature(
-        ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), class_by="length", comes_and_goes=True,
+        ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), class_by="length", may_pass=True,
         companion="rotor_drag"),
     "blade_flapping": Signature(("tilt",)),
     "motor_lag": Signature(("factor",), factors=True),
@@ -164,12 +164,12 @@ SIGNATURES: dict[str, Signature] = {
     "range_step": Signature(("residual", "kick"), commands_only=True, at_edges=True),
     "flow_scale": Signature(("share", "transient"), commands_only=True, at_edges=True),
     "downwash": Signature(
-        ("strength",), without_random={"turbulence": 0.0, "width": 0.0}, always_random=True, comes_and_goes=True),
+        ("strength",), without_random={"turbulence": 0.0, "width": 0.0}, always_random=True, may_pass=True),
     "controller_gain": Signature(
         ("rate", "attitude", "position", "height"), alone_too=True, commands_only=True, factors=True),
 }
-#: effects that may come and go within a flight
-GATED = tuple(name for name, s in SIGNATURES.items() if s.comes_and_goes)
+#: passing effects, which may act for some seconds of a flight only
+PASSING = tuple(name for name, s in SIGNATURES.items() if s.may_pass)
 #: effects that are only tried with their random part
 ALWAYS_RANDOM = frozenset(name for name, s in SIGNATURES.items() if s.always_random)
 #: effects with a variant that has another effect beside it, and that other
