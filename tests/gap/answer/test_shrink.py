@@ -113,7 +113,7 @@ def test_a_gap_that_one_half_alone_shows_is_not_measured_there():
 
 
 def test_the_interval_is_that_of_a_mean_of_so_many_values():
-    """An energy of 9 wholly known, and n of white noise at the floor left, whose mean has the deviation 1 / sqrt(n).
+    """Of an energy of 9, n values of white noise at the floor are left, whose mean has the standard error 1 / sqrt(n).
 
     So the share (3 - sqrt(mean)) / 2 has a quarter of that, and its 90 % interval is 2 * 1.645 of these wide.
     """

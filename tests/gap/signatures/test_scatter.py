@@ -7,7 +7,7 @@ from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.alike import ALIKE
-from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, standard_deviation
+from airtouch.gap.signatures.posterior import LEAST, MOST_STANDARD_DEVIATIONS, standard_deviation
 from airtouch.gap.signatures.scatter import FALSE_SHARE, ApparentStrengths, Scatter, size_of, table
 from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, class_scatter, scatter_of, student_log_density
 from airtouch.simulation.effects import EFFECTS
@@ -305,7 +305,7 @@ def test_of_two_halves_the_strength_of_least_evidence_counts():
 
 def test_a_rate_far_beyond_those_of_nominal_flights_allows_no_more_than_four_deviations():
     scatter = Scatter({}, 8.0, (0.3, 0.6))
-    assert scatter.allowed(10.0, 200.0) == pytest.approx(200.0 + 10.0 * (0.3 + MOST_DEVIATIONS * 0.6) ** 2)
+    assert scatter.allowed(10.0, 200.0) == pytest.approx(200.0 + 10.0 * (0.3 + MOST_STANDARD_DEVIATIONS * 0.6) ** 2)
 
 
 def test_few_baseline_flights_scatter_more_than_they_seem_to():

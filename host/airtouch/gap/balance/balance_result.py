@@ -105,14 +105,14 @@ def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
 
 
 def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
-    """Gap before and after in deviations of the floor, and the share of it that goes, with its interval.
+    """Gap before and after in standard deviations of the floor, and the share of it that goes, with its interval.
 
     gap (4,): BALANCE from the nominal mean.
     """
     spread = np.sqrt(base.variance[BALANCE])
 
     def rms(difference: np.ndarray) -> float:
-        """Root mean square of the balance in deviations of the floor."""
+        """Root mean square of the balance in standard deviations of the floor."""
         return float(np.sqrt(np.mean((difference / spread) ** 2)))
 
     before, after = rms(gap), rms(gap - fit.change)
@@ -127,7 +127,7 @@ def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
 
 
 def _gap(verdict: str, shrink: Shrink) -> OverallGap:
-    """The gap before and after in deviations of the floor; unchanged where no effect is named."""
+    """The gap before and after in standard deviations of the floor; unchanged where no effect is named."""
     return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
 
 

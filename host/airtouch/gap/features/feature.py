@@ -1,6 +1,6 @@
 """A feature of a flight, as its module declares it: its name, and how little it may scatter in nominal flights.
 
-No feature is taken to say more than the simulator is exact: its deviation in nominal flights is `least` at least.
+No feature is taken to say more than the simulator is exact: its scatter in nominal flights is `least` at least.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ LEAST_LOST = 0.5  #: of the logarithm of one more than a number of lost rows: on
 
 
 class Feature(NamedTuple):
-    """One feature. least: deviation that it has at least, in its own unit; 0 where nominal flights alone tell."""
+    """One feature. least: its least standard deviation, in its own unit; 0 where nominal flights alone tell."""
 
     name: str
     least: float = 0.0

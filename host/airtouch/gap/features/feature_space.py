@@ -7,23 +7,23 @@ import numpy as np
 
 from airtouch.gap.features import flight_features
 
-SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm only; chosen, as all numbers here
+SQUASHED = 5.0  #: standard deviations beyond which a feature grows with the logarithm only; chosen, as all numbers here
 MIDDLE_TWO_THIRDS = (0.16, 0.84)  #: quantiles; in a normal density they are two standard deviations apart
 LONG_SHIFT = 8.0  #: length of a whitened shift above which longer ones count no more in `directions`
 SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
 VARIANCE_DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
-SMALLEST = 1e-9  #: deviation of a feature that varies at all
+SMALLEST = 1e-9  #: standard deviation of a feature that varies at all
 
 
 @dataclass(frozen=True)
 class Standard:
-    """Median and deviation (features,) of each feature among nominal flights; deviation 0: it says nothing."""
+    """Median and standard deviation (features,) of each feature among nominal flights; 0: it says nothing."""
 
     middle: np.ndarray
     deviation: np.ndarray
 
     def __call__(self, features: np.ndarray) -> np.ndarray:
-        """Deviations (n, features) from the median, squashed; 0 where there is nothing to tell by."""
+        """Standard deviations (n, features) from the median, squashed; 0 where there is nothing to tell by."""
         known = self.deviation > 0.0
         far = (np.where(np.isnan(features), self.middle, features) - self.middle) / np.where(known, self.deviation, 1.0)
         size = np.abs(far)
@@ -32,7 +32,7 @@ class Standard:
 
 
 def standard_of(nominal: np.ndarray) -> Standard:
-    """The standard of nominal flights' features (n, features): the middle two thirds of them give the deviation."""
+    """The standard of nominal flights' features (n, features): the middle two thirds give the standard deviation."""
     middle = np.nanmedian(nominal, axis=0)
     low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), MIDDLE_TWO_THIRDS, axis=0)
     deviation = np.hypot(0.5 * (high - low), [f.least for f in flight_features.declared_features()])

@@ -8,11 +8,11 @@ from airtouch.robust import deviation
 CONTACT_S = 0.3  #: seconds excluded before and after take-off, touch-down and a collision; chosen
 SETTLED_S = 1.0  #: seconds after the motors have stopped in which the vehicle may still bounce; chosen
 KNOCK = 7.0  #: robust standard deviations at rest from which a sample is a knock; chosen
-LEAST_AT_REST_MPS2 = 1e-3  #: deviation at rest that an accelerometer has at least; chosen
+LEAST_AT_REST_MPS2 = 1e-3  #: standard deviation at rest that an accelerometer has at least; chosen
 #: robust standard deviations in flight above which the vehicle hit something: over the 35 that steps of a set-point
 #: reach; chosen
 JOLT = 40.0
-LEAST_IN_FLIGHT = 1e-6  #: deviation in flight, in the channel's unit, that a channel has at least; chosen
+LEAST_IN_FLIGHT = 1e-6  #: standard deviation in flight, in the channel's unit, that a channel has at least; chosen
 LONG_AGO = 10 ** 6  #: samples, longer than SETTLED_S: before the first command
 MOST_JOLTED = 0.1  #: share of a flight that collisions may take; more is no collision; chosen
 

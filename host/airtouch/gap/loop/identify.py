@@ -44,9 +44,9 @@ SEARCH_STEPS = 40  #: updates of noise strengths for each controller that a sear
 SEARCH_BLOCKS = 8.0  #: blocks that the misfit counts for against the prior of the gains in a search; chosen
 #: standard deviations of that prior, nepers around the firmware's gains: rate (climb), angle (height), velocity; chosen
 GAIN_SPREAD = (0.7, 0.4, 0.5)
-#: the first of them with which the two searches begin, in such deviations; chosen
+#: the first of them with which the two searches begin, in such standard deviations; chosen
 FIRST_GAINS = (-1.0, 0.5)
-#: of a search's simplex: most trials, and where it ends, in such deviations and in nats; chosen
+#: of a search's simplex: most trials, and where it ends, in such standard deviations and in nats; chosen
 SIMPLEX = {"maxfev": 80, "xatol": 0.03, "fatol": 0.02}
 
 

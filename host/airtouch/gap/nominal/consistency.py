@@ -26,7 +26,7 @@ ODD = 6.0
 MOST_LEFT_OUT = 3  #: at most one flight in so many is left out; where more are odd, the flights disagree and all count
 #: distance off the median, m/s^2 and rad/s^2, from which an odd flight is left out; chosen
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
-#: the same of simulated flights, which have no trim of their own: six of the deviations of 60 nominal flights of the
+#: the same of simulated flights, which have no trim of their own: six standard deviations of 60 nominal flights of the
 #: scenario `diagnosis` and more. With FAR a flight that lands on an edge hid masses of 5 % (gap-blind.md, seed 112233)
 FAR_SIMULATED = 0.1 * FAR
 #: range of the baseline flights' trims that a note mentions, m/s^2 and rad/s^2 (host/docs/gap-floor.md); chosen
@@ -77,8 +77,8 @@ def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
     trim = trims(flights, study.vehicle, study.calibration)
     distance = np.abs(trim - np.median(trim, axis=0)) / np.maximum(deviation(trim), 1e-9)
     words = [CHANNEL_WORDS[c.name] for c in CHANNELS[TRIM]]
-    return [f"{f.name}: declared nominal, yet its {words[int(np.argmax(d))]} is {d.max():.0f} deviations from the "
-            "others'" for f, d in zip(flights, distance, strict=True) if d.max() > ODD]
+    return [f"{f.name}: declared nominal, yet its {words[int(np.argmax(d))]} is {d.max():.0f} standard deviations "
+            "from the others'" for f, d in zip(flights, distance, strict=True) if d.max() > ODD]
 
 
 def differences(study: Study, flights: Sequence[Flight]) -> list[str]:

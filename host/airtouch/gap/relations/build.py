@@ -149,7 +149,7 @@ def _length_of_shift(scene: Scene, whitening: Whitening, nominal: dict[int, np.n
 
 
 def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
-    """Directions (Q, r), times the deviation, of nameless shifts (n, Q) over their length."""
+    """Directions (Q, r), times the standard deviation, of nameless shifts (n, Q) over their length."""
     length = np.linalg.norm(shift, axis=1, keepdims=True)
     unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > CLEAR_NAMELESS]
     _, deviation, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
@@ -157,7 +157,7 @@ def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
 
 
 def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]) -> np.ndarray:
-    """Directions (Q, r), times the deviation, of what two effects are beside their sum, over the smaller."""
+    """Directions (Q, r), times the standard deviation, of what two effects are beside their sum, over the smaller."""
     relative, noise = [], []
     for i in range(FLIGHTS_OF_TWO):
         rng = np.random.default_rng([SEED, Stream.PAIR, i])
@@ -174,7 +174,10 @@ def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]
 
 
 def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
-    """Directions (Q, r), times the deviation, in which values (n, Q) vary by more than a noise of this variance may."""
+    """Directions (Q, r), times the standard deviation, in which values (n, Q) vary more than such a noise may.
+
+    noise: its variance.
+    """
     many, dimensions = relative.shape
     _, deviation, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
     stands = stands_out(deviation ** 2, noise, dimensions, many)

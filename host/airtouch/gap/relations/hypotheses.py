@@ -15,7 +15,7 @@ from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, res
 from airtouch.gap.relations.effect_class import EffectClass
 
 TURNS = 3  #: turns, at most, in which the effects of a hypothesis are fitted in turn; chosen
-SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance in nominal deviations, equally likely; chosen
+SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance, nominal standard deviations, equally likely; chosen
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-MOST_DEVIATIONS = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
+FARTHEST_NOMINAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
 SHARES = ("nameless_share", "second_share", "distance_scatter")  #: fields of a library with one number for each class
-STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its deviation
+STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its scatter
 #: ends of the names of the arrays that are stored in float32
 EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
 
@@ -80,7 +80,7 @@ class Library:
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
         middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < MOST_DEVIATIONS * self.nominal_scatter
+        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_scatter
 
     @property
     def effects(self) -> frozenset[str]:

@@ -3,9 +3,9 @@
 Neyman and Pearson: among tests with a given rate of false alarms, the likelihood ratio of
 "this effect, this strength" against "none" misses least. It knows what the diagnosis has to
 find out. Its ratio is taken here on flights with and without the effect, each a normal
-variable with the mean and deviation seen; the strength is found by bisection. A diagnosis
+variable with the mean and standard deviation seen; the strength is found by bisection. A diagnosis
 that may raise 2 % false alarms asks about every effect at once, so that each test gets its
-share of them only. Deviations of so few flights come out too small by chance, and a search
+share of them only. Standard deviations of so few flights come out too small by chance, and a search
 finds where they do; so the means alone must be as far apart as such normal variables are.
 """
 
@@ -30,8 +30,8 @@ from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import Active
 
 FALSE_ALARMS, MISSES = 0.02, 0.05  #: of all tests of a flight together, and of the one that should answer
-FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(MISSES))  #: deviations
-#: nats, half of what the means of two log ratios differ by whose deviations are these, as those of normal variables are
+FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(MISSES))  #: standard deviations
+#: nats, half of what the means of two normal log ratios differ by whose standard deviations are these
 APART = 0.5 * (FALSE_ALARM + POWER) ** 2
 #: nats; a normal log ratio of two exact hypotheses (mean -d^2/2, variance d^2 under none) exceeds it by chance in a
 #: share FALSE_ALARMS / len(KINDS) of flights at most, whatever d

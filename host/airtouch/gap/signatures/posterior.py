@@ -7,7 +7,7 @@ from scipy.special import logsumexp
 
 LEAST = 1e-3  #: natural steps that the scatter of a parameter is at least; no effect is a thousandth of its step
 #: standard deviations above the mean to which values are cut, and up to which a rate is no news; chosen
-MOST_DEVIATIONS = 4.0
+MOST_STANDARD_DEVIATIONS = 4.0
 LEAST_INFORMATION = 1.0  #: exactly known values, of a scatter of a natural step, of which a scatter can be estimated
 GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations, in natural steps, among which the posterior's median is
 
@@ -41,7 +41,7 @@ def updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, wort
     flights without a gust do not make gusts rarer.
     """
     class_mean, spread = own
-    values = np.minimum(values, class_mean + MOST_DEVIATIONS * spread)
+    values = np.minimum(values, class_mean + MOST_STANDARD_DEVIATIONS * spread)
     total = worth + len(values)
     mean = (worth * class_mean + values.sum()) / total
     spread = float(np.sqrt((worth * spread ** 2 + ((values - mean) ** 2).sum()) / total))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS
+from airtouch.gap.signatures.posterior import LEAST, MOST_STANDARD_DEVIATIONS
 
 EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is added to that of every strength
 QUANTILES = 1000  #: of Student's distribution, of which sums of rarities are made; chosen
@@ -124,7 +124,7 @@ class Scatter:
         """
         middle, spread = self.rate
         deviations = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
-        return least + seconds * (middle + min(deviations, MOST_DEVIATIONS) * spread) ** 2
+        return least + seconds * (middle + min(deviations, MOST_STANDARD_DEVIATIONS) * spread) ** 2
 
     def unusual(self, sizes: Mapping[str, float]) -> float:
         """Log likelihood (Student) by which sizes of passing effects, together, exceed those of nominal flights.
