@@ -112,20 +112,24 @@ def test_a_gap_that_one_half_alone_shows_is_not_measured_there():
     assert gap.shrink.before == pytest.approx(1.0, abs=0.02)
 
 
-def test_the_interval_is_that_of_a_mean_of_so_many_values():
-    """Of an energy of 9, n values of white noise at the floor are left, whose mean has the standard error 1 / sqrt(n).
+def test_the_interval_is_that_of_the_power_of_white_noise():
+    """An energy of 16 becomes 4, that of N real samples of white noise, which scatters by 4 sqrt(2 / N).
 
-    So the share (3 - sqrt(mean)) / 2 has a quarter of that, and its 90 % interval is 2 * 1.645 of these wide.
+    So the share (4 - sqrt(4)) / 3 scatters by sqrt(2 / N) / 3, and its 90 % interval is 2 * 1.645 of these wide.
     """
-    data = Data(FLOOR, [hover(7)])
-    parts, lift = halves(data), np.zeros(CELLS, bool)
+    lift = np.zeros(CELLS, bool)
     lift[[cell_numbers(REPLAY_VIEW, band, LIFT) for band in range(1, len(BANDS_HZ) - 1)]] = True
-    n = int(sum(counts_of(data, part)[lift].sum() for part in parts))
-    known = Gap((lift, lift), 0.0, np.full(n, 9.0), None)
-    shrink = shrink_of(data, parts, Candidate("nothing", (), 0.0), known)
-    assert (shrink.before, shrink.after) == pytest.approx((3.0, 1.0), abs=0.1)
-    assert shrink.share.low < shrink.share.value < shrink.share.high
-    assert shrink.share.high - shrink.share.low == pytest.approx(2.0 * 1.645 * 0.25 / np.sqrt(n), rel=0.3)
+    widths = []
+    for seed in range(7, 13):
+        data = Data(FLOOR, [hover(seed, louder=2.0)])
+        parts = halves(data)
+        n = int(sum(counts_of(data, part)[lift].sum() for part in parts))
+        energies_before = Gap((lift, lift), 0.0, np.full(n, 16.0), None)
+        shrink = shrink_of(data, parts, Candidate("nothing", (), 0.0), energies_before)
+        assert (shrink.before, shrink.after) == pytest.approx((4.0, 2.0), rel=0.05)
+        assert shrink.share.low < shrink.share.value < shrink.share.high
+        widths.append(shrink.share.high - shrink.share.low)
+    assert np.mean(widths) == pytest.approx(2.0 * 1.645 * np.sqrt(2.0 / len(data.flights[0])) / 3.0, rel=0.2)
 
 
 def biased(mps2):
