@@ -51,7 +51,7 @@ def test_a_wake_is_found_with_its_seconds(study, nominal_flight):
     assert (acts & ~true).sum() * flight.PERIOD_S < 3.0  # blocks last 2.56 s
 
 
-def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, nominal_flight):
+def test_a_nominal_flight_has_no_passing_effect(study, nominal_flight):
     for name, gated in gates.passing_effects(Data(study, [nominal_flight])).items():
         rate = gated.gain / (len(nominal_flight) * flight.PERIOD_S)
         assert gated.gain < PASSING_GAIN or study.scatter.unusual({name: size_of(rate, gated.strength)}) < 0.0
@@ -67,7 +67,7 @@ def test_the_diagnosis_says_when(study, nominal_flight):
     assert FROM_S - 2.0 < fields["seconds"][0]["from_s"] < fields["seconds"][-1]["to_s"] < TO_S + 2.0
 
 
-def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and_goes(study, nominal_flight):
+def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_a_passing_effect(study, nominal_flight):
     """Its random force cannot be seen in the commands, so nothing may be gained by being less sure of their floor."""
     calm = replace(study, loop=replace(study.loop, floor=0.2 * study.loop.floor))
     t = np.arange(len(nominal_flight)) * flight.PERIOD_S
@@ -166,7 +166,7 @@ def test_words_say_when_and_what_is_open():
         == "lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of b.csv; follows height and speed"
 
 
-def test_nothing_comes_and_goes_in_take_off_and_landing(study, nominal_flight):
+def test_no_effect_passes_in_take_off_and_landing(study, nominal_flight):
     ends = np.isin(nominal_flight.phase, stretches.ENDS)
     assert ends.sum() * flight.PERIOD_S > 1.0
     force = nominal_flight.acceleration.copy()

@@ -146,7 +146,7 @@ def test_flights_that_say_nothing_of_an_effect_leave_it_to_its_gain():
     assert class_scatter(flights).rms["ground_effect"][0] == LEAST
 
 
-def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
+def test_a_passing_effect_of_a_nominal_flight_is_no_news_in_the_next():
     """One flight in twelve meets a gust. Were the largest tenth cut off, one in twelve would be called one."""
     rng = np.random.default_rng(10)
 

@@ -14,6 +14,6 @@ def test_the_shipped_table_is_written_as_it_was_read():
     assert nominal_scatter.text_of(table(), counts).strip() == SHIPPED.strip()
 
 
-def test_every_class_has_every_size_of_what_comes_and_goes():
+def test_every_class_has_the_size_of_every_passing_effect():
     sizes = frozenset({"downwash", "gust", "wind", "unsteady_yaw", "downward"})
     assert {frozenset(s.passing) for s in table().values()} == {sizes}
