@@ -58,7 +58,7 @@ def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, without_f
     (note,) = calibration.notes
     assert note.startswith("landing on an edge: declared nominal") and note.endswith("left out")
     alone, _ = calibrated(VEHICLE, nominal)
-    assert study.floor.offset == pytest.approx(alone.floor.offset)
+    assert study.offset == pytest.approx(alone.offset)
 
 
 def test_recorded_flights_differ_by_as_much_and_count(nominal, without_fits):
