@@ -23,7 +23,7 @@ STEEPEST = 3.0  #: largest slope; chosen
 CALMER, HARDER = 0.5, 1.5
 LEAST_BLOCKS = 4  #: blocks of nominal flights from which a slope is fitted; chosen
 LEAST_DISPERSION = 1e-3  #: variance over the squared mean that powers have at least; chosen
-ROUNDS = 8  #: Newton steps of the gamma regression; chosen
+NEWTON_STEPS = 8  #: of the gamma regression; chosen
 LARGEST_STEP = 1.0  #: of the regression, in log power and in slope; chosen
 
 
@@ -88,7 +88,7 @@ def _slope(y: np.ndarray, x: np.ndarray) -> float:
     middle, spread = PRIOR
     start = np.array([np.log(y.mean()), 0.0])
     line = start.copy()  # level and slope
-    for _ in range(ROUNDS):
+    for _ in range(NEWTON_STEPS):
         ratio = y / np.exp(table @ line)
         dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), LEAST_DISPERSION)
         information = table.T @ table / dispersion + np.diag([0.0, 1.0 / spread ** 2])
