@@ -123,3 +123,16 @@ def test_a_cluster_gives_the_same(sweeps):
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         on_cluster = measure(sweeps, VEHICLE, mapper=mapper(cluster.scheduler_address))
     assert on_cluster.plain() == measure(sweeps, VEHICLE).plain()
+
+
+def test_a_baseline_flight_unlike_the_others_is_no_part_of_the_floor(sweeps):
+    real, nominal = sweeps[0], [renamed(log, f"nominal_{i}") for i, log in enumerate(short_flights.fly(4, seed=9))]
+    odd = renamed(nominal[0].with_columns({"acc_z_mps2": nominal[0]["acc_z_mps2"] + 5.0}), "odd")
+    with_odd, without = measure([real], VEHICLE, [*nominal, odd]), measure([real], VEHICLE, nominal)
+    assert with_odd.baseline == without.baseline and "odd" not in with_odd.baseline
+    assert any("odd" in n and n.endswith("left out") for n in with_odd.notes)
+    assert with_odd.map.cells == without.map.cells
+
+
+def renamed(log, name):
+    return FlightLog(log.columns, {**log.meta, "source": name})

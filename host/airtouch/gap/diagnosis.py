@@ -46,8 +46,8 @@ PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no w
 class Comparison:
     """What is diagnosed: flights made ready, compared with the study of a vehicle.
 
-    usable: all flights; judged: those on which candidates are judged; nominal: the baseline's; calibration: None
-    without a baseline.
+    usable: all flights; judged: those on which candidates are judged; nominal: those of the baseline that are like the
+    others; calibration: None without a baseline.
     """
 
     vehicle: Vehicle
@@ -56,6 +56,11 @@ class Comparison:
     judged: Sequence[Flight]
     study: Study
     calibration: calibrate.Calibration | None
+
+    @property
+    def declared(self) -> Study | None:
+        """The study of the vehicle as its file declares it, where `study` is a calibrated one; else None."""
+        return self.calibration.declared if self.calibration else None
 
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
@@ -90,6 +95,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if partner:
         study, note = _with_partner(study, usable[0], seconds)
         notes.append(note)
+    nominal = [] if calibration is None else list(calibration.flights)  # without those that are left out
     comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, comparison.judged)
     selection, gap = selection_and_gap(data, without, say)
@@ -145,21 +151,13 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(_declared(comparison), judged, selection, result) if is_effect else {},
+        arms=arms(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
     return replace(answer, next=next_steps(answer, usable))
-
-
-def _declared(comparison: Comparison) -> Study | None:
-    """The study of the vehicle as its file declares it, where `Comparison.study` is a calibrated one; else None."""
-    calibration = comparison.calibration
-    if calibration is None:
-        return None
-    return calibration.declared or declared_study(comparison.vehicle, comparison.nominal)
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],

@@ -96,13 +96,15 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     """
     left_out: list[str] = []
     nominal = list(ready_flights(baseline, vehicle, left_out))
-    studies, fitted = [declared_study(vehicle, nominal)], None
-    notes = differences(studies[0], nominal)
+    fitted, notes = None, []
     if nominal and calibrated:
         progress("calibration")
         study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
-        studies.append(study)
-        notes += [n for n in fitted.notes if n not in notes]
+        nominal, studies = list(fitted.flights), [fitted.declared, study]
+        notes += fitted.notes
+    else:
+        studies = [declared_study(vehicle, nominal)]
+    notes = list(dict.fromkeys([*differences(studies[0], nominal), *notes]))
     measured = _measured(studies, flights, mapper, progress, left_out)
     maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]

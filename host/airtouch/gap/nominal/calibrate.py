@@ -46,12 +46,17 @@ ROUNDS = 2  #: fits of the vehicle, the second against the floor that the first 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Fitted effects that make the declared vehicle the nominal one; intervals are 90 %."""
+    """Fitted effects that make the declared vehicle the nominal one; intervals are 90 %.
+
+    flights: the nominal ones that were used, without those left out; declared: their study with the vehicle as
+    declared.
+    """
 
     active: tuple[Active, ...]
     parameters: dict[str, Quantity]
     notes: tuple[str, ...]
-    declared: Study | None = None  #: with the vehicle as declared; None where flights were left out
+    flights: tuple[Flight, ...]
+    declared: Study
 
 
 def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True, without: Sequence[str] = (),
@@ -75,7 +80,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     if study.simulated:
         study = _as_simulated(study, nominal, without)
     return study, Calibration(study.calibration, _quantities(measured.fitted),
-                              (*left_out, *odd_flights(study, nominal)), None if left_out else measured.declared)
+                              (*left_out, *odd_flights(study, nominal)), tuple(nominal), measured.declared)
 
 
 class _Measured(NamedTuple):

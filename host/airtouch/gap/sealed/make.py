@@ -19,6 +19,7 @@ from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
 from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
 from airtouch.gap.study import Study
@@ -34,6 +35,7 @@ SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two ef
 PAIR_SEVERITIES = (1, 2)  #: places among the severities of the effects of a pair: not the weakest; chosen
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
 ANEW = 10_000  #: added to the number of a flight for each time that it is drawn anew
+AT_ONCE = 4  #: kinds of effects whose severities two processes share at a time; chosen
 MOST_FLOWN = 10  #: flights flown for each that is to end well; chosen
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
@@ -123,14 +125,16 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
     vehicle = study.vehicle
     logs = nominal(vehicle, NONE_FIRST, NONE, seed)
     without = [Data(study, list(ready_flights([log], vehicle, []))) for log in logs]
-    conditions, found = Conditions(study, SCENARIO, without, stripped), {}
-    asked = {name: kind for name, kind in KINDS.items() if kinds is None or name in kinds}
-    for number, (name, kind) in enumerate(asked.items(), 1):
-        progress(f"severities of {name}, effect {number} of {len(asked)}")
-        low = weakest(kind, conditions, seed)
-        if low is not None:
-            found[name] = three_severities(low, kind.highest)
-    return found
+    conditions = Conditions(study, SCENARIO, without, stripped)
+    asked = [name for name in KINDS if kinds is None or name in kinds]
+    lowest: list[float | None] = []
+    for first in range(0, len(asked), AT_ONCE):
+        names = asked[first:first + AT_ONCE]
+        for number, name in enumerate(names, first + 1):
+            progress(f"severities of {name}, effect {number} of {len(asked)}")
+        lowest += map_on_two_cores(lambda name: weakest(KINDS[name], conditions, seed), names)
+    return {name: three_severities(low, KINDS[name].highest)
+            for name, low in zip(asked, lowest, strict=True) if low is not None}
 
 
 def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
