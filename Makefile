@@ -71,7 +71,7 @@ firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [PLATFORM=cf21bl] [VEHICLE
 	  "$(NETWORKS)"
 
 emulate: setup  ## the whole firmware with the app in QEMU: CRAZYFLIE_BASE=... [ARGS="flight.csv --steps 2400"]
-	@$(BIN)/python -m tools.emulate "$(CRAZYFLIE_BASE)" $(ARGS)
+	@$(BIN)/python -m tools.firmware_emulation "$(CRAZYFLIE_BASE)" $(ARGS)
 
 gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
 	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"

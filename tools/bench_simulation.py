@@ -76,7 +76,7 @@ def crazyflow_rates(python: str | None) -> dict[str, list[float]]:
     """Simulated seconds a wall second and a CPU second, by integrator; {} without crazyflow."""
     if python is None and importlib.util.find_spec("crazyflow") is None:
         return {}
-    command = [python or sys.executable, str(Path(__file__).parent / "checks/bench_crazyflow.py"), "--rounds", "1"]
+    command = [python or sys.executable, str(Path(__file__).parent / "benchmarks/bench_crazyflow.py"), "--rounds", "1"]
     run = subprocess.run(command, capture_output=True, text=True)
     return json.loads(run.stdout.splitlines()[-1]) if run.returncode == 0 else {}
 

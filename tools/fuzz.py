@@ -27,7 +27,7 @@ import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from checks.fuzz_build import BUILD, FUZZ, LONG, ROOT, build, engine, product_sources, targets
+from fuzzing.fuzz_build import BUILD, FUZZ, LONG, ROOT, build, engine, product_sources, targets
 
 SEEDS = FUZZ / "seeds"  # archives of inputs, one for each target, in git
 # Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
-from checks.log_fuzzing import hostile, mutations, sound, usd_mutations, usd_old_mutations, walk
+from fuzzing.log_fuzzing import hostile, mutations, sound, usd_mutations, usd_old_mutations, walk
 
 #: s of processor time for one input, and for each MB of it; no source: round numbers, some times what sound files take
 MOST_S, MOST_S_PER_MB = 1.0, 10.0
@@ -53,7 +53,7 @@ def mutate(name: str, seed: int, number: int) -> tuple[bytes, Random]:
     if name.startswith("usd"):
         return usd_mutations.usd(base, r), r
     if name == "parquet":
-        from checks.log_fuzzing import parquet_mutations
+        from fuzzing.log_fuzzing import parquet_mutations
 
         return parquet_mutations.parquet_file(base, r), r
     return (mutations.packed_text if name.endswith("gz") else mutations.text)(base, r), r

@@ -24,7 +24,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).with_name("diagnosis")))  # as for the scripts in it
+sys.path.insert(0, str(Path(__file__).with_name("diagnosis")))  # Python itself puts only this script's folder there
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError

@@ -44,8 +44,9 @@ GROUPS = {
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/evidence/cells.py", *(f"gap/naming/{name}.py" for name in (
         "forward", "judging", "leave_one_out", "over_prediction", "passing_effect", "policy", "rounds",
-        "screening/screen", "select", "thresholds"))), tuple(f"gap/naming/test_{name}.py" for name in (
-            "forward", "judging", "leave_one_out", "policy", "rounds", "select", "thresholds", "unknown"))),
+        "screening/screen", "select", "thresholds"))), tuple(f"gap/naming/{name}.py" for name in (
+            "test_forward", "test_judging", "test_leave_one_out", "test_loop_effects", "test_policy", "test_rounds",
+            "screening/test_screen", "screening/test_first_order", "test_select", "test_thresholds"))),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)

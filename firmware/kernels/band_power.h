@@ -23,7 +23,7 @@
  *   desktop's bits.
  * Threads: no globals: different objects may be used at once; one object by one thread at a time.
  * Memory: BAND_POWER_FLOATS floats of the caller's, 10.9 kB for 9 channels at 2 s of 100 Hz.
- * Cost: 3,130 instructions of a Cortex-M4 a step for 9 channels (`python -m tools.emulator.count`).
+ * Cost: 3,130 instructions of a Cortex-M4 a step for 9 channels (`python -m tools.instruction_counts.count`).
  */
 #pragma once
 

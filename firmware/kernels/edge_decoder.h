@@ -11,7 +11,7 @@
  *   desktop's bits.
  * Threads: no globals: different objects may be used at once; one object by one thread at a time.
  * Memory: edgeDecoder_t alone, 0.6 kB.
- * Cost: 130 instructions of a Cortex-M4 a step, 730 where an edge is seen (`python -m tools.emulator.count`).
+ * Cost: 130 instructions of a Cortex-M4 a step, 730 where an edge is seen (`python -m tools.instruction_counts.count`).
  */
 #pragma once
 

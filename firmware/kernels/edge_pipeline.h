@@ -10,7 +10,7 @@
  *   desktop's bits.
  * Threads: no globals: different objects may be used at once; one object by one thread at a time.
  * Memory: edgePipeline_t alone, under 12 kB; 172 bytes of stack.
- * Cost: 4,300 instructions of a Cortex-M4 a sample, 4,520 at worst (`python -m tools.emulator.count`).
+ * Cost: 4,300 instructions of a Cortex-M4 a sample, 4,520 at worst (`python -m tools.instruction_counts.count`).
  */
 #pragma once
 

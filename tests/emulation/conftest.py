@@ -9,7 +9,7 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
-from tools.emulate import build
+from tools.firmware_emulation import build
 
 
 @pytest.fixture(scope="module")

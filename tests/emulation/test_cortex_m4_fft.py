@@ -7,14 +7,15 @@ import pytest
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
-from tools.emulator.build import CACHE
-from tools.emulator.compare_fft import CHANNELS, VERSION, fft_instructions
-from tools.emulator.flight_code import FlightCode, compile_flight_code, made_flight
+from tools.instruction_counts.build import CACHE
+from tools.instruction_counts.compare_fft import CHANNELS, VERSION, fft_instructions
+from tools.instruction_counts.flight_code import FlightCode, compile_flight_code, made_flight
 
 SOURCE = CACHE / f"cmsisdsp-{VERSION}"
 
 
-@pytest.mark.skipif(not SOURCE.is_dir(), reason="no CMSIS-DSP: python -m tools.emulator.compare_fft fetches it")
+@pytest.mark.skipif(not SOURCE.is_dir(),
+                    reason="no CMSIS-DSP: python -m tools.instruction_counts.compare_fft fetches it")
 def test_twenty_times_cheaper_than_nine_ffts():
     steps = FlightCode(compile_flight_code(compiler="zig")).fly("edge_pipeline", made_flight(400))
     step = np.mean(steps.instructions[steps.ready])

@@ -14,10 +14,10 @@ from airtouch.vehicle import load
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
-from tools.emulator import budget
-from tools.emulator.build import compilers
-from tools.emulator.count import WHOLE, clean_flights, flight_samples, kernel_inputs, measure
-from tools.emulator.flight_code import EVENT, KERNELS, FlightCode, compile_flight_code, made_flight
+from tools.instruction_counts import budget
+from tools.instruction_counts.build import compilers
+from tools.instruction_counts.count import WHOLE, clean_flights, flight_samples, kernel_inputs, measure
+from tools.instruction_counts.flight_code import EVENT, KERNELS, FlightCode, compile_flight_code, made_flight
 
 VEHICLE = load("crazyflie-2.1-flow")
 GOAL_MEAN, GOAL_WORST = 6000, 8000  #: of the nine-channel step: 0.5 % of the STM32F405 at 100 Hz

@@ -10,9 +10,9 @@ from airtouch.errors import AirTouchError
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
-from tools.emulator.build import build
-from tools.emulator.elf import Elf
-from tools.emulator.machine import EmulationError, Machine
+from tools.instruction_counts.build import build
+from tools.instruction_counts.elf import Elf
+from tools.instruction_counts.machine import EmulationError, Machine
 
 SOURCE = r"""
 #include <math.h>

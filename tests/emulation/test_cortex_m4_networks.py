@@ -6,9 +6,9 @@ import pytest
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
-from tools.emulator.build import build, compilers
-from tools.emulator.flight_code import FIRMWARE, GAP8, MODEL
-from tools.emulator.machine import Machine
+from tools.instruction_counts.build import build, compilers
+from tools.instruction_counts.flight_code import FIRMWARE, GAP8, MODEL
+from tools.instruction_counts.machine import Machine
 
 KERNELS = [GAP8 / f"{name}.c" for name in ("network_int8", "conv_int8", "dense_int8", "max_pool_int8",
                                            "sparse_dense_int8")]

@@ -1,4 +1,4 @@
-"""`python -m tools.emulate` with what it cannot run: one line each, before anything is built."""
+"""`python -m tools.firmware_emulation` with what it cannot run: one line each, before anything is built."""
 
 import os
 import shutil
@@ -11,16 +11,16 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.logs import write
-from tools.emulate import build, height
-from tools.emulate.__main__ import main
-from tools.emulate.replay import rows
+from tools.firmware_emulation import build, height
+from tools.firmware_emulation.__main__ import main
+from tools.firmware_emulation.replay import rows
 
 ROOT = Path(__file__).parents[2]
 
 
 def emulate(*arguments, **environment):
-    return subprocess.run([sys.executable, "-m", "tools.emulate", *map(str, arguments)], cwd=ROOT, capture_output=True,
-                          text=True, env=os.environ | environment)
+    return subprocess.run([sys.executable, "-m", "tools.firmware_emulation", *map(str, arguments)], cwd=ROOT,
+                          capture_output=True, text=True, env=os.environ | environment)
 
 
 def one_line(process, words):
@@ -106,7 +106,7 @@ def test_a_flight_without_motors_is_refused(log):
     (["flight.csv", "--fly"], "--fly flies the simulator's drone: leave out flight.csv"),
     (["--height", "--only", "slope"], "no case begins with 'slope'; --only is the beginning of one of: platform 0.76"),
     (["nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
-    (["--nonsense"], "unrecognized arguments: --nonsense; see python -m tools.emulate --help"),
+    (["--nonsense"], "unrecognized arguments: --nonsense; see python -m tools.firmware_emulation --help"),
     (["--fly", "--height"], "--height: not allowed with argument --fly"),
     (["--platform", "bolt"], "invalid choice: 'bolt' (choose from 'cf2', 'cf21bl')"),
     (["--steps", "many"], "--steps: many is no whole number from 1 on"),

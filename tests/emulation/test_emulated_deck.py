@@ -7,9 +7,9 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.kernels.app_core import AppCore
 from airtouch.simulation.scenario import draw_flight
-from tools.emulate import gap8, height
-from tools.emulate.deck import CLEAR, Deck, Faults, frame
-from tools.emulate.plant import FLOW, Plant
+from tools.firmware_emulation import gap8, height
+from tools.firmware_emulation.deck import CLEAR, Deck, Faults, frame
+from tools.firmware_emulation.plant import FLOW, Plant
 
 
 def counts_of_flow(x, distance, top):

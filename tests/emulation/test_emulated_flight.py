@@ -16,9 +16,9 @@ from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight
 from airtouch.simulation.sensors import log_row
-from tools.emulate import build, compare, flight, height, side_by_side
-from tools.emulate import plant as at
-from tools.emulate.plant import Plant
+from tools.firmware_emulation import build, compare, flight, height, side_by_side
+from tools.firmware_emulation import plant as at
+from tools.firmware_emulation.plant import Plant
 
 HOVER = """
 name = "short-hover"

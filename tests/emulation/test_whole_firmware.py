@@ -10,10 +10,10 @@ from airtouch import vehicle as vehicles
 from airtouch.detector import best
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import AppCore
-from tools.emulate import build, gap8
-from tools.emulate.board import REPLAY, Board
-from tools.emulate.deck import Faults
-from tools.emulate.replay import FED, desktop_values, differs, replay, rows, sample
+from tools.firmware_emulation import build, gap8
+from tools.firmware_emulation.board import REPLAY, Board
+from tools.firmware_emulation.deck import Faults
+from tools.firmware_emulation.replay import FED, desktop_values, differs, replay, rows, sample
 
 
 def test_what_is_fed_is_what_the_core_gets(log):

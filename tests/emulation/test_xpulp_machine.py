@@ -6,8 +6,8 @@ import pytest
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
-from tools.emulator.build import build
-from tools.emulator.xpulp import BARRIER, BARRIER_CYCLES, XpulpMachine
+from tools.instruction_counts.build import build
+from tools.instruction_counts.xpulp import BARRIER, BARRIER_CYCLES, XpulpMachine
 
 SOURCE = r"""
 #define NAKED __attribute__((naked))

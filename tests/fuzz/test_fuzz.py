@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 import fuzz
-from checks import fuzz_build
+from fuzzing import fuzz_build
 
 MUTATIONS = 300
 #: Defects by target: a source, what stands there and what is put in its place.

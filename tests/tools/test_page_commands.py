@@ -239,7 +239,7 @@ def test_commands_are_found_in_the_pages():
     ("airtouch collect --uri udp://127.0.0.1:19850 --mission sweep", "missing: out"),
     ("airtouch simulate hover -n 2 --out o && airtouch gap diagnos o", "No such command"),
     ("python tools/gap_real.py F --rows swarms", "2"),
-    ("python -m tools.emulator.count --tolm", "2"),
+    ("python -m tools.instruction_counts.count --tolm", "2"),
     ("make fuzz TARGT=parser", "TARGT"),
     ("make fuzzy", "fuzzy"),
     ("make emulate CRAZYFLIE_BASE=x ARGS=--heigth", "heigth"),

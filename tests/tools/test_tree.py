@@ -36,7 +36,8 @@ def test_a_file_that_a_run_left_is_seen(tmp_path):
     assert strangers(tmp_path) == {"crash-1-0"}
 
 
-#: folders of tests that mirror none: of tools/emulator and tools/emulate, and the fuzz targets of all C
+#: folders of tests that mirror none: that of tools/instruction_counts and tools/firmware_emulation, and the fuzz
+#: targets of all C
 OWN = {"emulation", "fuzz"}
 
 
@@ -52,7 +53,7 @@ def test_no_folder_of_tests_holds_more_than_a_reader_overlooks():
 
 
 #: packages of tools, whose files the list does not name one by one
-PACKAGES = ("emulator", "emulate", "log_fuzzing", "crazypad")
+PACKAGES = ("instruction_counts", "firmware_emulation", "log_fuzzing", "crazypad")
 
 
 def test_every_tool_is_in_the_list_of_tools():

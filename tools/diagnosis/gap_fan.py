@@ -35,7 +35,7 @@ def main(folder: Path) -> None:
     f = frequencies(AIR)
     inside = (f >= BAND_HZ[0]) & (f < BAND_HZ[1])
     arm = vehicle.arm_m / np.sqrt(2.0)
-    print("| flight | roll, yaw torque told, rad/s^2 | far blocks | from, s | highest power over floor |")
+    print("| flight | roll, yaw torque of the commands, rad/s^2 | far blocks | from, s | highest power over floor |")
     print("|---|---|---|---|---|")
     for flight in sorted((*calm, *fan), key=lambda one: Path(one.name).name):
         data = Data(study, [flight])

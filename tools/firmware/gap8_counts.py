@@ -14,16 +14,16 @@ import numpy as np
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.paper.model import Model
 from airtouch.detector.shared import export
-from tools.emulator.build import CACHE, build
-from tools.emulator.elf import Elf
-from tools.emulator.machine import Machine
-from tools.emulator.xpulp import BARRIER, Cycles, XpulpMachine
+from tools.instruction_counts.build import CACHE, build
+from tools.instruction_counts.elf import Elf
+from tools.instruction_counts.machine import Machine
+from tools.instruction_counts.xpulp import BARRIER, Cycles, XpulpMachine
 
 ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
 #: folders of the C
 KERNELS, FIRMWARE = ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"
 STATE_BYTES = 4096      #: room for a rolling network's or a stream's struct
-#: names of `tools.emulator.cores`
+#: names of `tools.instruction_counts.cores`
 RV32IMC, XPULP = "rv32imc", "rv32im-xpulp"
 #: sources of a network over whole windows
 _WINDOWED = ("conv_int8", "dense_int8", "max_pool_int8", "network_int8", "sparse_dense_int8")
@@ -111,7 +111,7 @@ def stream(chip: Chip, quantised: np.ndarray, outputs: int = 3) -> Run:
 def team_cycles(chip: Chip, window: np.ndarray, cores: int, outputs: int = 2) -> tuple[Cycles, np.ndarray]:
     """One window (inputs,) int8 on so many XPULP cores: cycles, and each core's output (cores, outputs) int8.
 
-    Cycles are those of the model in tools/emulator/xpulp.py.
+    Cycles are those of the model in tools/instruction_counts/xpulp.py.
     """
     machine = XpulpMachine(chip.elf)
     x, arena = machine.allocate(window.size), _arena(machine, "networkInt8ArenaBytes", chip)

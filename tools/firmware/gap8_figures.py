@@ -15,7 +15,7 @@ from typing import Any
 import click
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for `tools`; Python itself puts only this folder there
 
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import paper, registry

@@ -25,18 +25,29 @@ if TYPE_CHECKING:  # layers above this one, for types only
 class Study:
     """What flights are compared with.
 
-    vehicle, calibration: the model without effects; loop: the control loop as nominal flights show it, None without
-    them; floor: power of the gap of nominal flights, that of their commands apart (`ClosedLoop.floor`); response: how
-    the gyro follows their commands, None where nobody knows; nominal_count: number of nominal flights.
+    Three stages fill it in, the later ones by a copy. `nominal.build_study`, for every study:
 
-    `nominal.build_study` makes a study with these. Rooms above fill in the others later, each by a copy of the study:
+    - vehicle, calibration: the model without effects. The calibration is empty for a vehicle as declared.
+    - loop: the control loop as nominal flights show it. None: no nominal flight, or too few blocks of their commands;
+      then no command is judged.
+    - floor: power of the gap of nominal flights, that of their commands apart (`ClosedLoop.floor`). Without nominal
+      flights it is the declared noise of the sensors.
+    - response: how the gyro follows the commands of nominal flights. None: no loop, a flight without a gyro, or too
+      few blocks; then torque counts in the mean alone.
+    - nominal_count: number of nominal flights; 0 without a baseline.
 
-    - nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`);
-      `nominal.calibrate`;
-    - scatter: how strong effects seem to be in nominal flights, None without any; `nominal.calibrate`;
-    - relations: what was learned of such flights (`relations.library.Library`), if anything; `nominal.calibrate`;
-    - overhead: when another vehicle is known to be overhead, none where nobody knows; `passing.overhead`, which adds
-      the size of its wake to the scatter.
+    `nominal.calibrate`, once the vehicle is fitted; a study of a vehicle as declared has none of these:
+
+    - nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`). None: that
+      model takes them to have no scatter.
+    - scatter: how strong effects seem to be in nominal flights. None: nobody measured it, as for a map.
+    - relations: what was learned of such flights (`relations.library.Library`). None: recorded flights, or no library
+      holds for them; then the replay decides.
+
+    `passing.overhead`, for one flight:
+
+    - overhead: when another vehicle is known to be overhead; the size of its wake is then in the scatter. Empty:
+      nobody knows, and such seconds are searched.
     """
 
     vehicle: Vehicle
@@ -57,6 +68,14 @@ class Study:
     def measured_blocks(self, state: str) -> int:
         """Number of nominal blocks of a state on which its floor is measured; 0 where the floor is only declared."""
         return self.floor.block_counts.get(state, 0) if self.nominal_count else 0
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Standard deviation (COUNT,) of a channel's mean in the air from flight to flight, in its unit.
+
+        Simulated flights all have the same trim: what the power in the lowest bin gives their means is no part of it.
+        """
+        return self.floor.offset_beyond if self.simulated else self.floor.offset
 
     @property
     def simulated(self) -> bool:

@@ -79,7 +79,7 @@ def instructions(budget: dict, kernel: str) -> float:
         return float(budget["cortex-m4"][kernel]["instructions_mean"])
     except (KeyError, TypeError, ValueError):
         raise AirTouchError(f"the budget has no instructions_mean for cortex-m4.{kernel}; count again with "
-                            "python -m tools.emulator.count") from None
+                            "python -m tools.instruction_counts.count") from None
 
 
 def gap8_mw(network: dict) -> Estimate:

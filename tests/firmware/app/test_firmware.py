@@ -23,11 +23,11 @@ from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
 from firmware.make import ROOT, make
-from tools.emulator import build
-from tools.emulator.cores import CORTEX_M4
-from tools.emulator.elf import Elf
-from tools.emulator.machine import Machine
 from tools.firmware import stack
+from tools.instruction_counts import build
+from tools.instruction_counts.cores import CORTEX_M4
+from tools.instruction_counts.elf import Elf
+from tools.instruction_counts.machine import Machine
 
 CORE, APP = ROOT / "firmware" / "app" / "core", ROOT / "firmware" / "app" / "src"
 GLUE = (APP / "airtouch_app.c").read_text()

@@ -1,7 +1,6 @@
 """Selection on made flights whose truth is known: white noise of the declared sensors, and what a test injects."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,14 +157,6 @@ def test_candidates_beside_a_base():
 def simulated(**rms):
     """A study of flights that come from the models which effects are fitted with."""
     return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=True))
-
-
-@pytest.mark.parametrize(("exact", "by_firmware", "same"),
-                         [(True, True, True), (True, False, False), (False, True, False)])
-def test_same_models_needs_simulated_flights_and_own_firmware(exact, by_firmware, same):
-    """Other simulators' flights scatter as little, but their models of the air are their own."""
-    study = replace(FLOOR, scatter=SimpleNamespace(exact=exact), loop=SimpleNamespace(by_firmware=by_firmware))
-    assert study.same_models is same and not replace(study, loop=None).same_models
 
 
 def test_calm_is_a_gap_in_simulated_flights():

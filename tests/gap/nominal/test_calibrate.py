@@ -59,8 +59,8 @@ def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, without_f
     assert note.startswith("landing on an edge: declared nominal") and note.endswith("left out")
     assert [f.name for f in calibration.flights] == [f.name for f in nominal]
     alone, of_nominal = calibrated(VEHICLE, nominal)
-    assert study.floor.offset == pytest.approx(alone.floor.offset)
-    assert calibration.declared.floor.offset == pytest.approx(of_nominal.declared.floor.offset)
+    assert study.offset == pytest.approx(alone.offset)
+    assert calibration.declared.offset == pytest.approx(of_nominal.declared.offset)
 
 
 def test_recorded_flights_differ_by_as_much_and_count(nominal, without_fits):

@@ -33,10 +33,15 @@ def flights(rng, true, alias, count=12, blocks=12):
     return felt, commands
 
 
+def torques(felt, commands):
+    """The spectra of each flight: what the gyro measured, and what the model makes of the commands."""
+    return [TorqueSpectra(f, w) for f, w in zip(felt, commands, strict=True)]
+
+
 def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
     felt, commands = flights(rng, 1.0, 1.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     np.testing.assert_allclose(response.quiet_law.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
     np.testing.assert_allclose(response.quiet_law.coherent.imag, 0.0, atol=0.1)
 
@@ -44,7 +49,7 @@ def test_share_is_that_of_errors_in_variables():
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
     felt, commands = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
-    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     assert np.median(np.abs(response.quiet_law.coherent)) == 0.0
 
 
@@ -52,7 +57,7 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     """With q = 1 half the response halves what folded noise leaves; with q as measured it adds to it."""
     rng = np.random.default_rng(2)
     felt, commands = flights(rng, 1.0, 2.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
     def table(torque):
         return np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
@@ -63,20 +68,18 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     steady = response.quiet(w)
     assert steady.all()
     assert size(weaker) < 0.6 * size(nominal)
-    residual = y - w
-    before, after = (size(response.with_residual(table(y - share * w), steady, TorqueSpectra(y, residual, change)))
-                     for share, change in ((1.0, None), (0.5, y - 0.5 * w - residual)))
+    before, after = (size(response.with_torque_gap(table(y - share * w), steady, TorqueSpectra(y, w, change)))
+                     for share, change in ((1.0, None), (0.5, 0.5 * w)))
     assert after > before
 
 
 def test_means_stay_as_they_are():
     rng = np.random.default_rng(3)
     felt, commands = flights(rng, 1.0, 2.0)
-    residuals = [f - w for f, w in zip(felt, commands, strict=True)]
-    response = response_of(felt, residuals, NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     spectra = np.zeros((12, BINS, COUNT), complex)
-    spectra[:, :, TORQUE] = residuals[0]
-    out = response.with_residual(spectra, response.quiet(commands[0]), TorqueSpectra(felt[0], residuals[0]))
+    spectra[:, :, TORQUE] = felt[0] - commands[0]
+    out = response.with_torque_gap(spectra, response.quiet(commands[0]), TorqueSpectra(felt[0], commands[0]))
     np.testing.assert_array_equal(out[:, :FIRST_BIN], spectra[:, :FIRST_BIN])
 
 
@@ -87,7 +90,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
         kick = noise(rng, (5, BINS, 3), 30.0)
         w[::4] += kick
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     np.testing.assert_array_equal(response.quiet(commands[0])[:, 0], np.arange(20) % 4 != 0)
     np.testing.assert_allclose(np.abs(response.stepped_law.coherent), 1.0 / 3.0, atol=0.05)
     variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
@@ -103,7 +106,7 @@ def test_flights_that_differ_so_much_that_an_axis_is_never_quiet_have_no_respons
     rng = np.random.default_rng(8)
     long, short = flights(rng, 1.0, 1.0, 1, 40), flights(rng, 1.0, 1.0, 2, 8)
     felt, commands = ([*a, *(strength * x for x in b)] for a, b in zip(long, short, strict=True))
-    response = response_of(felt, [f - w for f, w in zip(felt, commands, strict=True)], NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP)
     assert (response is None) == (strength > 1.0)
     if response is not None:
         np.testing.assert_allclose(np.median(np.abs(response.quiet_law.coherent), axis=0), 0.5, atol=0.02)

@@ -11,8 +11,8 @@ import pytest
 
 from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
 from patience import HANG_S
-from tools.emulator import build, elf
-from tools.emulator.machine import Machine
+from tools.instruction_counts import build, elf
+from tools.instruction_counts.machine import Machine
 
 ROOT = Path(__file__).parents[3]
 APP = ROOT / "gap8" / "app" / "src"

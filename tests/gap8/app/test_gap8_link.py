@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.emulator import build
-from tools.emulator.elf import Elf
+from tools.instruction_counts import build
+from tools.instruction_counts.elf import Elf
 
 HERE = Path(__file__).parent
 APP = HERE.parents[2] / "gap8" / "app"

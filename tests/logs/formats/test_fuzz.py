@@ -5,7 +5,7 @@ import pytest
 import fuzz_logs
 from airtouch import logs
 from airtouch.logs.files import parse
-from checks.log_fuzzing import sound, walk
+from fuzzing.log_fuzzing import sound, walk
 
 COUNT = 80  #: inputs of each format; `tools/fuzz_logs.py` runs more
 

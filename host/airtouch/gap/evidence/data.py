@@ -97,7 +97,7 @@ def _by_response(data: Data, i: int, response: Response, active: Sequence[Active
     by_command = [a for a in not_loop if a.effect.wrench is None]
     torque = _torque(data.measured_torque[i], *(_replay_spectra(data, i, some) for some in ((), by_command, not_loop)))
     change = loop.torque_change(active, frequencies(AIR))
-    return {**gap, AIR: response.with_residual(gap[AIR], data.quiet[i], torque, change)}
+    return {**gap, AIR: response.with_torque_gap(gap[AIR], data.quiet[i], torque, change)}
 
 
 def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],
@@ -106,11 +106,11 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
 
     nominal: without effects; driven: with those that act through the commands; disturbed: with outside torques as well.
     """
-    residual = nominal[AIR][:, :, TORQUE]
-    by_command = None if driven[AIR] is nominal[AIR] else driven[AIR][:, :, TORQUE] - residual
+    gap = nominal[AIR][:, :, TORQUE]
+    by_command = None if driven[AIR] is nominal[AIR] else driven[AIR][:, :, TORQUE] - gap
     disturbance = None if disturbed[AIR] is driven[AIR] else \
         disturbed[AIR][:, :, TORQUE] - driven[AIR][:, :, TORQUE]
-    return TorqueSpectra(measured, residual, by_command, disturbance)
+    return TorqueSpectra(measured, measured - gap, by_command, disturbance)
 
 
 def command_torque(data: Data, i: int) -> np.ndarray:

@@ -26,7 +26,7 @@ from airtouch.simulation.effects import Active
 #: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
 TURNS, SETTLED = 6, 0.3
 BRIEF = 2  #: steps of a brief fit; chosen
-ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen
+STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps; chosen: it says next to nothing
 CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
 #: strengths of a random effect that are tried before the best is refined: how many, from the least to the largest
@@ -58,7 +58,7 @@ def mean_parameters(terms: Sequence[Term]) -> np.ndarray:
 
 def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | None = None,
         prior: np.ndarray | float = PRIOR_UNITS, brief: bool = False) -> FittedTerms:
-    """Fit of effects to the blocks of `part`; the residual is judged elsewhere.
+    """Fit of effects to the blocks of `part`; the gap that they leave is judged elsewhere.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior: standard deviation of
     these around neutral. Mean and random effects are fitted in turn until neither moves; brief: once, mean ones by
@@ -77,9 +77,9 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             break
-        command_power, cost = problem.loop_power(active, True)
+        command_power, floor_cost = problem.loop_power(active, True)
         random_power = _random_power(problem, random, solution.values, active)
-        level = problem.likelihood(solution.values, random_power + command_power) - cost
+        level = problem.likelihood(solution.values, random_power + command_power) - floor_cost
         if not mean or level < last_level + SETTLED:
             break
         last_level = level
@@ -97,13 +97,13 @@ def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False)
 
     wide: the commands' floor is as uncertain as under random effects, though there are none.
     """
-    problem, values, added, price = _explained(data, part, terms, wide)
-    return problem.likelihood(values, added) - price
+    problem, values, added, cost = _explained(data, part, terms, wide)
+    return problem.likelihood(values, added) - cost
 
 
 def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, its residual (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
+    """The problem, its gap (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
     problem, values, added, _ = _explained(data, part, terms, wide)
     return problem, values, problem.power + added
 
@@ -118,17 +118,17 @@ def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
 
 def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
-    """Problem of a part, its residual under effects, the power that they add, and the cost of offsets and floor."""
+    """Problem of a part, its gap under effects, the power that they add, and the cost of offsets and floor."""
     problem = problem_of(data, part)
-    values, added, cost = problem.modelled(terms, wide)
-    residual, penalty = without_offsets(problem, values, added)
-    return problem, residual, added, penalty + cost
+    values, added, floor_cost = problem.modelled(terms, wide)
+    values, offset_cost = without_offsets(problem, values, added)
+    return problem, values, added, offset_cost + floor_cost
 
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
     """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
     command_power, _ = problem.loop_power(mean, True)
-    for _ in range(ROUNDS if len(random) > 1 else 1):
+    for _ in range(STRENGTH_ROUNDS if len(random) > 1 else 1):
         for i in range(len(random)):
             random[i] = _strength(problem, random, i, values, command_power)
     return problem.random_power(random)
@@ -144,7 +144,7 @@ def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.n
 def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.ndarray) -> Term:
     """A random effect with its strength of highest likelihood; unchanged where it adds no power.
 
-    values (n,): the residual; other_power (n,): that others add.
+    values (n,): the gap; other_power (n,): that others add.
     """
     _, high = term.bounds()
     unit = problem.random_power([term.fitted(np.ones(len(term.free)))])

@@ -24,7 +24,7 @@ GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,) with their covariance (k, k), and the residual (n,)."""
+    """Scaled parameters x (k,) with their covariance (k, k), and the gap (n,) that they leave."""
 
     x: np.ndarray
     covariance: np.ndarray
@@ -32,7 +32,7 @@ class MeanFit(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Where a fit stands: parameters, offsets, residual (n,), power (n,) over the floor, minus the log posterior."""
+    """Where a fit stands: parameters, offsets, gap (n,), power (n,) over the floor, minus the log posterior."""
 
     x: np.ndarray
     offsets: np.ndarray
@@ -61,10 +61,10 @@ class Posterior:
         values = self.problem.values(active) if self.mean else self.problem.base.copy()
         for amount, (index, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[index] -= amount * column
-        command_power, price = self.problem.loop_power(active, self.wide)
+        command_power, floor_cost = self.problem.loop_power(active, self.wide)
         power = self.added + command_power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
-        return _State(x, offsets, values, power, price + (0.5 * away - self.problem.likelihood(values, power)))
+        return _State(x, offsets, values, power, floor_cost + (0.5 * away - self.problem.likelihood(values, power)))
 
 
 class _Step(NamedTuple):
@@ -138,8 +138,8 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: ra
     for i, amount in itertools.product(own, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        command_power, cost = problem.loop_power(active_at(mean, trial))
-        level = problem.likelihood(problem.base, command_power) - cost
+        command_power, floor_cost = problem.loop_power(active_at(mean, trial))
+        level = problem.likelihood(problem.base, command_power) - floor_cost
         if level > best:
             best, out = level, trial
     return out

@@ -29,7 +29,7 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
     """Normal equations of the ridge regression that lowers values + sum(step * column) - sum(step * offset).
 
     columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
-    about 0; values (n,): the residual; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
+    about 0; values (n,): the gap; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
     begins; offsets: m of them, no two with a place in common.
     """
     columns = np.ascontiguousarray(columns, complex).reshape(-1, len(values))
@@ -87,7 +87,7 @@ def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
 def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
     """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where unknown.
 
-    values (n,): the residual; added (n,): power over the floor.
+    values (n,): the gap; added (n,): power over the floor.
     """
     power = problem.power + added
     e = squared(values) / power
@@ -99,15 +99,15 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
 
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
-    power, residual, cost = problem.power + added, values.copy(), 0.0
+    power, gap, cost = problem.power + added, values.copy(), 0.0
     for index, column, spread in problem.offsets:
         amount = 0.0
         largest_weight = OVERLAP_WEIGHT * (problem.freedom[index] + 1.0) * problem.known[index] / power[index]
         for _ in range(2):
-            weights = largest_weight / (problem.tail[index] + squared(residual[index]) / power[index])
+            weights = largest_weight / (problem.tail[index] + squared(gap[index]) / power[index])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
-            slope = 2.0 * float(np.vdot(column, weights * residual[index]).real) - amount / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * gap[index]).real) - amount / spread ** 2
             amount += slope / normal
-            residual[index] = values[index] - amount * column
+            gap[index] = values[index] - amount * column
         cost += 0.5 * (amount / spread) ** 2
-    return residual, cost
+    return gap, cost

@@ -1,4 +1,4 @@
-"""Blocks of flights flattened to one array, and what hypotheses make of them: residual, expected power, likelihood."""
+"""Blocks of flights flattened to one array, and what hypotheses make of them: gap, expected power, likelihood."""
 
 import functools
 import weakref
@@ -151,7 +151,7 @@ class Problem:
 
         One for each of OFFSETS channels of each flight whose mean differs between nominal flights.
         """
-        spread = self.data.study.floor.offset
+        spread = self.data.study.offset
         return [(self.joined(self.layout.gather(self._offset(i, c))), float(spread[c]))
                 for i in range(len(self.data.flights)) for c in range(OFFSETS) if spread[c] > 0.0]
 

@@ -74,11 +74,11 @@ def growth(term: Term, x: float) -> float:
 def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     """PSD (blocks, bins, COUNT) by state that a random effect of unit strength adds to flight i."""
     closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
-    power_by_regime = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
+    power_by_state = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
     response = data.study.response
     if response is not None and data.flights[i].rates is not None:
-        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.signature.sensed)
-    return power_by_regime
+        power_by_state[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.signature.sensed)
+    return power_by_state
 
 
 def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:

@@ -57,7 +57,7 @@ class SpectraSlopes:
                  ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
-        values, added: the residual, and the power over the floor, flattened.
+        values, added: the gap, and the power over the floor, flattened.
         """
         problem = self.problem
         gradient, information = problem.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)

@@ -22,7 +22,7 @@ from airtouch.vehicle import Vehicle
 AXES = "xyz"
 REGRESSED = {"force": FORCE_RESIDUAL, "torque": TORQUE_RESIDUAL, "speed": SPEED_RESIDUAL}
 OF_MEANS = slice(FORCE_RESIDUAL.start, SPEED_RESIDUAL.stop)  #: columns of the table whose means are looked at
-FEWEST_SAMPLES = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
+FEWEST_IN_PHASE = 20  #: samples of a phase, 0.2 s; else the whole flight stands in for it; chosen
 FEWEST_AT_REST = 4  #: samples at rest of which a variance is taken; chosen
 FAST_SAMPLES = 50  #: samples, 0.5 s, over which a mean is slow; chosen
 LEAST_VARIANCE = 1e-14  #: variance that is added, in squared units of a signal, so that none is 0
@@ -80,7 +80,7 @@ def _means(signals: FlightSignals, samples: np.ndarray) -> np.ndarray:
 def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
     """`_means`, those of angles, velocity, rates and range, and log variances of the part faster than 0.5 s."""
     in_phase = signals.air & (signals.flight.phase == phase)
-    samples = in_phase if in_phase.sum() > FEWEST_SAMPLES else signals.air
+    samples = in_phase if in_phase.sum() > FEWEST_IN_PHASE else signals.air
     assert signals.flight.rates is not None
     slow = [x[samples].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
                                               signals.table[:, RANGE_RESIDUAL])]

@@ -23,7 +23,7 @@ STEEPEST = 3.0  #: largest slope; chosen
 CALMER, HARDER = 0.5, 1.5
 LEAST_BLOCKS = 4  #: blocks of nominal flights from which a slope is fitted; chosen
 LEAST_DISPERSION = 1e-3  #: variance over the squared mean that powers have at least; chosen
-NEWTON_STEPS = 8  #: Newton steps of the gamma regression; chosen
+NEWTON_STEPS = 8  #: of the gamma regression; chosen
 LARGEST_STEP = 1.0  #: of the regression, in log power and in slope; chosen
 
 

@@ -36,7 +36,7 @@ FINE, REACH = 4, 2  #: points a bin; bins that a window's leakage is followed, i
 COMMAND_FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a block's power; chosen
 #: power of a block's commands over the median of its flight's blocks, above which a set-point stepped in it; chosen
 STEPPED_COMMAND = 5.0
-FEWEST_COMPARED = 3  #: blocks of a flight of which one can be unlike the others
+FEWEST_TO_COMPARE = 3  #: blocks of a flight of which one can be unlike the others
 VANISHING_POWER = 1e-30  #: least power, in any unit, that is divided by or has a logarithm; far below any measured
 STEPS = 12  #: iterations to the power of highest likelihood; chosen
 
@@ -87,7 +87,7 @@ def steady(flight: Flight) -> np.ndarray:
 
 def _without_step(power: np.ndarray) -> np.ndarray:
     """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
-    if len(power) < FEWEST_COMPARED:
+    if len(power) < FEWEST_TO_COMPARE:
         return np.ones(len(power), bool)
     mean = np.median(power, axis=0) / np.log(2.0)  # of an exponential law, as that of a bin's power
     return ((power / np.maximum(mean, VANISHING_POWER)).mean(axis=1) < STEPPED_COMMAND).all(axis=1)

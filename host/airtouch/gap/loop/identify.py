@@ -33,7 +33,7 @@ from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-FEWEST_FOR_LOOP = 6  #: blocks of nominal flights, for a command view; chosen
+FEWEST_COMMAND_BLOCKS = 6  #: blocks of nominal flights, for a command view; chosen
 #: nats by which fitted gains must be likelier than the firmware's documented ones, for each axis; chosen
 FREE_GAINS = 1.5
 FLOOR_SMOOTH = 3.0  #: bins, standard deviation of the Gaussian that smooths the floor over the model's shape; chosen
@@ -65,7 +65,7 @@ class AxisFit(NamedTuple):
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
     """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
     by_flight = [block_spectra(f, vehicle) for f in flights]
-    if sum(len(first) for first, _ in by_flight) < FEWEST_FOR_LOOP:
+    if sum(len(first) for first, _ in by_flight) < FEWEST_COMMAND_BLOCKS:
         return None
     hardness = np.concatenate([hardness_of(f, first, COMMAND_LENGTH)
                                for f, (first, _) in zip(flights, by_flight, strict=True)])

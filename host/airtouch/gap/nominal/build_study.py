@@ -75,9 +75,9 @@ def _replayed_blocks(flight: Flight, vehicle: Vehicle, calibration: tuple[Active
 
 
 def _torque(nominal: NominalBlocks) -> TorqueSpectra:
-    """Torque of a flight's blocks in the air, measured and as the replay leaves it."""
+    """Torque of a flight's blocks in the air, measured and modelled."""
     measured = short_time_spectra(angular_acceleration(nominal.flight), nominal.first[AIR], AIR)
-    return TorqueSpectra(measured, nominal.spectra[AIR][:, :, TORQUE])
+    return TorqueSpectra(measured, measured - nominal.spectra[AIR][:, :, TORQUE])
 
 
 def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_loop.ClosedLoop | None,
@@ -86,8 +86,7 @@ def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_lo
     if loop is None or any(n.flight.rates is None for n in replayed):
         return None
     outside = disturbed(loop.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
-    torques = [_torque(n) for n in replayed]
-    return response_of([t.measured for t in torques], [t.residual for t in torques], outside)
+    return response_of([_torque(n) for n in replayed], outside)
 
 
 def _under_response(replayed: NominalBlocks, vehicle: Vehicle, calibration: tuple[Active, ...],
@@ -96,7 +95,7 @@ def _under_response(replayed: NominalBlocks, vehicle: Vehicle, calibration: tupl
     spectra, quiet = replayed.spectra, None
     if response is not None:
         torque = _torque(replayed)
-        quiet = response.quiet(torque.measured - torque.residual)
-        spectra = {**spectra, AIR: response.with_residual(spectra[AIR], quiet, torque)}
+        quiet = response.quiet(torque.modelled)
+        spectra = {**spectra, AIR: response.with_torque_gap(spectra[AIR], quiet, torque)}
     bridging = bridging_power(replayed.flight, vehicle, calibration, replayed.first[AIR], quiet, response)
     return replace(replayed, spectra=spectra, bridging=bridging)

@@ -118,9 +118,7 @@ def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, 
 def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str]) -> Study:
     """The study of simulated flights: with the relations of their signals, where a library holds for them.
 
-    They all have the same trim. What the power in the lowest bin gives a flight's mean is therefore no part of the
-    offset between flights. without: effects that are no candidates; of the others the library learns those that it
-    lacks.
+    without: effects that are no candidates; of the others the library learns those that it lacks.
     """
     relations = library_for(study.vehicle, [features(f, study.vehicle) for f in flights])
     names = all_candidates(without)
@@ -128,7 +126,7 @@ def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str
         from airtouch.gap.relations.own_effect import completed  # a second of imports, which few need
 
         relations = completed(relations, study.vehicle, names)
-    return replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond), relations=relations)
+    return replace(study, relations=relations)
 
 
 def _terms_and_priors() -> tuple[list[Term], np.ndarray]:

@@ -21,7 +21,7 @@ from airtouch.simulation.effects.effect import Gate
 MOST_STRETCHES = 4  #: stretches in which an effect may act, times the number of flights, of all flights together
 WORST = 0.25  #: share of the blocks, those explained worst, that an effect is first fitted to
 LEAST_WORST = 2  #: blocks that it is first fitted to at least
-ALTERNATIONS = 3  #: alternations of fitting an effect and choosing its stretches
+STRETCH_ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches
 LEAST_BLOCKS = 6  #: blocks in the air, below which no stretch is sought
 STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 WHOLE = 0.9  #: share of a flight's blocks above which an effect is no passing one
@@ -42,12 +42,12 @@ def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: 
 
     No gate where it acts nowhere or everywhere. whole: all blocks of the flights; level_without (b,): log likelihood of
     each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
-    which it gains, ALTERNATIONS times at most; then the stretches' ends are moved.
+    which it gains, STRETCH_ROUNDS times at most; then the stretches' ends are moved.
     """
     air, cost = problem_of(data, whole).air, cost_of_stretch(len(level_without))
     at_the_ends = _at_the_ends(data, air)
     acting = _explained_worst(air, level_without)
-    for _ in range(ALTERNATIONS):
+    for _ in range(STRETCH_ROUNDS):
         fitted = fit(data, _part(whole, acting), terms)
         gain = np.where(at_the_ends, -np.inf, each_block(data, whole, fitted.terms) - level_without)
         stretches = best_stretches(gain, air.flight, cost)

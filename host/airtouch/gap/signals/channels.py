@@ -1,8 +1,9 @@
 """The gap's channels: what each is, and what a flight's residual is in them, sample by sample.
 
-Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3), judged below 0.3 Hz. Command view:
-the controller's command (4), divided by the change of its spectrum that the effects in the model predict, so that a
-right model leaves the spectrum of nominal flights.
+Replay view: specific force (3), angular acceleration (3), and the gyro's rates (3), judged below 0.3 Hz. "Torque" of a
+channel is torque per moment of inertia, an angular acceleration, as its "force" is force per mass. Command view: the
+controller's command (4), divided by the change of its spectrum that the effects in the model predict, so that a right
+model leaves the spectrum of nominal flights.
 """
 
 from collections.abc import Sequence

@@ -20,7 +20,7 @@ SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flig
 #: ones leave less evidence in the commands, as the floor takes up more of what effects make; with smaller ones a floor
 #: of few nominal flights, or other air, looks like an effect
 SPREAD = (0.10, 0.04)
-ROUNDS = 4  #: Newton steps to the correction; chosen
+NEWTON_STEPS = 4  #: Newton steps to the correction; chosen
 #: factor on SPREAD where random effects shake the loop in ways that no log holds; chosen, not measured. With a larger
 #: one commands say less of any effect beside a random one, with a smaller one what shakes the loop looks like an effect
 WIDE = 6.0
@@ -59,7 +59,7 @@ def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, wide:
     normal = weight * shapes @ shapes.T + np.diag(1.0 / spread ** 2)
     covariance = np.linalg.inv(normal)
     amount = np.zeros((SHAPES, len(AXES)))
-    for _ in range(ROUNDS):
+    for _ in range(NEWTON_STEPS):
         slope = OVERLAP_WEIGHT * log_likelihood_slope(over_floor, np.exp(-shapes.T @ amount))
         amount += covariance @ (shapes @ slope - amount / spread[:, None] ** 2)
     cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())

@@ -109,7 +109,9 @@ class CommandView:
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the log likelihood for k scaled parameters.
+        """Gradient (k,) and information (k, k) of the spectra's log likelihood for k scaled parameters.
+
+        Responses at edges are not in it: their power is 1 under every hypothesis.
 
         rise (k, bins, AXES): of the logarithm of the power per scaled parameter; active, wide: see `power`.
         """

@@ -27,7 +27,7 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     """Power (blocks, bins, COUNT), unit^2/Hz, that lost rows add to the blocks in the air that begin at `first`.
 
     It is zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight. quiet
-    (blocks, 3), response: as `Response.with_residual` takes them; without, the torque is that of the logged commands.
+    (blocks, 3), response: as `Response.with_torque_gap` takes them; without, the torque is that of the logged commands.
     """
     total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))  # of the shifts with room
     if not flight.lost.any() or not len(first):
@@ -43,7 +43,8 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
         spectrum = short_time_spectra(change, begin[room], AIR)
         if response is not None and quiet is not None and flight.rates is not None and room.any():
             turned = short_time_spectra(angular_acceleration(poorer) - turning, begin[room], AIR)
-            spectrum = response.with_residual(spectrum, quiet[room], TorqueSpectra(turned, spectrum[:, :, TORQUE]))
+            torque = TorqueSpectra(turned, turned - spectrum[:, :, TORQUE])
+            spectrum = response.with_torque_gap(spectrum, quiet[room], torque)
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], SMOOTH, axis=1, mode="nearest")

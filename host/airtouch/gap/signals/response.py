@@ -2,8 +2,8 @@
 
 Both are spectra (blocks, bins, 3) about three axes, rad/s^2/sqrt(Hz). Nominal flights give a law E[y | w] for each of
 two kinds of blocks, quiet ones and those in which a set-point stepped (`Law`). Of a flight under a hypothesis the
-residual (blocks, bins, 3) is y minus that, plus what effects add to it, weighted to the floor of quiet blocks
-(`Response.with_residual`). In the spectra of the gap it takes the place of measured minus modelled torque.
+torque's gap (blocks, bins, 3) is y minus that, plus what effects add to it, weighted to the floor of quiet blocks. In
+the spectra of the gap it takes the place of measured minus modelled torque (`Response.with_torque_gap`).
 
 A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the vehicle,
 and the kicks of the outer loop's steps, which did, are mostly not in it. So of w only a part is to be expected in y, by
@@ -12,13 +12,13 @@ dilution: Fuller, Measurement Error Models, 1987, chapter 1).
 
     E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal: `Law.transfer`
     q~ = q clip((coherence - NOISE) / NOISE, 0, 1)               0 where gyro noise in both makes q: `Law.coherent`
-    residual = y - q~ c w + what effects add                     c: ratio of q with effects to q without, `Law.ratio`,
+    gap = y - q~ c w + what effects add                          c: ratio of q with effects to q without, `Law.ratio`,
                                                                  derived in `loop.torque_share`
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
 fights it (`loop.disturbed`). Blocks in which a set-point stepped follow another law (the kick is coherent, the aliases
-are not) and leave another floor, to which their residual is weighted.
+are not) and leave another floor; their gap is weighted to that of quiet ones.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: bins below it hold the means, which the Hann window spreads over two bins: there q is 1
-FEWEST = 8  #: blocks of nominal flights that a response, and a law of stepped blocks, needs; chosen
+FEWEST_OF_KIND = 8  #: blocks of nominal flights that a response, and a law of stepped blocks, needs; chosen
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
@@ -55,27 +55,27 @@ FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a singl
 class TorqueSpectra:
     """Spectra (blocks, bins, 3) of the angular acceleration about the three axes, rad/s^2/sqrt(Hz).
 
-    measured: of the gyro's differences. residual: measured minus what the model without effects makes of the logged
-    commands. by_command, disturbance: what effects add to that residual through the commands, the loop as it was, and
+    measured: of the gyro's differences. modelled: what the model without effects makes of the logged commands.
+    by_command, disturbance: what effects add to measured minus modelled through the commands, the loop as it was, and
     as torques that no command makes; None for nothing.
     """
 
     measured: np.ndarray
-    residual: np.ndarray
+    modelled: np.ndarray
     by_command: np.ndarray | None = None
     disturbance: np.ndarray | None = None
 
     def of_blocks(self, index: np.ndarray) -> "TorqueSpectra":
         """The same of some blocks."""
-        return TorqueSpectra(self.measured[index], self.residual[index],
+        return TorqueSpectra(self.measured[index], self.modelled[index],
                              None if self.by_command is None else self.by_command[index],
                              None if self.disturbance is None else self.disturbance[index])
 
 
 class OutsideTorque(NamedTuple):
-    """What the residual of a law, before its weight, has of a torque from outside; (bins, 3) each, without unit.
+    """What the torque's gap, before a law's weight, has of a torque from outside; (bins, 3) each, without unit.
 
-    transfer: complex, residual over a known torque; power: power of the residual over that of a random torque.
+    transfer: complex, gap over a known torque; power: power of the gap over that of a random torque.
     """
 
     transfer: np.ndarray
@@ -87,7 +87,7 @@ class Law:
     """How the measured torque follows the modelled one in blocks of one kind; (bins, 3) each, but the kind.
 
     kind: of the blocks that it was measured in and holds for, QUIET or STEPPED. transfer: q, coherent: q~ (both in the
-    module's equations), complex, without unit; outside: what the residual has of a torque from outside; weight: rms
+    module's equations), complex, without unit; outside: what the gap has of a torque from outside; weight: rms
     floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz.
     """
 
@@ -113,19 +113,18 @@ class Law:
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.coherent[:, 2]), 1.0) ** 2
         return out
 
-    def residual(self, torque: TorqueSpectra, change: Change | None) -> np.ndarray:
-        """Weighted residual (blocks, bins, 3) of blocks of this law's kind. change: see `Response.with_residual`."""
+    def torque_gap(self, torque: TorqueSpectra, change: Change | None) -> np.ndarray:
+        """Weighted gap (blocks, bins, 3) of blocks of this law's kind. change: see `Response.with_torque_gap`."""
         c = 1.0 if change is None else self.ratio(change)
-        modelled = torque.measured - torque.residual
-        residual = torque.measured - self.coherent * c * modelled
+        gap = torque.measured - self.coherent * c * torque.modelled
         if torque.by_command is not None:
-            residual = residual + self.bounded * torque.by_command
+            gap = gap + self.bounded * torque.by_command
         if torque.disturbance is not None:
-            residual = residual + self.outside.transfer * torque.disturbance
-        return self.weight * residual
+            gap = gap + self.outside.transfer * torque.disturbance
+        return self.weight * gap
 
     def random_power(self, sensed: bool) -> np.ndarray:
-        """Power (bins, 3) that the residual has of a random torque of unit power. sensed: on the gyro alone."""
+        """Power (bins, 3) that the torque's gap has of a random torque of unit power. sensed: on the gyro alone."""
         return self.weight ** 2 * (1.0 if sensed else self.outside.power)
 
 
@@ -145,9 +144,9 @@ class Response:
         """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3)."""
         return quiet_blocks.are_quiet(modelled, self.quiet_power)
 
-    def with_residual(self, spectra: np.ndarray, quiet: np.ndarray, torque: TorqueSpectra,
-                      change: Change | None = None) -> np.ndarray:
-        """Spectra (blocks, bins, COUNT) of the gap in which the residual of the laws replaces that of the torque.
+    def with_torque_gap(self, spectra: np.ndarray, quiet: np.ndarray, torque: TorqueSpectra,
+                        change: Change | None = None) -> np.ndarray:
+        """Spectra (blocks, bins, COUNT) of the gap in which the torque's gap is that to the laws.
 
         It does so above the bins of the means (FIRST_BIN), and is NaN in a block for which there is no law.
 
@@ -155,23 +154,23 @@ class Response:
         whether no set-point stepped on an axis. torque: of the same blocks. change: what effects that change the loop
         make of the torque of a command; None for no such effect.
         """
-        residual = self.quiet_law.residual(torque, change)
+        gap = self.quiet_law.torque_gap(torque, change)
         with_step = np.flatnonzero(~quiet.all(axis=1))  # on some axis
         if len(with_step):
-            stepped = np.full(residual[with_step].shape, np.nan) if self.stepped_law is None else \
-                self.stepped_law.residual(torque.of_blocks(with_step), change)
-            residual[with_step] = np.where(quiet[with_step, None], residual[with_step], stepped)
+            stepped = np.full(gap[with_step].shape, np.nan) if self.stepped_law is None else \
+                self.stepped_law.torque_gap(torque.of_blocks(with_step), change)
+            gap[with_step] = np.where(quiet[with_step, None], gap[with_step], stepped)
         out = spectra.copy()
-        out[:, FIRST_BIN:, TORQUE] = residual[:, FIRST_BIN:]
+        out[:, FIRST_BIN:, TORQUE] = gap[:, FIRST_BIN:]
         return out
 
     def weighted(self, quiet: np.ndarray, torque: np.ndarray) -> np.ndarray:
-        """Torque (blocks, bins, 3) weighted as its residual is in quiet and in other blocks (blocks, 3)."""
+        """Torque (blocks, bins, 3) weighted as its gap is in quiet and in other blocks (blocks, 3)."""
         stepped = np.nan if self.stepped_law is None else self.stepped_law.weight
         return torque * np.where(quiet[:, None], self.quiet_law.weight, stepped)
 
     def doubt(self, quiet: np.ndarray, modelled: np.ndarray, change: Change) -> np.ndarray:
-        """Power (blocks, bins, 3) that the residual may have because steps, and what the limits cut of them, differ.
+        """Power (blocks, bins, 3) that the torque's gap may have as steps, and what the limits cut of them, differ.
 
         quiet (blocks, 3): whether no set-point stepped; modelled: torque of the commands (blocks, bins, 3).
         """
@@ -182,7 +181,7 @@ class Response:
         return np.where(quiet[:, None], 0.0, np.nan_to_num(doubt) * squared(modelled))
 
     def random_power(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
-        """Power (blocks, bins, 3) that the residual has of a random torque of unit power; 1 in the means.
+        """Power (blocks, bins, 3) that the torque's gap has of a random torque of unit power; 1 in the means.
 
         sensed: on the gyro alone.
         """
@@ -193,25 +192,23 @@ class Response:
         return out
 
 
-def response_of(measured: Sequence[np.ndarray], residuals: Sequence[np.ndarray], loop: Disturbed) -> Response | None:
-    """The response of nominal flights from their spectra (blocks, bins, 3); None for too few blocks, or too few quiet.
+def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed) -> Response | None:
+    """The response of nominal flights from the torque of each; None for too few blocks, or too few quiet.
 
     The latter are few on an axis where flights differ in strength so much that none is like the others.
 
-    measured, residuals: angular acceleration, and measured minus modelled one, of each flight. loop: what it makes of a
-    torque from outside.
+    loop: what it makes of a torque from outside.
     """
-    y = np.concatenate(measured)
-    w = y - np.concatenate(residuals)
-    if len(y) < FEWEST:
+    modelled = [t.modelled for t in torques]
+    y, w = np.concatenate([t.measured for t in torques]), np.concatenate(modelled)
+    if len(y) < FEWEST_OF_KIND:
         return None
-    modelled = [m - r for m, r in zip(measured, residuals, strict=True)]
     power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
     if quiet.sum(axis=0).min() < FEWEST_QUIET:
         return None
     quiet_law, floor = _law(QUIET, y, w, quiet, loop, None)
     stepped_law = None
-    if (~quiet).any(axis=1).sum() >= FEWEST:
+    if (~quiet).any(axis=1).sum() >= FEWEST_OF_KIND:
         stepped_law, _ = _law(STEPPED, y, w, ~quiet, loop, floor)
     return Response(QuietPower(_smooth(power.mean), power.calm), quiet_law, stepped_law)
 
@@ -234,7 +231,7 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     transfer = _smooth(q.real) + 1j * _smooth(q.imag)
     coherent = transfer * np.clip((coherence - NOISE) / NOISE, 0.0, 1.0)
     own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER))))
-    enough = chosen.sum(axis=0) >= FEWEST
+    enough = chosen.sum(axis=0) >= FEWEST_OF_KIND
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
     remains = loop.measured - answer

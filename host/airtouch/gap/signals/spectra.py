@@ -17,7 +17,7 @@ LENGTH = {AIR: 256, REST: 24}  #: samples of a block, 2.56 s and 0.24 s; chosen
 OVERLAP_WEIGHT = 0.5  #: of a block in a sum of log likelihoods, as half overlapping blocks hold every sample twice
 MOST_LOST = 0.1  #: share of a block's samples that may be bridged; chosen
 
-# Power over frequency, here and in the rooms that use it.
+# Power over frequency, here and in the folders that use it.
 SMOOTH = 1.5  #: bins, standard deviation of the Gaussian that averages floors and laws over frequency; chosen
 #: bins, frequency at which a spectrum that falls to 0 is taken in its lowest bin, as the window leaks into it; chosen
 LEAKED = 0.5

@@ -120,20 +120,20 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
         return gap
     modelled = _random_power(study, flight, random)
     sensor, power = sensor_rms(study.vehicle) ** 2, gap.power.copy()
-    for rows, regime in ((gap.phase == GROUND, REST), (gap.phase != GROUND, AIR)):
+    for rows, state in ((gap.phase == GROUND, REST), (gap.phase != GROUND, AIR)):
         weight = gap.weight[rows][:, :, None, None]
         noise = np.minimum(sensor * weight, gap.power[rows])
-        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled[regime])
+        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled[state])
     return replace(gap, power=power)
 
 
 def _random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> dict[str, np.ndarray | float]:
-    """Mean power (bands, COUNT) that random effects add in a flight, by regime of blocks; 0 where it has no block."""
+    """Mean power (bands, COUNT) that random effects add in a flight, by state of blocks; 0 where it has no block."""
     data, out = Data(study, [flight]), {}
-    for regime in (REST, AIR):
-        density = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
-        out[regime] = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
-                          for p in (random_effects.power(data, t)[0][regime] for t in terms))
+    for state in (REST, AIR):
+        density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
+        out[state] = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
+                          for p in (random_effects.power(data, t)[0][state] for t in terms))
     return out
 
 

@@ -1,6 +1,15 @@
 """The map in a few figures: where most of the gap lies, what stays and what got worse, phase by phase.
 
 Everything that is said of a map, in a sentence, a table, the JSON or a picture, comes from here.
+Of a cell: g its gap, l the lower end of g's interval (g where it has none), F the upper end of its floor, n its blocks;
+a its gap with the named effects in the model.
+
+    stands out    l / F > 1
+    stays         a l / g > F
+    got worse     it stays, and a > WORSE g
+    energy        n ((g / F)^2 - 1)                   0 where it does not stand out
+    removed       n ((g / F)^2 - max(a / F, 1)^2)     0 where it does not stand out
+    closes        removed >= HALF energy > 0
 """
 
 from collections.abc import Iterable, Sequence
@@ -85,12 +94,12 @@ def got_worse(cell: Cell) -> bool:
 
 
 def energy(cell: Cell) -> float:
-    """Power of the gap over its floor times the number of blocks: the cell's part in the whole flight."""
+    """Energy of the cell, in blocks: its part in the whole flight."""
     return max(cell.blocks, 1) * max(over_floor(cell) ** 2 - 1.0, 0.0) if stands_out(cell) else 0.0
 
 
 def removed(cell: Cell) -> float:
-    """Power over the floor that the named effects take from the cell, times the number of blocks."""
+    """Part of its energy that the named effects take from the cell, in blocks; below 0 where they add to it."""
     if cell.after is None or not stands_out(cell):
         return 0.0
     return max(cell.blocks, 1) * (over_floor(cell) ** 2 - max(over_floor(cell, cell.after), 1.0) ** 2)

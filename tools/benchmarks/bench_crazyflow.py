@@ -1,6 +1,6 @@
 """Simulated seconds a wall second of crazyflow (JAX) on the CPU: 64 worlds under state control at 500 Hz.
 
-    python tools/checks/bench_crazyflow.py [--seconds 10] [--rounds 3]
+    python tools/benchmarks/bench_crazyflow.py [--seconds 10] [--rounds 3]
 
 Prints one JSON object: by integrator, the rate a wall second and a second of CPU time. Runs where
 `pip install crazyflow==0.4.0` was done (1.2 GB, so not among AirTouch's packages);

@@ -14,8 +14,8 @@ from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
-from tools.emulate import flight
-from tools.emulate.flight import BOOT_S, REST, EmulatedFlight
+from tools.firmware_emulation import flight
+from tools.firmware_emulation.flight import BOOT_S, REST, EmulatedFlight
 
 ROWS_S = 100  #: rows a second
 #: channel -> first column in EmulatedFlight.table, and in the simulator's log

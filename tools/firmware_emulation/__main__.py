@@ -1,10 +1,10 @@
 """The whole firmware with the app, in QEMU: `make emulate CRAZYFLIE_BASE=...`.
 
-    python -m tools.emulate ~/crazyflie-firmware                    # two recorded flights through the log variables
-    python -m tools.emulate ~/crazyflie-firmware flight.csv --steps 2400
-    python -m tools.emulate ~/crazyflie-firmware --fly              # its stabilizer flies the simulator's drone
-    python -m tools.emulate ~/crazyflie-firmware --gap8             # with the network on the GAP8, and faults
-    python -m tools.emulate ~/crazyflie-firmware --height           # with and without the height over a platform
+    python -m tools.firmware_emulation ~/crazyflie-firmware             # two recorded flights, by the log variables
+    python -m tools.firmware_emulation ~/crazyflie-firmware flight.csv --steps 2400
+    python -m tools.firmware_emulation ~/crazyflie-firmware --fly       # its stabilizer flies the simulator's drone
+    python -m tools.firmware_emulation ~/crazyflie-firmware --gap8      # with the network on the GAP8, and faults
+    python -m tools.firmware_emulation ~/crazyflie-firmware --height    # with and without the height over a platform
 """
 
 import argparse
@@ -24,10 +24,10 @@ from airtouch.logs.files import check_free, make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
-from tools.emulate import build, gap8, height
-from tools.emulate.board import PER_US
-from tools.emulate.compare import report
-from tools.emulate.replay import VEHICLES, Replay, replay, rows
+from tools.firmware_emulation import build, gap8, height
+from tools.firmware_emulation.board import PER_US
+from tools.firmware_emulation.compare import report
+from tools.firmware_emulation.replay import VEHICLES, Replay, replay, rows
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
 #: what is said where the checkout is not given
@@ -88,13 +88,13 @@ class Parser(argparse.ArgumentParser):
         """AirTouchError in place of a usage of seven lines."""
         if "arguments are required" in message:
             raise AirTouchError(NO_BASE)
-        raise AirTouchError(f"{message}; see python -m tools.emulate --help")
+        raise AirTouchError(f"{message}; see python -m tools.firmware_emulation --help")
 
 
 def parser() -> argparse.ArgumentParser:
     """What the command takes. An option that is not given is None or False, so that `fits` can refuse it where it
     has no part."""
-    arguments = Parser(prog="python -m tools.emulate", description=__doc__,
+    arguments = Parser(prog="python -m tools.firmware_emulation", description=__doc__,
                        formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
     arguments.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")

@@ -4,8 +4,8 @@ import tomllib
 from dataclasses import fields
 from pathlib import Path
 
-from tools.emulator.build import ROOT
-from tools.emulator.flight_code import Cost
+from tools.instruction_counts.build import ROOT
+from tools.instruction_counts.flight_code import Cost
 
 PATH = ROOT / "tests" / "emulation" / "budget.toml"  #: file of the limits
 

@@ -18,9 +18,9 @@ from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.vehicle import Vehicle
-from tools.emulate import plant as at
-from tools.emulate.board import FLY, Board
-from tools.emulate.plant import Plant
+from tools.firmware_emulation import plant as at
+from tools.firmware_emulation.board import FLY, Board
+from tools.firmware_emulation.plant import Plant
 
 BOOT_S = 4.0  #: on the floor before the mission begins: self-tests, calibration, and the estimator at rest
 REST = 0.2  #: the IMU's noise there over that in flight; the firmware takes no bias from noise of 10 LSB and more

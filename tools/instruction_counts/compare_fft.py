@@ -1,6 +1,6 @@
 """The nine-channel step beside nine 256-point real FFTs of CMSIS-DSP, both counted in the emulator.
 
-    python -m tools.emulator.compare_fft [--sdist cmsisdsp-1.10.3.tar.gz]
+    python -m tools.instruction_counts.compare_fft [--sdist cmsisdsp-1.10.3.tar.gz]
 
 The FFT's sources are those in the source distribution of PyPI's `cmsisdsp` (Apache-2.0), which pip downloads
 once to build/. They are compiled as Arm means it (-O2 and -O3, multiply-adds fused where the compiler likes),
@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from tools.emulator.build import CACHE, build, compilers
-from tools.emulator.flight_code import FlightCode, compile_flight_code, made_flight
-from tools.emulator.machine import Machine
+from tools.instruction_counts.build import CACHE, build, compilers
+from tools.instruction_counts.flight_code import FlightCode, compile_flight_code, made_flight
+from tools.instruction_counts.machine import Machine
 
 VERSION = "1.10.3"  #: of the package cmsisdsp
 CHANNELS, POINTS = 9, 256  #: transforms of a step, and their length

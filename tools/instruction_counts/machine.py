@@ -16,8 +16,8 @@ from unicorn import riscv_const as riscv
 from unicorn import unicorn_const as uc_const
 
 from airtouch.errors import AirTouchError
-from tools.emulator.counter import InstructionCounter
-from tools.emulator.elf import ARM, Elf
+from tools.instruction_counts.counter import InstructionCounter
+from tools.instruction_counts.elf import ARM, Elf
 
 PAGE = 4096                 #: bytes of a page of the emulator's memory
 STACK_TOP = 0x3000_0000     #: a region of its own, so that running over its end is a fault
@@ -60,7 +60,7 @@ _RISCV = _Registers(tuple(getattr(riscv, f"UC_RISCV_REG_A{i}") for i in range(8)
 class Machine:
     """A processor with a program in its memory.
 
-    elf: a linked program (tools.emulator.build). stack_bytes, heap_bytes: room for the stack and for
+    elf: a linked program (tools.instruction_counts.build). stack_bytes, heap_bytes: room for the stack and for
     `allocate`, whole pages. Code and constants cannot be written, and nothing but code can run.
     Raises EmulationError, one line, for what a processor would stop at.
     """

@@ -1,6 +1,6 @@
 """Seconds of `airtouch gap diagnose` of the packaged flight of 25 s, four baseline flights, JSON and report.
 
-    python tools/checks/bench_diagnosis.py [--runs 5]
+    python tools/benchmarks/bench_diagnosis.py [--runs 5]
 
 Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles: with the first
 flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else should run
