@@ -50,6 +50,11 @@ def test_the_answer_has_no_reason():
     assert why_not(selection(), "none", "none") == why_not(selection(), "unknown", "unknown") == ""
 
 
+def test_at_the_floor_that_is_the_reason_of_a_named_effect():
+    assert why_not(selection(), "mass", "none") == "the gap as a whole is at its floor"
+    assert why_not(selection(), "inertia", "none") == why_not(selection(), "inertia", "effect")
+
+
 @pytest.mark.parametrize(("name", "words"), [
     ("inertia", "held-out data gain 2.0 nats by it, 8 are needed"),
     ("wind", "as strong as it often seems to be in nominal flights: 40 nats, of which 3.0 beyond that scatter, 8 are "

@@ -108,3 +108,10 @@ def test_replay_names_no_wind_that_is_not_the_likeliest(relations, monkeypatch):
     monkeypatch.setattr(select, "passing_effect", lambda *arguments: replace(passing(*arguments), name="wind"))
     relations(inference([effect_class("mass")], OPEN))
     assert select.select(PUSHED, candidates_of(["mass"])).inference is not None
+
+
+def test_relations_stand_where_the_replay_takes_its_wake_back(relations, monkeypatch):
+    """What it then names instead is asked for again: no wake, and not the likeliest."""
+    monkeypatch.setattr(select, "as_in_nominal_flights", lambda *_: True)
+    relations(inference([effect_class("mass")], OPEN, "downwash"))
+    assert select.select(PUSHED, candidates_of(["mass"])).inference is not None

@@ -63,6 +63,16 @@ def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, without_f
     assert calibration.declared.offset == pytest.approx(of_nominal.declared.offset)
 
 
+def test_no_more_than_a_third_is_left_out_in_all_passes_together(nominal, without_fits, monkeypatch):
+    """Each pass finds one more flight unlike the others: of four, the first alone may go."""
+    def split(vehicle, flights, far):
+        return (flights[1:], [flights[0].name]) if far is calibrate.FAR_SIMULATED else (flights, [])
+
+    monkeypatch.setattr(calibrate, "split_unlike", split)
+    _, calibration = calibrated(VEHICLE, nominal)
+    assert len(calibration.flights) == 3 and calibration.notes[0] == nominal[0].name
+
+
 def test_recorded_flights_differ_by_as_much_and_count(nominal, without_fits):
     flights = [recorded(f) for f in (*nominal, with_a_push(nominal[0], 2.0))]
     assert not [n for n in calibrated(VEHICLE, flights)[1].notes if "left out" in n]

@@ -20,6 +20,8 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
         return ""
     if step is not None and verdict == "effect":
         return _why_beside(selection, step)
+    if verdict == "none" and name in {s.name for s in selection.named_steps}:
+        return "the gap as a whole is at its floor"
     if name == "unknown":
         return _why_not_unknown(selection)
     if name == "none":

@@ -25,7 +25,7 @@ from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
-from airtouch.gap.signatures.signature import ALWAYS_RANDOM, OVERHEAD
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Terms
 from airtouch.simulation import effects
 
@@ -51,7 +51,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without, rank_all)
     passing = passing_effect(search, without)
-    answer = _by_replay(search, forward(search, passing), passing)
+    answer = _by_replay(search, _searched(search, passing))
     if inference is None or _own_effect_explains(answer):
         return answer
     return _by_relations(search, inference, without, rank_all)
@@ -66,8 +66,8 @@ def _own_effect_explains(answer: Selection) -> bool:
 def _by_relations(search: Search, inference: Inference, without: Sequence[str], rank_all: bool) -> Selection:
     """What the relations of signals name; where these leave something unexplained, what the replay may name instead.
 
-    The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake
-    (ALWAYS_RANDOM holds `downwash` alone), or the likeliest by the relations.
+    The replay is asked where `replay_may_name`. Its answer stands if the first effect that it names is a wake, or the
+    likeliest by the relations.
     """
     answer = selection_by_relations(search, inference, rank_all)
     if is_explained(answer):
@@ -75,11 +75,10 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     passing = passing_effect(search, without)
     if not replay_may_name(passing, inference):
         return answer
-    state = forward(search, passing)
-    first = next(iter(state.names), "")
-    if first not in (*ALWAYS_RANDOM, inference.likeliest):
+    state = _searched(search, passing)
+    if next(iter(state.names), "") not in (OVERHEAD, inference.likeliest):
         return answer
-    return _by_replay(search, state, passing)
+    return _by_replay(search, state)
 
 
 def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
@@ -89,31 +88,36 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
 
     1. it is a wake: the relations of a whole flight dilute its seconds;
     2. it is the effect for which the relations have most evidence;
-    3. for a wake that fills the flight (ALWAYS_RANDOM holds `downwash` alone) they have more than WAKE_SHARE of that
-       evidence, nats.
+    3. for a wake that fills the flight they have more than WAKE_SHARE of that evidence, nats.
     """
     if passing is not None and passing.name in (OVERHEAD, inference.likeliest):
         return True
     most = inference.evidence.get(inference.likeliest, 0.0)
-    return any(inference.evidence.get(name, -np.inf) > WAKE_SHARE * most for name in ALWAYS_RANDOM)
+    return inference.evidence.get(OVERHEAD, -np.inf) > WAKE_SHARE * most
 
 
-def _by_replay(search: Search, state: State, passing: Candidate | None) -> Selection:
-    """The selection that a forward search ended in, with what it leaves.
+def _searched(search: Search, passing: Candidate | None) -> State:
+    """Where a forward search ends, its steps with their leave-one-out gains.
 
-    passing: the passing effect, its first step; the search is done again without it where beside the other
-    effects it is no more than nominal flights have.
+    passing: the passing effect, its first step; the search is done again without it where beside the other effects it
+    is no more than nominal flights have.
     """
-    trial, policy = search.trial, search.trial.policy
+    trial, state = search.trial, forward(search, passing)
     steps = with_leave_one_out_gains(trial, state.steps)
     if passing is not None and as_in_nominal_flights(trial.data, passing, steps):
         state = forward(search, None)
         steps = with_leave_one_out_gains(trial, state.steps)
+    return replace(state, steps=tuple(steps))
+
+
+def _by_replay(search: Search, state: State) -> Selection:
+    """The selection that a search ended in, with what it leaves."""
+    trial, policy, steps = search.trial, search.trial.policy, state.steps
     last = steps[-1].terms if steps else ()
     over_none = nameless_nats(trial, None)
     over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
     selection = Selection(
-        single_effects=state.single_effects, steps=tuple(steps), halves=trial.halves, least_nats=state.least_nats,
+        single_effects=state.single_effects, steps=steps, halves=trial.halves, least_nats=state.least_nats,
         nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
     if not policy.judges_over_prediction:

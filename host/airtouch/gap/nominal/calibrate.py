@@ -22,7 +22,7 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nameless.model import nameless_floor
 from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
-from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, odd_flights, split_unlike
+from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, MOST_LEFT_OUT, odd_flights, split_unlike
 from airtouch.gap.nominal.kept_scatter import kept_scatter
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
@@ -74,6 +74,8 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         if not unlike:
             break
         alike, far = split_unlike(vehicle, alike, FAR)  # from the median of those that are left
+        if len(flights) - len(alike) > len(flights) // MOST_LEFT_OUT:  # they disagree
+            break
         left_out = [*left_out, *unlike, *far]
         measured = _measured(vehicle, alike, scatter, without)
     study, nominal = measured.study, measured.flights

@@ -28,8 +28,8 @@ LEAST_LEFT = 0.1  #: share of a block's power that is left at least when the pow
 #: Hz, upper end of the band in which torque and rate hold the trim of a flight, which does not go with how hard it is
 #: flown: that of the lowest band
 TRIM_HZ = BANDS_HZ[1]
-#: bins, noise bandwidth of a Hann window: what is constant within a block has so many times more power in a flight's
-#: mean than in the lowest bin. White noise has as much, so that its chance is rather over- than underrated
+#: bins, noise bandwidth of a Hann window. Times the duration, the variance of a flight's mean is 1.5 times the power in
+#: the lowest bin for what is constant within a block, once for white noise; the larger is used
 HANN_POWER = 1.5
 
 

@@ -37,7 +37,9 @@ from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: bins below it hold the means, which the Hann window spreads over two bins: there q is 1
-FEWEST_OF_KIND = 8  #: blocks of nominal flights that a response, and a law of stepped blocks, needs; chosen
+#: quiet blocks that a response needs on each axis, and stepped ones that a law of these needs; chosen: of so many
+#: blocks of noise the coherence is 1/8 by chance, which NOISE lies above
+FEWEST_OF_KIND = 8
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
@@ -48,7 +50,6 @@ ANSWER_DOUBT = 0.2
 #: believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says less of
 #: effects that act through the commands; with a smaller one noise of the gyro counts as a response
 NOISE = 0.2
-FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a single one is 1, whatever is in it
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed) -> Response |
     if len(y) < FEWEST_OF_KIND:
         return None
     power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
-    if quiet.sum(axis=0).min() < FEWEST_QUIET:
+    if quiet.sum(axis=0).min() < FEWEST_OF_KIND:
         return None
     quiet_law, floor = _law(QUIET, y, w, quiet, loop, None)
     stepped_law = None
