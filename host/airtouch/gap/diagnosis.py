@@ -134,7 +134,8 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     effects = named_effects(data, selection) if is_effect else []
     ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking), indistinguishable=alike_of(selection) if verdict != "none" else (),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
+        indistinguishable=() if verdict == "none" else alike_of(selection),
         where=(), gap={"before": before, "after": gap.shrink.after if is_effect else before, "floor": 1.0},
         shrink=gap.shrink.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
 
