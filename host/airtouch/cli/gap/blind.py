@@ -12,7 +12,7 @@ from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
 from airtouch.logs.files import make_folder
 
-SEVERITIES_TAKE = "two to three minutes"  #: on an idle processor, 2026-11-25 (host/docs/gap-blind.md)
+SEVERITIES_TAKE = "one to two minutes"  #: on two idle processors, 2026-11-26 (host/docs/gap-blind.md)
 
 
 @click.group("blind", cls=Suggesting)
