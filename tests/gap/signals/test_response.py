@@ -10,6 +10,7 @@ from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.command_response import acceleration_per_command
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.loop.set_point_steps import NO_STEP
+from airtouch.gap.signals import quiet_blocks
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
@@ -95,6 +96,22 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
     np.testing.assert_allclose(np.abs(response.stepped_law.coherent), 1.0 / 3.0, atol=0.05)
     variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
     np.testing.assert_allclose(np.median(response.stepped_law.weight), np.sqrt(variances[0] / variances[1]), rtol=0.1)
+
+
+@pytest.mark.parametrize("count", [2, 7, 8])
+def test_a_response_needs_eight_quiet_blocks_on_each_axis(monkeypatch, count):
+    """Of fewer blocks of noise the coherence is by chance as large as that of a response."""
+    estimate = quiet_blocks.estimate_quiet_power
+
+    def with_few_on_one_axis(modelled, power):
+        found = estimate(modelled, power)
+        quiet = np.ones_like(found[1])
+        quiet[count:, 0] = False
+        return found[0], quiet
+
+    monkeypatch.setattr(quiet_blocks, "estimate_quiet_power", with_few_on_one_axis)
+    response = response_of(torques(*flights(np.random.default_rng(9), 1.0, 1.0, 1, 40)), NO_LOOP)
+    assert (response is None) == (count < 8)
 
 
 @pytest.mark.parametrize("strength", [1.0, 1.8, 2.0, 3.0])
