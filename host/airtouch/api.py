@@ -210,7 +210,6 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.logs.files import check_free
     from airtouch.twin import adapt as module
     from airtouch.twin import adapt_report
-    from airtouch.twin.fitting import calibrate
     from airtouch.vehicle import DEFAULT_VEHICLE
 
     need("train", "training")
@@ -222,9 +221,9 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
-    found = calibrate.of_folder(Path(twin)) if twin is not None else calibrate.of_flights(
-        adapt_report.for_a_twin(usable), craft, work, speed_mps=speed_mps, seed=seed, bar=_stages(progress))
-    adapted = module.adapt(usable, found.scenario, found.vehicle, work, start=best.load(None), seed=seed,
+    simulator = adapt_report.twin_for(usable, None if twin is None else Path(twin), craft, work, speed_mps=speed_mps,
+                                      seed=seed, bar=_stages(progress))
+    adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=best.load(None), seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)

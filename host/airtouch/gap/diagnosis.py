@@ -116,8 +116,8 @@ def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterab
     `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    found = selection_and_gap(data, tuple(without), rank_all=rank_all)
-    return replace(_answer(data, *found), flights=tuple(f.name for f in flights))
+    selection, gap = selection_and_gap(data, tuple(without), rank_all=rank_all)
+    return replace(_answer(data, selection, gap), flights=tuple(f.name for f in flights))
 
 
 def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:

@@ -96,15 +96,14 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     """
     left_out: list[str] = []
     nominal = list(ready_flights(baseline, vehicle, left_out))
-    fitted, notes = None, []
+    fitted = None
     if nominal and calibrated:
         progress("calibration")
         study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
         nominal, studies = list(fitted.flights), [fitted.declared, study]
-        notes += fitted.notes
     else:
         studies = [declared_study(vehicle, nominal)]
-    notes = list(dict.fromkeys([*differences(studies[0], nominal), *notes]))
+    notes = list(dict.fromkeys([*differences(studies[0], nominal), *(fitted.notes if fitted else ())]))
     measured = _measured(studies, flights, mapper, progress, left_out)
     maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]

@@ -13,7 +13,9 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.twin.adapt import Adapted, LoadedFlight
+from airtouch.twin.fitting import calibrate
 from airtouch.twin.recorded.course import course
+from airtouch.vehicle import Vehicle
 
 
 def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
@@ -43,9 +45,16 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
     return usable, left_out
 
 
-def for_a_twin(usable: Sequence[LoadedFlight]) -> list[Path]:
-    """Files of the flights to which a twin can be fitted: over a platform, with every sensor."""
-    return [f.file.path for f in usable if f.labelled and not sensors.missing_sensors(f.log)]
+def twin_for(usable: Sequence[LoadedFlight], folder: Path | None, vehicle: Vehicle, work: Path, *,
+             speed_mps: float | None, seed: int, bar: calibrate.Bars) -> calibrate.Twin:
+    """The twin in a folder, or else one fitted to those flights over a platform that have every sensor.
+
+    The other arguments are those of `calibrate.of_flights`; vehicle: what the fit starts from.
+    """
+    if folder is not None:
+        return calibrate.of_folder(folder)
+    paths = [f.file.path for f in usable if f.labelled and not sensors.missing_sensors(f.log)]
+    return calibrate.of_flights(paths, vehicle, work, speed_mps=speed_mps, seed=seed, bar=bar)
 
 
 def expected_error(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:

@@ -27,9 +27,9 @@ def candidate(name, gate=()):
 def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0.0):
     """A selection that names effects, beside which a nameless model or disturbance gains so many nats."""
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
-    told = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
+    inferred = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
     return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
-                     dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=told)
+                     dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=inferred)
 
 
 def gap(before):

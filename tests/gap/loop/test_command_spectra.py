@@ -36,11 +36,11 @@ def test_the_slope_is_that_of_the_likelihood(made):
 
 def test_the_typical_power_is_the_likeliest_and_hardly_follows_a_stray_block(made):
     expected, power = made
-    found = typical(power)
-    np.testing.assert_allclose(log_likelihood_slope(power / found, np.ones(found.shape)), 0.0, atol=1e-3)
+    estimate = typical(power)
+    np.testing.assert_allclose(log_likelihood_slope(power / estimate, np.ones(estimate.shape)), 0.0, atol=1e-3)
     deviation = np.sqrt((COMMAND_FREEDOM + 2.0) / COMMAND_FREEDOM / len(power))  # of log power, by its information
-    assert np.abs(np.log(found / expected)).max() < 3.5 * deviation
+    assert np.abs(np.log(estimate / expected)).max() < 3.5 * deviation
     stray = np.concatenate([power, 1000.0 * expected[None]])
     most = (COMMAND_FREEDOM + 1.0) / len(power)  # a value counts as much at most
-    assert (typical(stray) < found * (1.0 + 1.5 * most)).all()
-    assert (stray.mean(axis=0) > 3.0 * found).all()
+    assert (typical(stray) < estimate * (1.0 + 1.5 * most)).all()
+    assert (stray.mean(axis=0) > 3.0 * estimate).all()

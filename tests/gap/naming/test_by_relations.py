@@ -45,13 +45,13 @@ def test_matching_by_shape():
 def test_selection_has_a_step_for_each_effect_with_its_evidence():
     """A push and loud noise: both are fitted, each beside those before it, and named whatever they gain."""
     data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN), louder=1.5)])
-    told = inference([effect_class("imu_noise"), effect_class("mass")], likeliest="imu_noise")
+    inferred = inference([effect_class("imu_noise"), effect_class("mass")], likeliest="imu_noise")
     search = Search(trial_of(data), candidates_of(["mass", "imu_noise"]), lambda _: None)
-    selection = selection_by_relations(search, told)
+    selection = selection_by_relations(search, inferred)
     assert [(s.name, s.is_named, s.evidence) for s in selection.steps] == [("imu_noise", True, 100.0),
                                                                         ("mass", True, 20.0)]
     assert {t.name for t in selection.last_step.terms} == {"mass", "imu_noise"}
-    assert selection.inference is told and is_explained(selection)
+    assert selection.inference is inferred and is_explained(selection)
 
 
 def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
@@ -65,8 +65,8 @@ def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
 @pytest.fixture
 def relations(monkeypatch):
     """Makes the relations of signals hold for the flights, and give an inference."""
-    def hold(told):
-        monkeypatch.setattr(select, "inference_of", lambda data, names: told)
+    def hold(inferred):
+        monkeypatch.setattr(select, "inference_of", lambda data, names: inferred)
     return hold
 
 
@@ -76,10 +76,10 @@ PUSHED = Data(scattered(), [with_a_push(9.0, 15.0)])  #: a push of some seconds,
 @pytest.mark.parametrize("against", [EXPLAINED, OPEN])
 def test_relations_name_what_always_acts(relations, against):
     """The replay is not asked where no effect passes, explained or not."""
-    told = inference([effect_class("mass")], against)
-    relations(told)
+    inferred = inference([effect_class("mass")], against)
+    relations(inferred)
     selection = select.select(Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass"]))
-    assert selection.inference is told and [s.name for s in selection.named_steps] == ["mass"]
+    assert selection.inference is inferred and [s.name for s in selection.named_steps] == ["mass"]
     assert selection.single_effects["mass"].gain > 100.0
 
 

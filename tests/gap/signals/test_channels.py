@@ -77,8 +77,8 @@ def test_what_is_cached_for_one_flight_vehicle_or_seed_is_not_given_for_another(
 
 def test_what_is_cached_is_made_once_and_not_changed_by_gates(monkeypatch):
     replayed, runs = ReplayedFlight(flight(SECONDS), VEHICLE), []
-    made = ReplayedFlight._ungated
-    monkeypatch.setattr(ReplayedFlight, "_ungated", lambda self, active: runs.append(active) or made(self, active))
+    ungated = ReplayedFlight._ungated
+    monkeypatch.setattr(ReplayedFlight, "_ungated", lambda self, active: runs.append(active) or ungated(self, active))
     gates = [(("synthetic", t, t + 0.5),) for t in np.arange(1.0, 5.0)]
     outcomes = [replayed.residual([heavier(0.2, gate)]) for gate in gates]
     assert len(runs) == 2  # with the effect and without

@@ -78,8 +78,8 @@ def best_correction(power, ratio, wide):
             log_density = stats.f.logpdf(over, 2.0, 2.0 * COMMAND_FREEDOM) - np.log(power[:, :, axis] / over)
             return -0.5 * log_density.sum() + 0.5 * ((amount / spread) ** 2).sum()
 
-        found = minimize(cost, np.zeros(SHAPES), method="BFGS", options={"gtol": 1e-5})
-        log_power[:, axis], level = found.x @ shapes(), level - found.fun
+        optimum = minimize(cost, np.zeros(SHAPES), method="BFGS", options={"gtol": 1e-5})
+        log_power[:, axis], level = optimum.x @ shapes(), level - optimum.fun
         information = 0.5 * len(power) * np.einsum("i,if,jf,j->ij", spread, shapes(), shapes(), spread)
         level -= 0.5 * np.linalg.slogdet(np.eye(SHAPES) + information)[1]
     return log_power, level
@@ -88,25 +88,25 @@ def best_correction(power, ratio, wide):
 @pytest.mark.parametrize("wide", [False, True])
 def test_the_power_is_floor_times_ratio_times_the_correction_of_highest_posterior(powers, wide):
     ratio, begin = MadeLoop.ratio([0.8, -0.5]), 0
-    found, cost = made_view(powers).power([0.8, -0.5], wide)
+    expected, cost = made_view(powers).power([0.8, -0.5], wide)
     likelihood = level = 0.0
     for power in powers:
         log_power, of_flight = best_correction(power, ratio, wide)
-        own = found[begin:begin + power.size].reshape(power.shape)
+        own = expected[begin:begin + power.size].reshape(power.shape)
         np.testing.assert_array_equal(own, np.broadcast_to(own[0], own.shape))  # the same in every block
         np.testing.assert_allclose(np.log(own[0] / (FLOOR * ratio)), log_power, atol=3e-3)
         likelihood += 0.5 * (stats.f.logpdf(power / own, 2.0, 2.0 * COMMAND_FREEDOM) - np.log(own)).sum()
         level += of_flight
         begin += power.size
-    assert begin == len(found)
+    assert begin == len(expected)
     assert likelihood - cost == pytest.approx(level, abs=0.02)
 
 
 def test_a_flight_on_the_floor_needs_no_correction_and_costs_the_volume_alone():
     """A power equal to the expected one is the likeliest of the law, so that no shape moves."""
     power = np.tile(FLOOR, (BLOCKS[0], 1, 1))
-    found, cost = made_view([power]).power([])
-    np.testing.assert_allclose(found, power.ravel(), rtol=1e-12)
+    expected, cost = made_view([power]).power([])
+    np.testing.assert_allclose(expected, power.ravel(), rtol=1e-12)
     spread = deviations(np.ones(TABLE), False)
     covariance = np.eye(len(F)) + 0.5 * len(power) * shapes().T @ np.diag(spread ** 2) @ shapes()
     assert cost == pytest.approx(0.5 * len(AXES) * np.linalg.slogdet(covariance)[1])

@@ -57,7 +57,6 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
     from airtouch.twin import adapt, adapt_report
-    from airtouch.twin.fitting import calibrate
 
     need("train", "training")
     started = time.monotonic()
@@ -68,9 +67,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     usable = _read([f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds])
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
-    twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
-        adapt_report.for_a_twin(usable), vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed, seed=seed,
-        bar=Bar)
+    twin = adapt_report.twin_for(usable, twin_folder, vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed,
+                                 seed=seed, bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])

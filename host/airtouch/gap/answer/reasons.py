@@ -83,12 +83,12 @@ def _left(selection: Selection, gains: str, off: str) -> str:
 
     off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
     """
-    left = against(selection)
-    nats = f"{max(left.nats, 0.0):.0f}"
-    if left.of_distance:
+    remainder = against(selection)
+    nats = f"{max(remainder.nats, 0.0):.0f}"
+    if remainder.of_distance:
         farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
-        return f"the flight lies {nats} nats farther {farther}, up to {left.limit:.0f} may be chance"
-    return f"{gains.format(nats)}, up to {left.limit:.0f} may be left"
+        return f"the flight lies {nats} nats farther {farther}, up to {remainder.limit:.0f} may be chance"
+    return f"{gains.format(nats)}, up to {remainder.limit:.0f} may be left"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:

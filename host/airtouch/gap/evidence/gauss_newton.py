@@ -59,8 +59,8 @@ class Posterior:
         """The state at parameters x (k,) and offsets (m,)."""
         active = active_at(self.mean, x)
         values = self.problem.values(active) if self.mean else self.problem.base.copy()
-        for amount, (index, column, _) in zip(offsets, self.problem.offsets, strict=True):
-            values[index] -= amount * column
+        for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
+            values[places] -= amount * column
         command_power, floor_cost = self.problem.loop_power(active, self.wide)
         power = self.added + command_power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())

@@ -40,11 +40,11 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
         wj = j * np.repeat(weights, 2)
         matrix[:k, :k] += 2.0 * (wj @ j.T)
         right[:k] -= 2.0 * (wj @ np.ascontiguousarray(values, complex).view(float))
-    for i, (index, column, _) in zip(range(k, k + m), offsets, strict=True):
-        weighted = (weights[index] * column).conj()
+    for i, (places, column, _) in zip(range(k, k + m), offsets, strict=True):
+        weighted = (weights[places] * column).conj()
         matrix[i, i] += 2.0 * (weighted @ column).real
-        right[i] += 2.0 * (weighted @ values[index]).real
-        matrix[:k, i] = matrix[i, :k] = -2.0 * (columns[:, index] @ weighted).real
+        right[i] += 2.0 * (weighted @ values[places]).real
+        matrix[:k, i] = matrix[i, :k] = -2.0 * (columns[:, places] @ weighted).real
     return NormalEquations(matrix, right)
 
 
@@ -100,14 +100,14 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
     power, gap, cost = problem.power + added, values.copy(), 0.0
-    for index, column, spread in problem.offsets:
+    for places, column, spread in problem.offsets:
         amount = 0.0
-        largest_weight = OVERLAP_WEIGHT * (problem.freedom[index] + 1.0) * problem.known[index] / power[index]
+        largest_weight = OVERLAP_WEIGHT * (problem.freedom[places] + 1.0) * problem.known[places] / power[places]
         for _ in range(2):
-            weights = largest_weight / (problem.tail[index] + squared(gap[index]) / power[index])
+            weights = largest_weight / (problem.tail[places] + squared(gap[places]) / power[places])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
-            slope = 2.0 * float(np.vdot(column, weights * gap[index]).real) - amount / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * gap[places]).real) - amount / spread ** 2
             amount += slope / normal
-            gap[index] = values[index] - amount * column
+            gap[places] = values[places] - amount * column
         cost += 0.5 * (amount / spread) ** 2
     return gap, cost

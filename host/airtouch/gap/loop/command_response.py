@@ -17,7 +17,7 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.axis_plant import AxisPlant
 from airtouch.gap.loop.controller import Controller
 from airtouch.gap.loop.loop_model import LOWEST_HZ, LoopParts, butterworth, loop_parts
-from airtouch.gap.loop.noise_spectra import TWO_FOLDS, aliases_of, difference, transfers, with_aliases
+from airtouch.gap.loop.noise_spectra import FOLDS, aliases_of, difference, transfers, with_aliases
 from airtouch.gap.loop.set_point_steps import NO_STEP, Step, step_transfers
 
 KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sample; spacing chosen
@@ -87,7 +87,7 @@ def source_spectra(c: Controller, plant: AxisPlant, f: np.ndarray, parts: LoopPa
         sensed = _sensed(c.chip_hz, f.tobytes())
         for k in GYRO_FOLDS:
             power[0] += np.abs(sensed[k]) ** 2
-        for k, alias in zip(TWO_FOLDS[1:], aliases, strict=True):
+        for k, alias in zip(FOLDS[1:], aliases, strict=True):
             cross[0] += sensed[k] * np.where(f + k / PERIOD_S < 0.0, alias, alias.conj())
     return Spectra(cross, with_aliases(np.abs(logged) ** 2, aliases), power)
 

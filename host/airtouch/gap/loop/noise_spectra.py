@@ -12,7 +12,7 @@ from airtouch.gap.loop.axis_plant import AxisPlant
 from airtouch.gap.loop.controller import Controller
 from airtouch.gap.loop.loop_model import LOWEST_HZ, Factors, LoopParts, factors_of, loop_parts
 
-TWO_FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's 100 Hz that fall onto a frequency: all of a 500 Hz controller
+FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's 100 Hz that fall onto a frequency: all of a 500 Hz controller
 #: Hz, above which the estimated velocity's error falls by the frequency's square: errors of optical flow last
 #: 0.1 s, and 1 / (2 pi 0.1 s) is 1.6; chosen.
 FLOW_HZ = 1.5
@@ -76,11 +76,11 @@ def transfers(c: Controller, plant: AxisPlant, f: np.ndarray, parts: LoopParts) 
 def aliases_of(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:
     """Transfer of the rate's noise above half of the log's rate, folded into the log, to the command: (folds, bins).
 
-    One row for each of TWO_FOLDS[1:], complex. None for a controller no faster than the log, or for thrust.
+    One row for each of FOLDS[1:], complex. None for a controller no faster than the log, or for thrust.
     """
     if plant.axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
         return np.zeros((0, len(f)))
-    beyond_hz = np.maximum(np.abs(f + np.array(TWO_FOLDS[1:])[:, None] / PERIOD_S), LOWEST_HZ)
+    beyond_hz = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), LOWEST_HZ)
     parts, kick = loop_parts(c, plant, beyond_hz), kick_of(c, factors_of(c, beyond_hz))
     rate = parts.plant * -(parts.rate + parts.angle) / parts.return_difference
     return -(parts.rate + kick * parts.angle) - parts.logged_controller(kick) * rate
@@ -126,7 +126,7 @@ def _range_errors(c: Controller, plant: AxisPlant, f: np.ndarray, sensitivity: n
     have the power 1 / (4 sin^2(pi f T)), flat below WANDER_HZ.
     """
     white, drifting = np.zeros(len(f)), np.zeros(len(f))
-    for k in TWO_FOLDS:
+    for k in FOLDS:
         g = f + k / PERIOD_S
         power = np.abs(_command_per_range(c, plant, g) * (1.0 if k else sensitivity)) ** 2
         white += power

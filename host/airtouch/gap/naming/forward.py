@@ -40,7 +40,7 @@ class Search:
         """Every candidate judged alone, by name; worked out when it is first asked for."""
         return round_of(self.trial, self.candidates, None, self.progress)
 
-    @property
+    @cached_property
     def least_nats(self) -> Mapping[str, float]:
         """What each candidate must gain to be the first step."""
         return dict.fromkeys(self.candidates, self.trial.policy.first_gain)

@@ -158,6 +158,6 @@ def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[n
         x = np.clip(x + change[:size], *bounds)
         offsets = offsets + change[size:]
         values = half.values + x @ columns
-        for amount, (index, column, _) in zip(offsets, constants, strict=True):
-            values[index] -= amount * column
+        for amount, (places, column, _) in zip(offsets, constants, strict=True):
+            values[places] -= amount * column
     return x, np.diag(covariance)
