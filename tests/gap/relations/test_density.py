@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
-from airtouch.gap.relations.density import fit, log_density, rescaling_of, unchanged
+from airtouch.gap.relations.density import fit, log_density, principal, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 Q = 6
@@ -75,3 +75,14 @@ def test_several_parameters_are_solved_interaction():
                      np.zeros((Q, 0)), np.zeros(0))
     values = np.array([1.5, -0.7]) @ plane + 0.1 * rng.normal(size=Q)
     assert fit(of, values, unchanged(Q)).strength == pytest.approx(np.linalg.lstsq(plane.T, values)[0], abs=1e-3)
+
+
+def test_principal_axes_are_those_of_a_singular_value_decomposition():
+    """Two of six factors are the same: an axis without variance counts for nothing."""
+    factors = np.random.default_rng(5).normal(size=(40, 6)) * np.array([1e3, 10.0, 1.0, 0.1, 1.0, 1.0])
+    factors[:, 5] = factors[:, 4]
+    axes, variance = principal(factors)
+    assert np.sort(variance)[1:] == pytest.approx(np.sort(np.linalg.svd(factors)[1] ** 2)[1:], rel=1e-6)
+    assert variance.min() == pytest.approx(0.0, abs=1e-9)
+    assert (axes * variance) @ axes.T == pytest.approx(factors @ factors.T, rel=1e-9, abs=1e-9)
+    assert principal(np.zeros((40, 0)))[0].shape == (40, 0)

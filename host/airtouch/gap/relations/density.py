@@ -16,6 +16,7 @@ REFINEMENTS, TRIALS = 3, 9  #: rounds in which the best strength of a grid is re
 STARTS, STEPS = 5, 10  #: sizes of the strength from which a fit of several parameters begins, and its steps at most
 STEP_LENGTHS = (1.0, 0.5, 0.25, 0.1)  #: of a step that are tried in turn, until one gains
 LEAST_GAIN = 0.01  #: nats that a step gains; after one that gains less the fit ends
+EPSILON = float(np.finfo(float).eps)
 SLOPE = 1e-3  #: share of the strength over which slopes are taken
 
 
@@ -38,9 +39,20 @@ class Rescaling:
 
 def rescaling_of(factors: np.ndarray) -> Rescaling:
     """The rescaling for the covariance 1 + F F' of factors F (Q, r)."""
-    axes, size, _ = np.linalg.svd(factors, full_matrices=False)
-    deviation = np.sqrt(1.0 + size ** 2)
+    axes, variance = principal(factors)
+    deviation = np.sqrt(1.0 + variance)
     return Rescaling(axes, 1.0 / deviation - 1.0, -float(np.log(deviation).sum()))
+
+
+def principal(factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal axes (Q, r) of F F' for factors F (Q, r) with r < Q, and the variances (r,) along them.
+
+    From the eigenvectors of F'F, several times faster than a singular value decomposition. Axes along which there is
+    next to no variance, 1e-16 of the largest, are not of unit length; they count for nothing.
+    """
+    variance, vectors = np.linalg.eigh(factors.T @ factors)
+    least = max(float(variance[-1]), SMALLEST) * EPSILON if len(variance) else 0.0
+    return (factors @ vectors) / np.sqrt(np.maximum(variance, least)), np.maximum(variance, 0.0)
 
 
 def unchanged(dimensions: int) -> Rescaling:
@@ -83,8 +95,7 @@ class _Likelihood:
         """values: rescaled."""
         self.of, self.values, self.rescaling = of, values, rescaling
         if rescaling.stretch.size and of.variances.size:
-            self.axes, size, _ = np.linalg.svd(rescaling((of.axes * np.sqrt(of.variances)).T).T, full_matrices=False)
-            self.variances = size ** 2
+            self.axes, self.variances = principal(rescaling((of.axes * np.sqrt(of.variances)).T).T)
         else:
             self.axes, self.variances = of.axes, of.variances
 

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, rescaling_of, unchanged
+from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, principal, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 TURNS = 3  #: turns, at most, in which the effects of a hypothesis are fitted in turn; chosen
@@ -114,9 +114,9 @@ class FlightHypotheses:
         """Evidence over none of a hypothesis with a nameless disturbance beside it, nats."""
         known = self.rescaling(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
         residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
-        axes, size, _ = np.linalg.svd(known(self.model.nameless.T).T, full_matrices=False)
+        axes, of_unit_size = principal(known(self.model.nameless.T).T)
         along = (residual @ axes) ** 2
-        variance = 1.0 + np.outer(SIZES ** 2, size ** 2)  # (sizes, r)
+        variance = 1.0 + np.outer(SIZES ** 2, of_unit_size)  # (sizes, r)
         gain = 0.5 * ((along * (1.0 - 1.0 / variance)) - np.log(variance)).sum(axis=1)
         averaged = float(logsumexp(known.level + log_density(residual) + gain) - np.log(len(SIZES)))
         return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.level
