@@ -103,6 +103,15 @@ def test_tables_and_lists_stand_apart_for_the_site(page):
             assert not re.match(r"(- |1\. )", line) or re.match(r"(- |\d+\. |  )", above), line
 
 
+def test_a_long_page_begins_with_links_to_its_sections():
+    """In the first 60 lines, four or more; the ledger is read from its end."""
+    for page in DOCS.glob("*.md"):
+        lines = page.read_text("utf-8").splitlines()
+        if len(lines) > 250 and page.name not in ("looks.md", "api.md"):
+            links = set(re.findall(r"\]\(#([\w-]+)\)", "\n".join(lines[:60])))
+            assert len(links) >= 4, (page.name, links)
+
+
 #: pages that tell a newcomer which files to open
 MAPS = ("architecture", "add-an-effect", "change-the-network", "unknown", "port")
 
