@@ -18,11 +18,13 @@ from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
-from airtouch.gap.signals.spectra import squared
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
+#: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen. The error is that of
+#: exponential energies of mean 1, of which OVERLAP_WEIGHT of all are independent
+SURE = 4.0
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
 FEWEST_VALUES = 12  #: values that a cell needs; chosen
 DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
@@ -165,7 +167,7 @@ def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarr
     energy = np.minimum(squared(values) / power, LARGEST)
     count = np.bincount(problem.cells, problem.known, CELLS)
     mean = np.bincount(problem.cells, energy * problem.known, CELLS) / np.maximum(count, 1)
-    out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
+    out = mean > 1.0 + SURE * np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1))) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST_VALUES)
