@@ -157,16 +157,16 @@ def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
     """
     for half in (0, 1):
         problem, values, power = left_over(data, parts[half], terms[1 - half])
-        use = problem.known & cells[half][problem.cells]
-        yield problem.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
+        use = problem.elements.known & cells[half][problem.flat.cells]
+        yield problem.flat.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
 
 
 def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
     energy = np.minimum(squared(values) / power, LARGEST)
-    count = np.bincount(problem.cells, problem.known, CELLS)
-    mean = np.bincount(problem.cells, energy * problem.known, CELLS) / np.maximum(count, 1)
+    count = np.bincount(problem.flat.cells, problem.elements.known, CELLS)
+    mean = np.bincount(problem.flat.cells, energy * problem.elements.known, CELLS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1))) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN

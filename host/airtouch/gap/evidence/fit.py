@@ -105,15 +105,20 @@ def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = Fa
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem, its gap (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
     problem, values, added, _ = _explained(data, part, terms, wide)
-    return problem, values, problem.power + added
+    return problem, values, problem.elements.power + added
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
-    problem, values, power = left_over(data, part, (), bool(random_of(terms)))
-    without = problem.likelihood.each(values, power - problem.power)
-    problem, values, power = left_over(data, part, terms)
-    return np.bincount(problem.cells, problem.likelihood.each(values, power - problem.power) - without, CELLS)
+    flat = problem_of(data, part).flat
+
+    def of_each(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
+        """Log likelihood (n,) of each value under effects."""
+        _, values, power = left_over(data, part, hypothesis, wide)
+        return flat.likelihood.each(values, power - flat.elements.power)
+
+    without = of_each((), bool(random_of(terms)))
+    return np.bincount(flat.cells, of_each(terms, False) - without, CELLS)
 
 
 def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,

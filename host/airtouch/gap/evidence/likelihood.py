@@ -71,7 +71,10 @@ class Likelihood:
 
     @functools.cached_property
     def _exponent(self) -> np.ndarray:
-        """Power (n,) of the tails' fall."""
+        """Exponent nu + 1 (n,) of the tails (1 + e / tail)^-(nu + 1), where e is a value's power over that expected.
+
+        nu: the degrees of freedom.
+        """
         return self.freedom + 1.0
 
 
