@@ -81,6 +81,7 @@ def from_times(data: Data, term: Term) -> Estimate:
     The relative variance of a standard deviation from n independent values is 1 / (2 n); a jitter has one such value in
     CORRELATION_S. That of a number of lost samples is E[L^2] / (E[L] times the number), where runs begin as in a
     Poisson process and have L samples (compound Poisson); of geometric lengths of mean b it is (2 b - 1) / the number.
+    No relative variance is more than 1.
     """
     samples = sum(len(f) for f in data.flights)
     independent = samples / (CORRELATION_S / PERIOD_S)

@@ -1,9 +1,9 @@
 """How far: the gap before and after an effect is in the model, on data that it was not fitted on.
 
-Gap is the rms of the whitened spectra (floor 1) over the cells, view by channel by band,
-in which the other half of the data shows one, or in which the effects named gain there.
-A cell's own floor is 1 by definition: where less is left, the flights were calmer than nominal
-ones by so much, and that is taken off the floor, not off the gap.
+Gap is the rms of the whitened spectra (floor 1) over the cells, view by channel by band, in which the other half of the
+data shows one, or in which the effects named gain there. A cell's own floor is 1 by definition: where less is left, the
+flights were calmer than nominal ones by so much, and that is taken off the floor, not off the gap. An energy is the
+square of a whitened value, of mean 1 at the floor.
 """
 
 from collections.abc import Iterator, Sequence

@@ -29,6 +29,8 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
                      weights: np.ndarray, at: np.ndarray, offsets: Sequence[Offset] = ()) -> NormalEquations:
     """Normal equations of the ridge regression that lowers values + sum(step * column) - sum(step * offset).
 
+    They minimise sum(weight |value|^2) + sum(((at + step) / prior)^2) / 2, hence the factors 2.
+
     columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
     about 0; values (n,): the gap; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
     begins; offsets: m of them, no two with a place in common.
