@@ -25,14 +25,13 @@ def probabilities(selection: Selection, answer: str) -> dict[str, float]:
     """
     names = [*selection.single_effects, "none"]
     weight = dict(zip(names, _weights(selection), strict=True))
-    odds = against_over_limit(selection) ** 2
-    unknown = odds / (1.0 + odds)
     if answer != "unknown":
         weight[answer] = max(weight.get(answer, 0.0), *weight.values())
     total = np.array([*weight.values()]).sum()
+    odds = against_over_limit(selection) ** 2
     if answer != "unknown":
-        odds = MOST_UNKNOWN * (weight[answer] / total)
-        unknown = min(unknown, odds / (1.0 + odds))
+        odds = min(odds, MOST_UNKNOWN * (weight[answer] / total))
+    unknown = odds / (1.0 + odds)
     return {n: (1.0 - unknown) * w / total for n, w in weight.items()} | {"unknown": unknown}
 
 
