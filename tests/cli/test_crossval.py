@@ -88,3 +88,9 @@ def test_a_bad_flight_is_left_out(generated, tmp_path):
     (folder / "f1.csv.gz").write_bytes(b"")
     result = run(folder, "--detector", "baseline", "--out", tmp_path / "o")
     assert result.exit_code == 2 and "f1.csv.gz" in result.stderr and "1 left out" in result.stderr
+
+
+def test_an_option_that_the_detector_does_not_have_is_refused(tmp_path):
+    for options in (("--detector", "baseline", "--epochs", 3), ("--detector", "paper", "--steps", 3)):
+        result = run(*options, "--out", tmp_path, tmp_path)
+        assert result.exit_code == 2 and options[2] in result.stderr

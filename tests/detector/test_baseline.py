@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import periodogram
 from scipy.signal.windows import hann
 
-from airtouch.detector.baseline import Baseline, correlation_sum, derivative, extrema, load, run, spectrum_power
+from airtouch.detector.baseline import Baseline, correlation_sum, derivative, extrema, fit, load, run, spectrum_power
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
 
@@ -61,6 +61,12 @@ def test_edges_do_not_depend_on_later_samples():
     edges = run(log, model).edges
     assert edges and [e.sample for e in run(log.slice(0, 600), model).edges] == [
         e.sample for e in edges if e.sample < 600]
+
+
+@pytest.mark.parametrize("option", ["epochs", "steps", "free_air"])
+def test_it_takes_no_option_of_a_network(option):
+    with pytest.raises(TypeError, match=option):
+        fit([noisy_log()], seed=1, **{option: 3})
 
 
 def test_it_takes_no_model_file(tmp_path):

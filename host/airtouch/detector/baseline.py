@@ -5,7 +5,7 @@ spectrum at every timestamp, the correlations between the channels' powers are
 summed, and an edge is where the second derivative of that sum is zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -47,10 +47,11 @@ def run(log: FlightLog, model: Baseline | None = None) -> Trace:
     return Trace(np.full(len(log), np.nan), edges, {"correlation sum": correlation, "derivative": slope})
 
 
-def fit(flights: Sequence[FlightLog], seed: int = 0, **_: Any) -> Baseline:
+def fit(flights: Sequence[FlightLog], seed: int = 0, progress: Callable[..., None] | None = None) -> Baseline:
     """The settings of the best timed F1 over the training flights (`tuning.timed_f1`), with their lag.
 
-    Nothing is random: the seed and other options are ignored.
+    seed, progress: what every detector's `fit` takes; here nothing is random, and nothing takes long. Raises TypeError
+    for any other option, as the baseline has none.
     """
     truth = [logs.true_edges(log) for log in flights]
     correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]

@@ -8,7 +8,8 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import arms, control
-from airtouch.gap.answer.named_effects import at_end_of_range, named_effects
+from airtouch.gap.answer.named_effects import named_effects
+from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
@@ -18,7 +19,6 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import gap_closure
-from airtouch.gap.naming.by_relations import signs_not_shown
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.select import select

@@ -25,7 +25,7 @@ PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "
 
 
 def signals(signal: Signal) -> bytes:
-    """PNG of one channel of one flight up to the band's upper end: measured, modelled, and below their difference."""
+    """PNG of one channel of one flight up to a frequency: measured, modelled, and below their difference."""
     rows = 1 if signal.measured is None else 2
     with style(PHONE):
         figure, axes = _panes(rows, 1.6, left_in=0.85, above_in=0.35)

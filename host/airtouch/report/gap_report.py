@@ -126,7 +126,7 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
-        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.band_hz[1]:g} Hz",
+        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.highest_hz:g} Hz",
                           f"Flight {Path(signal.flight).name}. Grey: the floor; blue: take-off and landing; yellow: "
                           "over a platform.", partial(gap_figures.signals, signal)))
     if pictures.spectra:

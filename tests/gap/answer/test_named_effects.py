@@ -1,64 +1,53 @@
-"""The parameters of named effects: by replay and by the relations of signals together, and in the shape flown."""
+"""The effects named: fitted until nothing more is gained, in the shape that was flown, with their random parts."""
 
-import numpy as np
+from dataclasses import replace
+
 import pytest
 
-from airtouch.gap.answer.named_effects import at_end_of_range, best_shape, converged, with_reading
+from airtouch.gap.answer.named_effects import best_shape, converged, with_random_part
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import without_columns
 from airtouch.gap.result import NamedEffect, Quantity
-from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.candidates import random_part_of, terms
+from airtouch.simulation.effects import EFFECTS
 from gap_flights import VEHICLE, fly
 
 
-def combined(name, x, covariance, reading):
-    """Values and 90 % intervals of an effect's parameters with a reading, from scaled ones."""
-    term = next(t for t in terms(name) if len(t.free) == len(x))
-    return term.quantities(*with_reading(term, np.array(x), np.array(covariance), reading))
+def unsteady(strength, part_strength, turbulence):
+    """A ground effect of a strength (0.1 either way), with a random part that was fitted at a strength of its own."""
+    effect = NamedEffect("ground_effect", {"strength": Quantity(strength, strength - 0.1, strength + 0.1),
+                                           "turbulence": Quantity(0.0), "fade": Quantity(0.06)})
+    part = random_part_of("ground_effect")
+    part = replace(part, values={**part.values, "strength": part_strength, "turbulence": turbulence})
+    return with_random_part(effect, part).parameters
 
 
-def mass(value, deviation, reading):
-    step = terms("mass")[0].step("fraction")
-    return combined("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
+@pytest.mark.parametrize(("strength", "part_strength"), [(2.0, 1.0), (0.5, 1.0), (0.8, 2.0)])
+def test_random_force_of_mean_and_part_together_is_that_of_the_part(strength, part_strength):
+    """The force of the part is its strength times its turbulence."""
+    both = unsteady(strength, part_strength, 0.2)
+    assert both["strength"] == Quantity(strength, strength - 0.1, strength + 0.1) and both["fade"].value == 0.06
+    assert both["strength"].value * both["turbulence"].value == pytest.approx(part_strength * 0.2)
 
 
-def test_a_reading_is_weighted_by_its_precision():
-    """Two measurements of one number: the closed form of the weighted mean and its error."""
-    both = mass(0.10, 0.01, {"fraction": (0.11, 0.02)})
-    assert both.value == pytest.approx((4.0 * 0.10 + 0.11) / 5.0)
-    assert both.high - both.low == pytest.approx(2.0 * 1.645 * 0.01 * np.sqrt(0.8), rel=1e-6)
+@pytest.mark.parametrize("strength", [0.0, 0.01])
+def test_a_mean_too_weak_for_its_random_part_is_raised_to_the_least_that_carries_it(strength):
+    most = next(p.high for p in EFFECTS["ground_effect"].parameters if p.name == "turbulence")
+    both = unsteady(strength, 1.0, 0.5 * most)
+    assert both["turbulence"].value == pytest.approx(most)
+    assert both["strength"].value == pytest.approx(0.5) and both["strength"].high >= 0.5
 
 
-def test_an_interval_is_wider_where_replay_and_reading_disagree():
-    both = mass(0.10, 0.01, {"fraction": (0.20, 0.01)})
-    assert both.value == pytest.approx(0.15)
-    assert both.low < 0.10 < 0.20 < both.high
+def test_a_part_without_power_divides_nothing_by_zero():
+    both = unsteady(0.0, 1.0, 0.0)
+    assert both["turbulence"].value == 0.0 and 0.0 < both["strength"].value < 1e-3
 
 
-def test_what_the_replay_knows_as_a_sum_stays_a_sum():
-    """Of x + y the replay is sure, of either alone it is not: a reading of x moves y by as much the other way."""
-    term = terms("com_offset")[0]
-    both = combined("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
-                    {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
-    assert both["x"].value == pytest.approx(0.5 * term.step("x"), rel=0.01)
-    assert both["y"].value == pytest.approx(1.5 * term.step("y"), rel=0.01)
-
-
-def test_a_parameter_without_a_reading_stays():
-    assert mass(0.10, 0.01, {}).value == pytest.approx(0.10)
-
-
-def test_a_parameter_at_the_end_of_its_range_is_told():
-    """Slow motors have a factor of at most 5; a wake's turbulence of 0 is none, and no end."""
-    def named(name, **values):
-        return NamedEffect(name, {k: Quantity(v) for k, v in values.items()})
-
-    (note,) = at_end_of_range([named("motor_lag", factor=5.0, fall=1.0), named("wind", x=1.0, y=0.0, z=-9.0)])
-    assert note.startswith("motor_lag: factor is at the end of its range (5)")
-    assert len(at_end_of_range([named("wind", x=10.0, y=0.0, z=-10.0)])) == 2
-    assert not at_end_of_range([named("downwash", strength=1.0, turbulence=0.0), named("motor_lag", factor=1.0)])
+def test_a_random_part_of_another_effect_changes_nothing():
+    effect = NamedEffect("mass", {"fraction": Quantity(0.1)})
+    assert with_random_part(effect, random_part_of("ground_effect")) is effect
 
 
 def test_a_fit_goes_on_until_it_stands_still(study):

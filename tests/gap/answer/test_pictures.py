@@ -1,19 +1,171 @@
-"""The curves of a report."""
+"""The curves of a report: each has what its caption says, worked out by hand from made flights."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.pictures import pictures_of
-from airtouch.gap.nominal.build_study import declared_study
-from gap_flights import VEHICLE, flight
+from airtouch.gap.answer.pictures import MOST_SPECTRA, pictures_of
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.nominal.build_study import sensor_noise
+from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.signals.channels import COLUMN, angular_acceleration
+from airtouch.gap.signals.spectra import AIR, frequencies
+from airtouch.gap.signatures.candidates import term_of, terms
+from gap_flights import VEHICLE, flight, noise
+from hovers import FLOOR, LOUDNESS, hover
 from made_diagnosis import cell
+
+SECONDS = 15.0
+TIME_S = np.arange(round(SECONDS / PERIOD_S)) * PERIOD_S
+FORWARD = np.array([0.5, 0.0, 0.0])  #: m/s^2
+LOWEST = cell("force_x", "hover", 0.5)
+
+
+def bias(mps2):
+    return term_of(NamedEffect("imu_bias", {"acc_x": Quantity(mps2)}))
+
+
+def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR):
+    return pictures_of(study, flights, nominal, effects, cells)
+
+
+def test_signal_is_that_of_the_cell():
+    drawn = pictures(flight(SECONDS, FORWARD, name="pushed.csv")).signal
+    assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
+    assert drawn.floor == LOWEST.floor
+    np.testing.assert_allclose(drawn.time_s, TIME_S)
+    assert drawn.phase.shape == TIME_S.shape and drawn.after is None
+
+
+def test_measured_is_the_model_and_the_gap_together():
+    """Of a level hover whose model has no force forward."""
+    drawn = pictures(flight(SECONDS, FORWARD)).signal
+    np.testing.assert_allclose(drawn.before, 0.5, atol=1e-9)
+    np.testing.assert_allclose(drawn.measured - drawn.before, 0.0, atol=1e-9)
+
+
+def test_the_gap_after_is_without_what_the_effects_make():
+    drawn = pictures(flight(SECONDS, FORWARD), effects=[bias(0.4)]).signal
+    np.testing.assert_allclose(drawn.before, 0.5, atol=1e-9)
+    np.testing.assert_allclose(drawn.after, 0.1, atol=1e-9)
+
+
+@pytest.mark.parametrize(("band_hz", "push_hz", "highest_hz"), [
+    ((0.0, 0.5), 1.0, 2.0), ((0.0, 0.5), 4.0, 2.0), ((0.5, 2.0), 1.0, 2.0), ((0.5, 2.0), 4.0, 2.0),
+    ((2.0, 6.0), 4.0, 6.0), ((2.0, 6.0), 9.0, 6.0), ((6.0, 12.0), 4.0, 12.0), ((25.0, 50.0), 40.0, 50.0)])
+def test_signal_holds_what_is_below_the_frequency_that_is_told(band_hz, push_hz, highest_hz):
+    """A push beside a constant one, away from the ends, where the filter lacks one side.
+
+    It is drawn up to the end of the cell's band, and up to 2 Hz at least.
+    """
+    push, share = np.sin(2.0 * np.pi * push_hz * TIME_S), push_hz < highest_hz
+    made = flight(SECONDS, push[:, None] * [1.0, 0.0, 0.0] + FORWARD)
+    drawn = pictures(made, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
+    inside = slice(300, -300)
+    assert drawn.highest_hz == highest_hz
+    np.testing.assert_allclose(drawn.before[inside], 0.5 + share * push[inside], atol=0.05)
+
+
+def test_nothing_is_drawn_where_nothing_is_judged():
+    drawn = pictures(replace(made := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
+    assert made.usable.all()
+    np.testing.assert_array_equal(np.isfinite(drawn.signal.before), used)
+    np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
+
+
+def test_flight_of_the_signal_is_that_of_the_median_gap():
+    """By the standard deviation in the cell's channel; in another channel their order is another."""
+    made = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
+            for i, (forward, up) in enumerate([(3.0, 1.0), (1.0, 2.0), (2.0, 3.0)])]
+    assert pictures(*made).signal.flight == "2.0"
+    assert pictures(*made, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
+
+
+@pytest.mark.parametrize(("channel", "gyro", "shown"), [
+    ("torque_y", 0.01, True), ("torque_y", None, False), ("rate_x", 0.01, False)])
+def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):
+    """Of torque the slope of the gyro; of rates only the difference to the model is known."""
+    made = flight(SECONDS, gyro=0.0 if gyro is None else noise(SECONDS, gyro, 5))
+    if gyro is None:
+        made = replace(made, rates=None)
+    drawn = pictures(made, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
+    assert (drawn.measured is not None) is shown
+    if shown:
+        pitch = angular_acceleration(made)[:, 1]
+        assert np.corrcoef(drawn.measured[100:-100], pitch[100:-100])[0, 1] > 0.5
+
+
+def test_spectra_are_of_the_cells_channels_each_once_and_the_first_few():
+    channels = ["force_z", "force_x", "force_z", "torque_x", "force_y"]
+    made = pictures(hover(1, length_s=SECONDS), cells=[cell(c, "hover", 1.0) for c in channels])
+    assert [s.channel for s in made.spectra] == ["force_z", "force_x", "torque_x"] and MOST_SPECTRA == 3
+    assert [s.unit for s in made.spectra] == ["m/s^2", "m/s^2", "rad/s^2"]
+    np.testing.assert_array_equal(made.frequency_hz, frequencies(AIR))
+    for s in made.spectra:
+        assert s.before.shape == s.floor.shape == made.frequency_hz.shape and s.after is None
+
+
+def test_spectrum_before_is_the_mean_power_of_white_noise():
+    """2 rms^2 T, one-sided, over blocks of several flights."""
+    made = [flight(60.0, noise(60.0, rms, 20 + i)) for i, rms in enumerate((0.1, 0.3))]
+    (spectrum,) = pictures(*made).spectra
+    assert spectrum.before[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * np.mean([0.1 ** 2, 0.3 ** 2]), rel=0.05)
+
+
+@pytest.mark.parametrize(("blocks", "rise"), [(8, 1.0), (9, LOUDNESS ** 2)])
+def test_floor_of_a_spectrum_is_measured_where_nine_blocks_are_known_and_the_sensors_noise_where_not(blocks, rise):
+    """The floor of this study is twice the declared noise."""
+    study = replace(FLOOR, floor=replace(FLOOR.floor, block_counts={AIR: blocks}), nominal_count=1)
+    (spectrum,) = pictures(hover(1, length_s=SECONDS), study=study).spectra
+    declared = 2.0 * PERIOD_S * sensor_noise(VEHICLE)[COLUMN["force_x"]] ** 2
+    np.testing.assert_allclose(spectrum.floor[1:-1], rise * declared, rtol=1e-6)
+
+
+def test_spectrum_after_lacks_the_power_of_a_mean_effect():
+    (spectrum,) = pictures(flight(SECONDS, FORWARD), effects=[bias(0.5)]).spectra
+    assert spectrum.before[0] > 0.1 and spectrum.after.max() < 1e-9
+
+
+def test_spectrum_after_a_random_effect_is_near_the_floor():
+    """Its samples cannot be predicted: its power is taken off what is over the floor."""
+    louder = terms("imu_noise")[0].fitted(np.ones(1))
+    factor = louder.values["factor"]
+    made = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
+    (spectrum,) = pictures(made, effects=[louder]).spectra
+    above = slice(2, -1)
+    assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
+    off = np.abs(spectrum.after - spectrum.floor)[above].mean()
+    assert off < 0.3 * (spectrum.before - spectrum.floor)[above].mean()
 
 
 def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():
     """A constant gap has no power above the means, whatever rows are lost."""
     lost = np.arange(1500) % 100 < 3
-    whole, poor = (flight(15.0, np.array([0.5, 0.0, 0.0]), lost=rows) for rows in (None, lost))
-    headline = cell("force_x", "hover", 0.5)
-    power, poorer = (pictures_of(declared_study(VEHICLE, ()), [f], [], [], [headline]).spectra[0].before
-                     for f in (whole, poor))
+    whole, poor = (flight(15.0, FORWARD, lost=rows) for rows in (None, lost))
+    power, poorer = (pictures(f).spectra[0].before for f in (whole, poor))
     assert poorer == pytest.approx(power, abs=1e-9) and power[3:].max() < 1e-9
+
+
+def test_without_a_cell_the_commands_are_all():
+    made = pictures(flight(SECONDS), cells=[])
+    assert made.signal is None and made.spectra == () and not len(made.frequency_hz)
+    assert made.commands is not None
+
+
+def test_commands_of_nominal_flights_are_drawn_where_there_are_any():
+    alone = pictures(flight(SECONDS)).commands
+    beside = pictures(flight(SECONDS), nominal=[flight(SECONDS)]).commands
+    assert set(alone.flown) == set(beside.flown) == set(beside.nominal) and not alone.nominal
+    for axis, power in beside.flown.items():
+        np.testing.assert_array_equal(power, beside.nominal[axis])
+
+
+def test_without_flights_nothing_is_drawn():
+    made = pictures()
+    assert made.signal is None and made.spectra == () and made.commands is None
+
+
+def test_a_flight_too_short_for_a_block_has_a_signal_and_no_spectrum():
+    made = pictures(flight(1.0, FORWARD))
+    assert made.signal is not None and made.spectra == ()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.ranking import AT_FLOOR, agreeing, ranking_of, verdict_of
+from airtouch.gap.answer.ranking import AT_FLOOR, ranking_of, verdict_of
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.inference import Against, Inference
@@ -68,7 +68,9 @@ def test_simulated_flights_at_their_floor_have_effects_that_bring_cells_nearer(m
 
 @pytest.mark.parametrize(("of", "verdict", "answer"), [
     (selection(), "effect", "mass"), (selection(("wind",)), "effect", "wind"), (selection(()), "none", "none"),
-    (selection(left=900.0), "unknown", "unknown")])
+    (selection(left=900.0), "unknown", "unknown"),
+    (selection(), "none", "none"),  # a gap at its floor
+    (selection(("wind",), by_relations=True), "effect", "wind")])  # of two that act together, the weaker alone
 def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
     ranking = ranking_of(RECORDED, of, gap(OVER), verdict, answer)
     assert ranking[0].name == answer and ranking[0].probability == max(r.probability for r in ranking)
@@ -78,10 +80,3 @@ def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
     assert probabilities == sorted(probabilities, reverse=True)
     assert [bool(r.why) for r in ranking] == [False] + [True] * (len(ranking) - 1)
     assert ranking[0].shrink.value == (0.8 if verdict == "effect" else 0.0), "of one effect named: that of the answer"
-
-
-def test_a_larger_probability_changes_places_with_the_answer():
-    chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
-    assert agreeing(chance, "unknown") == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5}
-    assert agreeing(chance, "mass") == chance
-    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}, "a passing effect"

@@ -7,6 +7,7 @@ import pytest
 
 from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
+from airtouch.gap.evidence.cells import REST_VIEW, cell_numbers
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
     Candidate,
@@ -18,6 +19,7 @@ from airtouch.gap.naming.records import (
 )
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
+from airtouch.gap.signals.channels import COLUMN
 from hovers import FLOOR
 
 EVIDENCE = {"mass": 200.0, "wind": 40.0, "gust": 20.0, "inertia": 2.0}
@@ -29,7 +31,7 @@ def judged(name, gain, evidence=None):
     return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
-def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, lost=(0.0, "")):
+def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, lost=(0.0, None)):
     """A selection of made candidates: mass gains most, wind is as strong in nominal flights, inertia gains nothing.
 
     Of several that are named, each adds a quarter of its gain to the others. beside: nats that speak against them.
@@ -120,9 +122,9 @@ def test_reason_of_the_best_effect_where_the_answer_is_unknown():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
     open_gap = selection(beside=70.0)
     assert why_not(open_gap, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
-    over_predicting = selection(lost=(60.0, "yaw torque"))
+    over_predicting = selection(lost=(60.0, cell_numbers(REST_VIEW, 1, COLUMN["torque_z"])))
     assert why_not(over_predicting, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
-                                                        "most in yaw torque; 18 may be chance")
+                                                        "most in torque_z at 0.6 to 2 Hz at rest; 18 may be chance")
 
 
 def test_the_three_that_gain_most_are_nearest():

@@ -11,8 +11,8 @@ from airtouch.gap.evidence.cells import (
     above_means,
     band_cells,
     cell_numbers,
-    cell_words,
     channel_cells,
+    place_of,
 )
 from airtouch.gap.evidence.layout import Layout
 from airtouch.gap.signals.channels import CHANNELS, COUNT
@@ -66,12 +66,12 @@ def test_nothing_is_laid_out_as_nothing():
     assert len(nothing.gather([])) == len(nothing.channels()) == len(nothing.air_blocks([]).of) == 0
 
 
-@pytest.mark.parametrize(("view", "band", "channel", "words"), [
-    (REPLAY_VIEW, 0, "force_z", "force_z at 0 to 0.6 Hz"), (REPLAY_VIEW, 5, "torque_x", "torque_x at 25 to 50 Hz"),
-    (REST_VIEW, 1, "rate_y", "rate_y at 0.6 to 2 Hz at rest"),
-    (COMMAND_VIEW, 2, "command_roll", "command_roll at 0.6 to 2 Hz")])
-def test_a_cell_in_words_is_its_channel_and_band(view, band, channel, words):
-    assert cell_words(cell_numbers(view, band, [c.name for c in CHANNELS].index(channel))) == words
+@pytest.mark.parametrize(("view", "band", "channel", "band_hz"), [
+    (REPLAY_VIEW, 0, "force_z", (0.0, 0.6)), (REPLAY_VIEW, 5, "torque_x", (25.0, 50.0)),
+    (REST_VIEW, 1, "rate_y", (0.6, 2.0)), (COMMAND_VIEW, 2, "command_roll", (0.6, 2.0))])
+def test_place_of_a_cell_is_its_view_channel_and_band(view, band, channel, band_hz):
+    number = cell_numbers(view, band, [c.name for c in CHANNELS].index(channel))
+    assert place_of(number) == (view, channel, pytest.approx(band_hz))
 
 
 def test_a_band_and_the_bands_above_the_means_are_told_by_the_number():

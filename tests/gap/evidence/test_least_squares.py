@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from airtouch.gap.evidence.flattened import Offset
 from airtouch.gap.evidence.least_squares import bounded_step, normal_equations
-from airtouch.gap.evidence.problem import Offset
 
 FREE = np.full(3, -9.0), np.full(3, 9.0)
 

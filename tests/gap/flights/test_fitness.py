@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.flights.fitness import cannot_of, without_bad_columns
+from airtouch.gap.flights.fitness import cannot_of, cannot_tell, stamped_at_arrival, without_bad_columns
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
 SAMPLES, HEIGHT = 1000, 0.4  #: 10 s of a hover, m
@@ -59,6 +59,15 @@ def test_a_log_in_which_nothing_was_logged_is_told_as_that():
     empty = {name: np.full(SAMPLES, np.nan) for name in hover().columns if name != "t_s"}
     with pytest.raises(AirTouchError, match="nothing was logged"):
         without_bad_columns(hover(**empty))
+
+
+@pytest.mark.parametrize(("meta", "at_arrival"), [
+    ({"format": "authors-12"}, True), ({"format": "canonical", "origin_format": "authors-14"}, True),
+    ({"format": "canonical"}, False), ({"format": "canonical", "origin_format": "usd-2"}, False), ({}, False)])
+def test_rows_of_the_authors_logs_are_stamped_at_arrival_in_converted_logs_too(meta, at_arrival):
+    log = FlightLog(hover().columns, meta)
+    assert stamped_at_arrival(log) is at_arrival
+    assert any("those of arrival" in reason for reason in cannot_tell(log)) is at_arrival
 
 
 def test_a_reason_is_told_once_with_the_number_of_flights_where_it_is_not_all():

@@ -77,3 +77,16 @@ def test_the_vehicle_turns_as_the_loop_says(spectra, axis, band):
     predicted = torque * np.abs(disturbed(firmware_of(row), row, f).measured[:, axis]) ** 2
     simulated = (np.abs(spectra[0][:, :, axis]) ** 2).mean(axis=0)
     assert simulated[in_band(*band)].sum() == pytest.approx(predicted[in_band(*band)].sum(), rel=0.25)
+
+
+def test_more_inertia_leaves_more_of_an_outside_torque():
+    f = frequencies(AIR)
+    inertia = get("inertia")
+    heavy = Active(inertia, inertia.values({"fraction": 1.0}))
+    axes = {}
+    for name, active in (("usual", ()), ("heavy", (heavy,))):
+        row = prepare(VEHICLE, active)[0][0]
+        axes[name] = np.abs(disturbed(firmware_of(row), row, f).measured)
+    low = (f > 0.5) & (f < 3.0)
+    assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
+    assert np.all(axes["usual"][f > 40.0] > 0.9)

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import select
-from airtouch.gap.naming.by_relations import matching, selection_by_relations, signs_not_shown
+from airtouch.gap.naming.by_relations import matching, selection_by_relations
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.unknown import is_explained
@@ -23,10 +23,10 @@ def effect_class(effect, name=None, shape=None):
     return SimpleNamespace(effect=effect, name=name or effect, shape=shape)
 
 
-def inference(classes=(), against=EXPLAINED, likeliest="mass", without_sign=()):
+def inference(classes=(), against=EXPLAINED, likeliest="mass"):
     """An inference with most evidence for one effect."""
     evidence = {c.effect: 20.0 for c in classes} | {likeliest: 100.0}
-    return Inference(tuple(classes), evidence, against, without_sign=without_sign)
+    return Inference(tuple(classes), evidence, against)
 
 
 def test_matching_by_parameter():
@@ -52,14 +52,6 @@ def test_selection_has_a_step_for_each_effect_with_its_evidence():
                                                                         ("mass", True, 20.0)]
     assert {t.name for t in selection.last_step.terms} == {"mass", "imu_noise"}
     assert selection.inference is inferred and is_explained(selection)
-
-
-def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
-    selection = SimpleNamespace(inference=inference(without_sign=("mass", "inertia")),
-                                named_steps=(SimpleNamespace(name="mass"),))
-    (note,) = signs_not_shown(selection)
-    assert note.startswith("mass: ")
-    assert signs_not_shown(SimpleNamespace(inference=None)) == []
 
 
 @pytest.fixture

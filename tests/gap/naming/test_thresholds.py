@@ -11,6 +11,7 @@ from airtouch.gap.naming import thresholds
 from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signals.channels import CHANNELS
+from airtouch.gap.signatures.candidates import terms
 from hovers import DOWN, hover, scattered, select_from
 
 FORCE_X, FORCE_Z, TORQUE_X, RATE_Y = (
@@ -32,6 +33,9 @@ ELSEWHERE = [
     ((REST_VIEW, 4, RATE_Y), (COMMAND_VIEW, 4, RATE_Y)),
     ((REPLAY_VIEW, 1, 12), (REPLAY_VIEW, 1, 11)),  # the yaw command is no axis of those before it
 ]
+
+
+WEAK = {t.values["rotor"]: t for t in terms("weak_motor")}  #: a term for each rotor
 
 
 def gains(*cells):
@@ -90,6 +94,19 @@ def test_misfit_of_the_whole_gain(cells, recorded, everywhere, full, gain):
     """Recorded flights, a random effect, one that was not fitted, or one that gains as much as the whole share."""
     more = fitted(gain, full)
     assert thresholds.misfit(trial(recorded), fitted(10_000.0), more, 0.01, everywhere) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("rotors", "share"), [((1,), 0.01), ((1, 2), 0.25)])
+def test_a_second_of_a_name_is_a_further_effect_of_its_own(rotors, share):
+    """Two weak rotors have one name. Beside an effect of the loop, another that changed it would need a quarter."""
+    def hypothesis(gain, of_rotors):
+        return Candidate("weak_motor", tuple(WEAK[r] for r in of_rotors), gain, full=False)
+
+    loop = SimpleNamespace(changes_loop=lambda active: True)
+    judged = SimpleNamespace(data=SimpleNamespace(study=SimpleNamespace(loop=loop)), policy=SimpleNamespace(
+        misfit_by_cell=False, misfit_share=0.01, loop_misfit_share=0.25))
+    least = thresholds.least_further_gain(judged, hypothesis(10_000.0, (1,)), hypothesis(10_050.0, rotors))
+    assert least == pytest.approx(share * 10_000.0)
 
 
 def added_gains(selection):

@@ -22,7 +22,7 @@ def selection(left=0.0, gain=None, over_none=0.0, assumed=False, lost=0.0, by_re
     steps = () if gain is None else (Step.of(Candidate("mass", (), gain)),)
     inference = None if by_relations is None else SimpleNamespace(against=by_relations)
     return Selection({}, steps, NamelessGain(over_none, left), (None, None), {}, POLICY, assumed,
-                     OverPrediction(lost, "force_x"), inference)
+                     OverPrediction(lost, 0), inference)
 
 
 @pytest.mark.parametrize(("options", "limit"), [

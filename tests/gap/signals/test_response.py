@@ -1,23 +1,23 @@
-"""How the gyro follows logged commands: against the closed forms of errors in variables and of a closed loop."""
+"""How the gyro follows logged commands: against the closed forms of errors in variables, and made laws."""
 
 import numpy as np
 import pytest
 
-from airtouch import vehicle as vehicles
-from airtouch.gap.flights.flight import ready_flights
-from airtouch.gap.loop import controller, loop_model
-from airtouch.gap.loop.axis_plant import axis_plant
-from airtouch.gap.loop.command_response import acceleration_per_command
-from airtouch.gap.loop.disturbed import Disturbed, disturbed
-from airtouch.gap.loop.set_point_steps import NO_STEP
+from airtouch.gap.loop.disturbed import Disturbed
+from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change, response_ratio
 from airtouch.gap.signals import quiet_blocks
-from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
-from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
-from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
-from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation import batch
-from airtouch.simulation.effects import Active, get
-from airtouch.simulation.flight import prepare
+from airtouch.gap.signals.channels import COUNT, TORQUE
+from airtouch.gap.signals.quiet_blocks import QuietPower
+from airtouch.gap.signals.response import (
+    CUT_DOUBT,
+    FIRST_BIN,
+    Law,
+    OutsideTorque,
+    Response,
+    TorqueSpectra,
+    response_of,
+)
+from airtouch.gap.signals.spectra import AIR, frequencies
 
 BINS = len(frequencies(AIR))
 NO_LOOP = Disturbed(np.zeros((BINS, 3)), np.zeros((BINS, 3)))
@@ -129,57 +129,87 @@ def test_flights_that_differ_so_much_that_an_axis_is_never_quiet_have_no_respons
         np.testing.assert_allclose(np.median(np.abs(response.quiet_law.coherent), axis=0), 0.5, atol=0.02)
 
 
-def test_turning_under_an_outside_torque_is_the_closed_loop_s():
-    """No gyro noise, no steps, no folds: u = -(K / s) d / (1 + P K), the vehicle turns by d / (1 + P K)."""
-    row = prepare(vehicles.load("crazyflie-2.1-flow"), ())[0][0]
-    c = controller.Controller(0.01, 6.0, 0.4)
-    f = np.geomspace(0.8, 20.0, 12)
-    s = 2j * np.pi * f
-    roll = axis_plant(row, "roll")
-    strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    (expected,) = acceleration_per_command(c, roll, strengths, f, 0.0, [NO_STEP]).expected
-    np.testing.assert_allclose(expected, -s / loop_model.loop_parts(c, roll, f).controller, rtol=1e-9)
+def law(kind=QUIET, coherent=0.5, weight=1.0, remains=0.5 + 0.5j, power=2.0):
+    """A law of the same numbers in all bins and axes."""
+    def table(x):
+        return np.full((BINS, 3), x)
+
+    return Law(kind, table(coherent), table(coherent), OutsideTorque(table(remains), table(power)), table(weight),
+               table(1.0))
 
 
-def test_more_inertia_leaves_more_of_an_outside_torque():
-    vehicle = vehicles.load("crazyflie-2.1-flow")
-    f = frequencies(AIR)
-    inertia = get("inertia")
-    heavy = Active(inertia, inertia.values({"fraction": 1.0}))
-    axes = {}
-    for name, active in (("usual", ()), ("heavy", (heavy,))):
-        row = prepare(vehicle, active)[0][0]
-        axes[name] = np.abs(disturbed(controller.firmware_of(row), row, f).measured)
-    low = (f > 0.5) & (f < 3.0)
-    assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
-    assert np.all(axes["usual"][f > 40.0] > 0.9)
+def response(stepped=True):
+    """A response to quiet blocks, whose torque is taken as it is, and to stepped ones, which weigh 0.2."""
+    return Response(QuietPower(np.ones((BINS, 3)), np.ones(3)), law(power=3.0),
+                    law(STEPPED, coherent=0.5j, weight=0.2, power=7.0) if stepped else None)
 
 
-def empirical(active: list[Active]) -> np.ndarray:
-    """Angular acceleration for the torque of logged commands in simulated flights, S_yw / S_ww of roll, (bins,)."""
-    vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
-    outcomes = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
-    logs = [log for log in outcomes if isinstance(log, FlightLog)]
-    for flight in ready_flights(logs, vehicle, []):
-        first = starts(flight, AIR)
-        turns = short_time_spectra(angular_acceleration(flight), first, AIR)[:, :, 0]
-        modelled = turns - short_time_spectra(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
-        cross, power = cross + (turns * modelled.conj()).sum(axis=0), power + (np.abs(modelled) ** 2).sum(axis=0)
-    return np.asarray(cross / power)
+#: three blocks: in the second a set-point stepped about the first axis, in the third about all
+SOME_QUIET = np.array([[True, True, True], [False, True, True], [False, False, False]])
 
 
-def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
-    """Noise of the gyro folds into log and command alike, through the gyro chip's own low-pass."""
-    vehicle, f = vehicles.load("crazyflie-2.1-flow"), frequencies(AIR)
-    late = Active(get("sensor_latency"), {"delay": 0.003})
-    simulated = empirical([late]) / empirical([])
-    noise_alone = np.eye(5)[0]
-    predicted = []
-    for active in ((), (late,)):
-        row = prepare(vehicle, active)[0][0]
-        predicted += acceleration_per_command(
-            controller.firmware(row, "roll"), axis_plant(row, "roll"), noise_alone, f, 0.0, [NO_STEP]).expected
-    band = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
-    ratio = (simulated / (predicted[1] / predicted[0]))[band].reshape(-1, 8).mean(axis=1)
-    np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)
-    np.testing.assert_allclose(np.abs(ratio), 1.0, atol=0.25)
+def drawn_change(cut=0.0):
+    """What effects change in a loop, of drawn numbers; cut: the part that the limits of a command make."""
+    rng = np.random.default_rng(3)
+
+    def drawn(*shape):
+        return 1.0 + 0.3 * rng.normal(size=shape) + 0.3j * rng.normal(size=shape)
+
+    return Change(motors=drawn(BINS, 1), share=drawn(2, BINS, 3), before=0.4 * drawn(2, BINS, 3),
+                  cut=np.full((BINS, 3), cut), logged=drawn(BINS, 1), incoherent=np.ones((2, BINS, 3)))
+
+
+@pytest.mark.parametrize("kind", [QUIET, STEPPED])
+def test_ratio_of_roll_and_pitch_is_that_of_the_torque_share(kind):
+    change, made = drawn_change(), law(kind, coherent=4.0)
+    np.testing.assert_array_equal(made.ratio(change)[:, :2], response_ratio(change, kind, made.transfer)[:, :2])
+
+
+@pytest.mark.parametrize(("coherent", "part"), [(0.5, 1.0), (1.0, 1.0), (2.0, 0.25), (-3.0j, 1.0 / 9.0)])
+def test_in_yaw_the_ratio_changes_less_where_the_response_is_above_one(coherent, part):
+    """There most of it is noise of the gyro, which no effect changes: of its square 1 / |q~|^2 is the vehicle's."""
+    change, made = drawn_change(), law(coherent=coherent)
+    whole = response_ratio(change, QUIET, made.transfer)[:, 2]
+    assert np.abs(whole - 1.0).max() > 0.1
+    np.testing.assert_allclose(made.ratio(change)[:, 2] - 1.0, part * (whole - 1.0))
+
+
+def test_torque_is_weighted_as_blocks_of_its_kind_are():
+    torque = noise(np.random.default_rng(6), (3, BINS, 3))
+    weights = response().weighted(SOME_QUIET, torque) / torque
+    np.testing.assert_allclose(weights, np.where(SOME_QUIET, 1.0, 0.2)[:, None] * np.ones((1, BINS, 1)))
+    unknown = np.isnan(response(stepped=False).weighted(SOME_QUIET, torque))
+    np.testing.assert_array_equal(unknown, np.broadcast_to(~SOME_QUIET[:, None], unknown.shape))
+
+
+def test_doubt_is_the_error_of_what_limits_cut_off_steps():
+    """In stepped blocks alone: (CUT_DOUBT * weight * |q~| * cut)^2 of the power of the modelled torque."""
+    modelled = noise(np.random.default_rng(7), (3, BINS, 3), 2.0)
+    doubt = response().doubt(SOME_QUIET, modelled, drawn_change(cut=0.3))
+    of_steps = (CUT_DOUBT * 0.2 * 0.5 * 0.3) ** 2 * np.abs(modelled) ** 2
+    np.testing.assert_allclose(doubt, np.where(SOME_QUIET[:, None], 0.0, of_steps))
+
+
+def test_where_no_law_of_steps_is_known_there_is_no_doubt():
+    """Neither without such a law nor on an axis with too few of its blocks: nothing of them is counted."""
+    modelled, change = noise(np.random.default_rng(7), (3, BINS, 3)), drawn_change(cut=0.3)
+    assert not response(stepped=False).doubt(SOME_QUIET, modelled, change).any()
+    few = response()
+    few.stepped_law.weight[:, 0] = np.nan
+    doubt = few.doubt(SOME_QUIET, modelled, change)
+    assert not doubt[:, :, 0].any() and (doubt[2, :, 1:] > 0.0).all()
+
+
+@pytest.mark.parametrize(("sensed", "quiet", "stepped"), [(True, 1.0, 0.2 ** 2), (False, 3.0, 0.2 ** 2 * 7.0)])
+def test_power_of_a_random_torque_is_that_of_the_law_above_the_means(sensed, quiet, stepped):
+    """What the gyro alone senses passes no loop; any other torque leaves what the law says."""
+    power = response().random_power(SOME_QUIET, sensed)
+    expected = np.where(SOME_QUIET, quiet, stepped)[:, None] * np.ones((1, BINS, 1))
+    np.testing.assert_allclose(power[:, FIRST_BIN:], expected[:, FIRST_BIN:])
+    np.testing.assert_array_equal(power[:, :FIRST_BIN], 1.0)
+
+
+def test_power_of_a_random_torque_stays_where_no_law_is_known():
+    power = response(stepped=False).random_power(SOME_QUIET, sensed=False)
+    above = power[:, FIRST_BIN:, 0]
+    np.testing.assert_allclose(above, np.where(SOME_QUIET[:, :1], 3.0, 1.0) * np.ones(above.shape))

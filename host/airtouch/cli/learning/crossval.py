@@ -65,6 +65,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     check_free(json_path, force)
     if detector != "best" and (steps or silence or free_air):
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
+    if detector == "baseline" and epochs:
+        raise click.UsageError("--epochs is for detectors with a network; the baseline has none")
     files = dataset.collect(flights or [need_flights()], speed)
     split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
     options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}

@@ -10,7 +10,7 @@ from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
-URI = "radio://0/80/2M/E7E7E7E7E7"
+URI = "radio://0/80/2M/E7E7E7E7E7"  #: of a Crazyflie as it ships
 #: mission with most of a phase; take-off and landing are in every one
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 

@@ -11,7 +11,7 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import Cell
-from airtouch.gap.signals.channels import CHANNELS, COLUMN, TORQUE, angular_acceleration
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, FORCE, TORQUE, angular_acceleration
 from airtouch.gap.signals.floor import sensor_power
 from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
 from airtouch.gap.signatures.candidates import mean_of, random_of
@@ -21,8 +21,10 @@ from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 
-MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
-MOST_SPECTRA = 3  #: channels whose spectra are drawn
+MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
+MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen
+#: Hz up to which a signal is drawn at least: the lowest band alone is nearly a constant; chosen, the end of the second
+LEAST_HIGHEST_HZ = 2.0
 #: blocks of nominal flights from which on the power measured there is drawn as the floor of a spectrum; with fewer the
 #: declared noise of the sensors is; chosen
 FEWEST_DRAWN_BLOCKS = 9
@@ -40,14 +42,15 @@ class FlightGap:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel of one flight up to the band's end, each (n,), NaN where nothing is judged.
+    """One channel of one flight up to a frequency; curves (n,), NaN where nothing is judged.
 
-    measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects.
+    measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
+    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: of the headline's cell.
     """
 
     flight: str
     channel: str
-    band_hz: tuple[float, float]
+    highest_hz: float
     unit: str
     time_s: np.ndarray
     phase: np.ndarray
@@ -59,7 +62,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral densities (bins,) of one channel's gap in the air."""
+    """Power spectral densities (bins,) of one channel's gap in the air, its unit squared/Hz; after as in `Signal`."""
 
     channel: str
     unit: str
@@ -70,7 +73,11 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Pictures:
-    """Every curve of a report."""
+    """Every curve of a report.
+
+    signal: of the headline's cell, None without one; frequency_hz (bins,): of the spectra; commands: None where no
+    flight has a steady stretch.
+    """
 
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -97,14 +104,13 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
 
 
 def _signal(gap: FlightGap, cell: Cell) -> Signal:
-    """The curves of one flight in a cell's channel, up to the end of its band."""
+    """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_HIGHEST_HZ."""
     flight, c = gap.flight, COLUMN[cell.channel]
-    band = MAP_BANDS_HZ.index(cell.band_hz) if cell.band_hz in MAP_BANDS_HZ else 0
-    measured, after = _measured(flight, c), None if gap.after is None else gap.after[:, c]
-    return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, None if measured is None else _lowpass(flight, measured, band),
-                  _lowpass(flight, gap.before[:, c], band), None if after is None else _lowpass(flight, after, band),
-                  cell.floor)
+    highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_HIGHEST_HZ)
+    measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
+                       for values in (_measured(flight, c), None if gap.after is None else gap.after[:, c]))
+    return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
+                  flight.phase, measured, _lowpass(flight, gap.before[:, c], highest_hz), after, cell.floor)
 
 
 def _of_median_flight(gaps: Sequence[FlightGap], cell: Cell) -> FlightGap:
@@ -116,20 +122,20 @@ def _of_median_flight(gaps: Sequence[FlightGap], cell: Cell) -> FlightGap:
 
 def _measured(flight: Flight, channel: int) -> np.ndarray | None:
     """What sensors show of a channel (n,): acceleration, or the slope of the rates; None of any other channel."""
-    if channel < 3:
-        return flight.acceleration[:, channel]
+    if FORCE.start <= channel < FORCE.stop:
+        return flight.acceleration[:, channel - FORCE.start]
     if TORQUE.start <= channel < TORQUE.stop and flight.rates is not None:
         return angular_acceleration(flight)[:, channel - TORQUE.start]
     return None
 
 
-def _lowpass(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
-    """Values (n,) up to the end of a band, NaN where nothing is judged."""
-    out = np.full(len(values), np.nan)
+def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarray:
+    """Values (n,) in the bands that end at a frequency or below it, NaN where nothing is judged."""
+    out, bands = np.full(len(values), np.nan), sum(end <= highest_hz for _, end in MAP_BANDS_HZ)
     for start, stop in stretches(flight):
         here = values[start:stop]
-        if band < len(MAP_BANDS_HZ) - 1:
-            here = filtered(np.nan_to_num(here[:, None]))[:max(band, 1) + 1].sum(axis=0)[:, 0]
+        if bands < len(MAP_BANDS_HZ):
+            here = filtered(np.nan_to_num(here[:, None]))[:bands].sum(axis=0)[:, 0]
         out[start:stop] = here
     return out
 

@@ -6,42 +6,38 @@ import numpy as np
 
 from airtouch.gap.naming.policy import TEMPERATURE
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.naming.unknown import against_over_limit, is_explained
+from airtouch.gap.naming.unknown import against_over_limit
 
-LEAD = 1.0  #: nats that others lie behind the effect that is the answer, at least; chosen, so that it leads the list
+LEAD = 1.0  #: nats that others lie behind the effect that is named first, at least; chosen, so that it leads the list
 #: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAD
 MOST_UNKNOWN = 0.9
 
 
-def probabilities(selection: Selection, is_none: bool = False) -> dict[str, float]:
-    """The probability of every single candidate, of `none` and of `unknown`; they sum to 1.
+def probabilities(selection: Selection, answer: str) -> dict[str, float]:
+    """The probability of every single candidate, of `none` and of `unknown`; they sum to 1, the answer's is largest.
 
-    is_none: whether the verdict is `none`, which it is for a gap at its floor even where the selection names effects
-    (`ranking.verdict_of`).
+    answer: the first effect named, else the verdict (`ranking.verdict_of`).
 
-    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Where an
-    effect or `none` is the answer it stays below that.
+    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. Every
+    other candidate has a weight by its evidence alone. The verdict knows more than these weights: that the gap is at
+    its floor, in which seconds a passing effect acts, which effects act together. So an answer other than `unknown`
+    weighs as much as the heaviest other candidate at least, and limits `unknown` (MOST_UNKNOWN).
     """
-    names = list(selection.single_effects)
-    weight = _weights(selection, names)
-    total = weight.sum()
+    names = [*selection.single_effects, "none"]
+    weight = dict(zip(names, _weights(selection), strict=True))
+    if answer != "unknown":
+        weight[answer] = max(weight.get(answer, 0.0), *weight.values())
+    total = np.array([*weight.values()]).sum()
     odds = against_over_limit(selection) ** 2
+    if answer != "unknown":
+        odds = min(odds, MOST_UNKNOWN * (weight[answer] / total))
     unknown = odds / (1.0 + odds)
-    if selection.named_hypothesis is not None and is_explained(selection):
-        unknown = _limited(unknown, weight[names.index(selection.named_steps[0].name)] / total)
-    if is_none:
-        unknown = _limited(unknown, weight[-1] / total)
-    known = (1.0 - unknown) * weight / total
-    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
+    return {n: (1.0 - unknown) * w / total for n, w in weight.items()} | {"unknown": unknown}
 
 
-def _limited(unknown: float, share: float) -> float:
-    """Probability of `unknown`, MOST_UNKNOWN that of an answer at most, which has this share of all others."""
-    return min(unknown, MOST_UNKNOWN * share / (1.0 + MOST_UNKNOWN * share))
-
-
-def _weights(selection: Selection, names: Sequence[str]) -> np.ndarray:
-    """Weight (k + 1,) of each of k candidates, and of `none`, beside one another."""
+def _weights(selection: Selection) -> np.ndarray:
+    """Weight (k + 1,) of each of k single candidates, in their order, and of `none`, beside one another."""
+    names = list(selection.single_effects)
     if selection.inference is not None:
         alone = selection.inference.probabilities()
         return np.array([alone[n] for n in (*names, "none")])
@@ -55,7 +51,7 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
     The first effect named leads them by LEAD at least.
     """
     single_effects = selection.single_effects
-    out = [_against_none(single_effects[n].evidence, selection.least_nats[n], len(names)) for n in names]
+    out = [_beside_none(single_effects[n].evidence, selection.least_nats[n], len(names)) for n in names]
     if not selection.named_steps or selection.named_steps[0].name not in names:
         return out
     first = names.index(selection.named_steps[0].name)
@@ -68,11 +64,13 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
     return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
 
 
-def _against_none(gain: float, least: float, many: int = 1) -> float:
-    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
+def _beside_none(evidence: float, least: float, many: int) -> float:
+    """Score of one of many candidates beside 0 for `none`, nats: what is missing counts in full, what is over little.
 
-    gain: the evidence, nats, over `none` and over what nominal flights show; least: what is needed.
+    evidence: nats over `none` and over what nominal flights show; least: nats that are needed. What is missing is
+    multiplied by TEMPERATURE, by which every score is divided: such a candidate has the odds e^(evidence - least) /
+    many. What is over is divided by it, as the likelihoods of real flights are too sure of themselves.
     """
-    if gain < least:
-        return TEMPERATURE * (gain - least - np.log(many))
-    return gain - least
+    if evidence < least:
+        return TEMPERATURE * (evidence - least - np.log(many))
+    return evidence - least

@@ -1,7 +1,5 @@
 """The verdict, and every candidate with its probability and how far it closes the gap, best first."""
 
-from collections.abc import Mapping
-
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
 from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
@@ -53,7 +51,7 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
     answer: the first effect named, else the verdict.
     """
     out = []
-    for name, p in agreeing(probabilities(selection, verdict == "none"), answer).items():
+    for name, p in probabilities(selection, answer).items():
         single = selection.single_effects.get(name)
         share = Quantity(0.0)
         if name == answer and verdict == "effect" and len(selection.named_steps) == 1:
@@ -64,17 +62,6 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
         out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: selection.gained(c) for n, c in selection.single_effects.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
-    return out
-
-
-def agreeing(probability: Mapping[str, float], answer: str) -> dict[str, float]:
-    """The probabilities, of which the answer's is the largest: a larger one changes places with it.
-
-    The verdict weighs what the ranking of single candidates does not, as a passing effect.
-    """
-    out = {answer: 0.0, **probability}
-    best = max(out, key=out.__getitem__)
-    out[answer], out[best] = out[best], out[answer]
     return out
 
 

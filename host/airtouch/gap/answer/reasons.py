@@ -1,11 +1,13 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
+from airtouch.gap.evidence.cells import REST_VIEW, place_of
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Candidate, Selection, Step
 from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
+AT_ITS_FLOOR = "the gap as a whole is at its floor"
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
 
@@ -21,7 +23,7 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
     if step is not None and verdict == "effect":
         return _why_beside(selection, step)
     if verdict == "none" and name in {s.name for s in selection.named_steps}:
-        return "the gap as a whole is at its floor"
+        return AT_ITS_FLOOR
     if name == "unknown":
         return _why_not_unknown(selection)
     if name == "none":
@@ -72,10 +74,16 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 def _against_in_words(selection: Selection) -> str:
     """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
     lost, worst = selection.over_prediction
-    if over_prediction_ratio(selection) == against_over_limit(selection):
-        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
+    if worst is not None and over_prediction_ratio(selection) == against_over_limit(selection):
+        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")
     return _left(selection, "a model without names gains {} nats beside it", "it")
+
+
+def cell_in_words(cell: int) -> str:
+    """A cell of the spectra as `force_z at 0 to 0.6 Hz at rest`: channel, band, and whether on the ground."""
+    view, channel, (low, high) = place_of(cell)
+    return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
 def _left(selection: Selection, gains: str, off: str) -> str:
@@ -104,7 +112,7 @@ def _why_beside(selection: Selection, step: Step) -> str:
 def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not is_explained(selection):
-        return "the gap as a whole is at its floor"
+        return AT_ITS_FLOOR
     names = " and ".join(s.name for s in selection.named_steps)
     return _left(selection, "a model without names adds {} nats", names)
 

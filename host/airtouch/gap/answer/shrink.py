@@ -1,9 +1,9 @@
 """How far: the gap before and after an effect is in the model, on data that it was not fitted on.
 
-Gap is the rms of the whitened spectra (floor 1) over the cells, view by channel by band,
-in which the other half of the data shows one, or in which the effects named gain there.
-A cell's own floor is 1 by definition: where less is left, the flights were calmer than nominal
-ones by so much, and that is taken off the floor, not off the gap.
+Gap is the rms of the whitened spectra (floor 1) over the cells, view by channel by band, in which the other half of the
+data shows one, or in which the effects named gain there. A cell's own floor is 1 by definition: where less is left, the
+flights were calmer than nominal ones by so much, and that is taken off the floor, not off the gap. An energy is the
+square of a whitened value, of mean 1 at the floor.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,11 +18,13 @@ from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
-from airtouch.gap.signals.spectra import squared
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen
+#: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen. The error is that of
+#: exponential energies of mean 1, of which OVERLAP_WEIGHT of all are independent
+SURE = 4.0
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
 FEWEST_VALUES = 12  #: values that a cell needs; chosen
 DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
@@ -155,17 +157,17 @@ def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
     """
     for half in (0, 1):
         problem, values, power = left_over(data, parts[half], terms[1 - half])
-        use = problem.known & cells[half][problem.cells]
-        yield problem.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
+        use = problem.elements.known & cells[half][problem.flat.cells]
+        yield problem.flat.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
 
 
 def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
     energy = np.minimum(squared(values) / power, LARGEST)
-    count = np.bincount(problem.cells, problem.known, CELLS)
-    mean = np.bincount(problem.cells, energy * problem.known, CELLS) / np.maximum(count, 1)
-    out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
+    count = np.bincount(problem.flat.cells, problem.elements.known, CELLS)
+    mean = np.bincount(problem.flat.cells, energy * problem.elements.known, CELLS) / np.maximum(count, 1)
+    out = mean > 1.0 + SURE * np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1))) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST_VALUES)

@@ -3,15 +3,27 @@
 A cell's number is VIEW times the number of its view, plus COUNT times that of its band, plus that of its channel.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import CHANNELS, COUNT
 
 REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: numbers of the views: in the air, on the ground, of the commands
 VIEW = 1000  #: numbers that are kept for the cells of a view
 CELLS = 3 * VIEW  #: numbers of cells are below it
+NYQUIST_HZ = 0.5 / PERIOD_S  #: end of the highest band
 AXES = 3  #: channels of one sensor (x, y and z), whose numbers follow one another
+
+
+class CellPlace(NamedTuple):
+    """Where a cell is: number of its view, name of its channel, ends of its band."""
+
+    view: int
+    channel: str
+    band_hz: tuple[float, float]
 
 
 def cell_numbers(view: int, band: np.ndarray, channel: np.ndarray) -> np.ndarray:
@@ -48,9 +60,9 @@ def above_means() -> np.ndarray:
     return np.arange(CELLS) % VIEW >= COUNT
 
 
-def cell_words(cell: int) -> str:
-    """A cell in words: channel, band, and whether at rest."""
+def place_of(cell: int) -> CellPlace:
+    """The place of the cell of a number."""
     view, place = divmod(cell, VIEW)
     band, channel = divmod(place, COUNT)
     low, high = BANDS_HZ[max(band - (view == COMMAND_VIEW), 0):][:2]
-    return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"
+    return CellPlace(view, CHANNELS[channel].name, (low, min(high, NYQUIST_HZ)))

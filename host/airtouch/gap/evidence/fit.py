@@ -1,7 +1,7 @@
 """Fitting hypotheses to flights, and judging them on others.
 
-Mean effects are fitted by Gauss-Newton on the whitened spectra, random ones by their
-strength; what differs from flight to flight (offsets) has a prior.
+Mean effects are fitted by Gauss-Newton on the whitened spectra, random ones by their strength; what differs from flight
+to flight (offsets) has a prior.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,8 @@ BRIEF = 2  #: steps of a brief fit; chosen
 STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps; chosen: it says next to nothing
 CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
-#: strengths of a random effect that are tried before the best is refined: how many, from the least to the largest
+#: strengths of a random effect that are tried before the best is refined: how many, from the least to the largest, in
+#: natural steps; chosen
 GRID_SIZE, LEAST_STRENGTH, LARGEST_STRENGTH = 40, 0.003, 1e3
 LEAST_CURVATURE = 1e-6  #: nats, curvature in the logarithm of a strength, by which is divided at least; chosen
 CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelihood's curvature is taken; chosen
@@ -103,22 +104,33 @@ def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False)
 
 def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, its gap (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
+    """The problem, the gap (n,) that effects leave, offsets subtracted, and its expected power (n,).
+
+    wide: see `judge`.
+    """
     problem, values, added, _ = _explained(data, part, terms, wide)
-    return problem, values, problem.power + added
+    return problem, values, problem.elements.power + added
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
-    problem, values, power = left_over(data, part, (), bool(random_of(terms)))
-    without = problem.likelihood.each(values, power - problem.power)
-    problem, values, power = left_over(data, part, terms)
-    return np.bincount(problem.cells, problem.likelihood.each(values, power - problem.power) - without, CELLS)
+    flat = problem_of(data, part).flat
+
+    def of_each(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
+        """Log likelihood (n,) of each value under effects."""
+        _, values, power = left_over(data, part, hypothesis, wide)
+        return flat.likelihood.each(values, power - flat.elements.power)
+
+    without = of_each((), bool(random_of(terms)))
+    return np.bincount(flat.cells, of_each(terms, False) - without, CELLS)
 
 
 def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
-    """Problem of a part, its gap under effects, the power that they add, and the cost of offsets and floor."""
+    """Problem, gap (n,) under effects, power (n,) that these add, and nats that the offsets and the floor cost.
+
+    Offsets are subtracted. wide: see `judge`.
+    """
     problem = problem_of(data, part)
     values, added, floor_cost = problem.modelled(terms, wide)
     values, offset_cost = without_offsets(problem, values, added)

@@ -58,7 +58,7 @@ class Posterior:
     def at(self, x: np.ndarray, offsets: np.ndarray) -> _State:
         """The state at parameters x (k,) and offsets (m,)."""
         active = active_at(self.mean, x)
-        values = self.problem.values(active) if self.mean else self.problem.base.copy()
+        values = self.problem.values(active) if self.mean else self.problem.elements.base.copy()
         for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[places] -= amount * column
         command_power, floor_cost = self.problem.loop_power(active, self.wide)
@@ -86,7 +86,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
     low, high = limits(mean)
     x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.offsets:
-        return MeanFit(x, covariance, problem.base)
+        return MeanFit(x, covariance, problem.elements.base)
     now = posterior.at(x, offsets)
     slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
     for _ in range(most):
@@ -126,7 +126,7 @@ def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -
     known = np.full(size, np.nan) if known is None else known
     x = np.where(np.isnan(known), CLOSE, known)
     for t, own in mean_places(mean):
-        if t.signature.loop_only and len(problem.commands) and np.isnan(known[own]).all():
+        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(known[own]).all():
             x = _best_on_grid(problem, mean, x, range(own.start, own.stop))
     return x
 
@@ -139,7 +139,7 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: ra
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
         command_power, floor_cost = problem.loop_power(active_at(mean, trial))
-        level = problem.likelihood(problem.base, command_power) - floor_cost
+        level = problem.likelihood(problem.elements.base, command_power) - floor_cost
         if level > best:
             best, out = level, trial
     return out

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.problem import Offset, Problem
+from airtouch.gap.evidence.flattened import Offset
+from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.signals.spectra import LEAST_POWER, OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
@@ -27,6 +28,8 @@ class NormalEquations(NamedTuple):
 def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
                      weights: np.ndarray, at: np.ndarray, offsets: Sequence[Offset] = ()) -> NormalEquations:
     """Normal equations of the ridge regression that lowers values + sum(step * column) - sum(step * offset).
+
+    They minimise sum(weight |value|^2) + sum(((at + step) / prior)^2) / 2, hence the factors 2.
 
     columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
     about 0; values (n,): the gap; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
@@ -89,9 +92,10 @@ def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) 
 
     values (n,): the gap; added (n,): power over the floor.
     """
-    power = problem.power + added
+    elements = problem.elements
+    power = elements.power + added
     e = squared(values) / power
-    return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
+    return OVERLAP_WEIGHT * (elements.freedom + 1.0) / (elements.tail + e) / power * elements.known
 
 
 def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -99,12 +103,13 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
 
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
-    power, gap, cost = problem.power + added, values.copy(), 0.0
+    elements = problem.elements
+    power, gap, cost = elements.power + added, values.copy(), 0.0
     for places, column, spread in problem.offsets:
         amount = 0.0
-        largest_weight = OVERLAP_WEIGHT * (problem.freedom[places] + 1.0) * problem.known[places] / power[places]
+        largest_weight = OVERLAP_WEIGHT * (elements.freedom[places] + 1.0) * elements.known[places] / power[places]
         for _ in range(2):
-            weights = largest_weight / (problem.tail[places] + squared(gap[places]) / power[places])
+            weights = largest_weight / (elements.tail[places] + squared(gap[places]) / power[places])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
             slope = 2.0 * float(np.vdot(column, weights * gap[places]).real) - amount / spread ** 2
             amount += slope / normal

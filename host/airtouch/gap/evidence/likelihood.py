@@ -18,7 +18,8 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 
 REPLAY_FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 _COLUMN = float64[::1]
-LEAST, MOST = 1e-100, 1e100  #: of a product of values before its logarithm is taken
+LEAST, MOST = 1e-100, 1e100  #: of a product of values before its logarithm is taken; chosen, far from overflow
+BRACKET = 1e-3, 600.0  #: tails' scales among which `tail` seeks; chosen, beyond any in use, and exp does not overflow
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,10 @@ class Likelihood:
 
     @functools.cached_property
     def _exponent(self) -> np.ndarray:
-        """Power (n,) of the tails' fall."""
+        """Exponent nu + 1 (n,) of the tails (1 + e / tail)^-(nu + 1), where e is a value's power over that expected.
+
+        nu: the degrees of freedom.
+        """
         return self.freedom + 1.0
 
 
@@ -98,8 +102,9 @@ def tail(freedom: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _tail(nu: float) -> float:
-    """`tail` for one number of degrees of freedom."""
-    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
+    """`tail` for one number nu of degrees of freedom: the scale a of a e^a E1(a) = nu / (nu + 1)."""
+    low, high = BRACKET
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), low, high))
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")

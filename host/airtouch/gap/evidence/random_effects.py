@@ -1,7 +1,7 @@
 """Power spectra that random effects add to the gap of a flight.
 
-White noise of the IMU and the rotors' lines in closed form; random forces by running the
-effect itself on the flight's signals with several seeds.
+White noise of the IMU, noise of the thrust and the rotors' lines in closed form; others by running the effect itself on
+the flight's signals with several seeds.
 """
 
 from dataclasses import replace

@@ -41,15 +41,15 @@ class SpectraSlopes:
         if not len(stale):
             return
         before = active_at(self.mean, x)
-        values, power = self.problem.values(before), self.problem.torque_power.added_by(before)
+        values, power = self.problem.values(before), self.problem.torque_power(before)
         for i in stale:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             shifted = x.copy()
             shifted[i] += step
             after = active_at(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
-            self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.torque_power.added_by(after) - power) / step
+            self.rises[i] = self.problem.flat.commands.rise(before, after) / step
+            self.powers[i] = (self.problem.torque_power(after) - power) / step
             self.bent[i] = loops_differ(self.problem.data, before, after)
         self.at = x.copy() if anew else self.at
 
@@ -60,11 +60,11 @@ class SpectraSlopes:
         values, added: the gap, and the power over the floor, flattened.
         """
         problem = self.problem
-        gradient, information = problem.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
+        gradient, information = problem.flat.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
         powers = np.array(self.powers)
         if powers.any():
             push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
-                                                           problem.replay_count)
+                                                           problem.flat.replay_count)
             gradient = gradient + powers @ push
             information = information + (powers * weight) @ powers.T
         return gradient, information

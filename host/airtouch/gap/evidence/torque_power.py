@@ -1,12 +1,11 @@
 """Power that effects of the loop add to the floor of the torque in the replay view."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, gap_spectra, step_doubt
-from airtouch.gap.evidence.layout import Layout
+from airtouch.gap.evidence.flattened import Flattened
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COUNT, TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
@@ -19,44 +18,31 @@ from airtouch.simulation.effects import Active
 TORQUE_DOUBT = 0.25
 
 
-@dataclass(frozen=True)
-class TorquePower:
-    """Works out the power that effects of the loop add in the replay view. Its arrays are (replay,).
+def torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.ndarray:
+    """Power (replay,) that effects add to the floor of the torque in the replay view; 0 in other channels.
 
-    base: the gap without effects, 0 where unknown; known: whether a value counts; torque: whether it is one of the
-    torque; noise: power of the floor, without what lost rows add.
+    It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
     """
+    loop, count = data.study.loop, flat.replay_count
+    effects = beside_edges(active) if loop and count else []
+    of_loop = loop.torque_change(effects, frequencies(AIR)) if loop and effects else None
+    if of_loop is None:
+        return np.zeros(count)
+    gather, flights = flat.layout.gather, flat.layout.flights
+    base, known = flat.elements.base[:count], flat.elements.known[:count]
+    change = np.where(known, gather(gap_spectra(data, effects, flights)) - base, 0.0)
+    steps = step_doubt(data, effects, flights)
+    doubt = TORQUE_DOUBT ** 2 * squared(change) * flat.of_torque + (0.0 if steps is None else gather(steps).real)
+    return doubt + flat.noise * _noise_growth(data, flat, of_loop)
 
-    data: Data
-    layout: Layout
-    base: np.ndarray
-    known: np.ndarray
-    torque: np.ndarray
-    noise: np.ndarray
 
-    def added_by(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (replay,) that effects add.
-
-        It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
-        """
-        loop = self.data.study.loop
-        effects = beside_edges(active) if loop and len(self.base) else []
-        of_loop = loop.torque_change(effects, frequencies(AIR)) if loop and effects else None
-        if of_loop is None:
-            return np.zeros(len(self.base))
-        gather, flights = self.layout.gather, self.layout.flights
-        change = np.where(self.known, gather(gap_spectra(self.data, effects, flights)) - self.base, 0.0)
-        steps = step_doubt(self.data, effects, flights)
-        doubt = TORQUE_DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else gather(steps).real)
-        return doubt + self.noise * self._noise_growth(of_loop)
-
-    def _noise_growth(self, change: Change) -> np.ndarray:
-        """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
-        before, after = change.incoherent
-        table = np.zeros((len(before), COUNT))
-        nominal = self.data.study.floor.power[AIR][:, TORQUE]
-        table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
-        return self.layout.per_bin({AIR: table, REST: np.zeros(self.layout.keep[REST].shape)})
+def _noise_growth(data: Data, flat: Flattened, change: Change) -> np.ndarray:
+    """Factor (replay,) of a changed loop on the torque's floor, less 1, as far as that is noise of the loop."""
+    before, after = change.incoherent
+    table = np.zeros((len(before), COUNT))
+    nominal = data.study.floor.power[AIR][:, TORQUE]
+    table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
+    return flat.layout.per_bin({AIR: table, REST: np.zeros(flat.layout.keep[REST].shape)})
 
 
 def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) -> bool:

@@ -1,13 +1,11 @@
 """Where the lines of turning rotors lie in a flight's spectra, and how strong they are there.
 
-An out-of-balance rotor shakes the IMU once a turn; the log's 100 Hz fold that line to
-somewhere below 50 Hz. Motor commands tell how the speed wanders: the mean of the rotors
-follows the thrust, which changes slowly, while differences between them are aliases of
-the rate loop but for their mean (trim). How fast a rotor turns for its thrust is seldom
-known to the percent that would tell where the fold puts the line, so the place of all
-lines together, and how far those of single rotors are apart, are found from the flights:
-two numbers for all of them. Lines of rotors that turn alike add up as their phases happen to
-stand, so that flights of one vehicle differ: each has its own share of the power.
+An out-of-balance rotor shakes the IMU once a turn; the log's 100 Hz fold that line to somewhere below 50 Hz. Motor
+commands tell how the speed wanders: the mean of the rotors follows the thrust, which changes slowly, while differences
+between them are aliases of the rate loop but for their mean (trim). How fast a rotor turns for its thrust is seldom
+known to the percent that would tell where the fold puts the line. So the place of all lines together, and how far those
+of single rotors are apart, are found from the flights: two numbers for all of them. Lines of rotors that turn alike add
+up as their phases happen to stand, so that flights of one vehicle differ: each has its own share of the power.
 """
 
 from dataclasses import dataclass
@@ -29,9 +27,11 @@ WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one; cho
 SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place, tried one by one; chosen
 #: relative error of a rotor's speed where the vehicle declares thrust over speed squared; chosen
 KNOWN_SPEED = 0.02
+#: columns of the rotors' logged speeds, 1/min
 RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: below it forces of other origin are strong; chosen
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
+FINER = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)  #: multiples of the best that are tried then, up to its neighbours
 MOST_BLOCKS = 40  #: blocks in which the place of lines is looked for; chosen for time
 
 
@@ -156,7 +156,7 @@ def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
 
     levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))
-    fine = strengths[best] * np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
+    fine = strengths[best] * FINER
     fine_levels = [likelihood(s) for s in fine]
     return max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))])
 

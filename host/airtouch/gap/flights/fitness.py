@@ -76,8 +76,8 @@ def log_kind(log: FlightLog) -> str:
 
 
 def stamped_at_arrival(log: FlightLog) -> bool:
-    """Whether the host stamped the rows: the authors' logs."""
-    return str(log.meta.get("format", "")).startswith("authors")
+    """Whether the host stamped the rows: the authors' logs, converted ones too."""
+    return log_kind(log) == "authors"
 
 
 def cannot_tell(log: FlightLog) -> tuple[str, ...]:

@@ -71,19 +71,20 @@ class Regressors:
 
 def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
     """The regressors of each channel of each flight of a part that has known values; made once."""
-    return problem.workspace.cached("regressors", (), lambda: _regressors(data, part, problem))
+    return problem.flat.workspace.cached("regressors", (), lambda: _regressors(data, part, problem))
 
 
 def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
     """See `regressors_of`."""
     out = []
-    channel, flight, known = (x[:problem.replay_count] for x in (problem.channel, problem.flight, problem.known))
+    e, count = problem.elements, problem.flat.replay_count
+    channel, flight, known = (x[:count] for x in (e.channel, e.flight, e.known))
     for c in range(CHANNELS):
         table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
             here = known[elements] & (flight[elements] == f)
             places = elements[here]
-            offsets = [(x[places], p) for x, p in problem.unit_offsets if np.any(x[places])]
+            offsets = [(x, o.spread) for o in problem.offsets if np.any(x := o.at(places))]
             if len(places):
                 out.append(Regressors(c, places, np.column_stack([table[here], *(x for x, _ in offsets)]),
                                       np.array([p for _, p in offsets])))
@@ -133,7 +134,7 @@ def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.nda
         if channel in ROLL_PITCH:
             loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP_COLUMNS))
             columns = np.concatenate([columns, loop], axis=2)
-        rows.append(columns[:, problem.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
+        rows.append(columns[:, problem.flat.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
 
 

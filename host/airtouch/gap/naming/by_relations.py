@@ -49,15 +49,6 @@ def selection_by_relations(search: Search, inference: Inference, rank_all: bool 
         policy=search.trial.policy)
 
 
-def signs_not_shown(selection: Selection) -> list[str]:
-    """A note on each effect named by the relations of signals whose parameter may have the other sign as well."""
-    if selection.inference is None:
-        return []
-    names = {s.name for s in selection.named_steps}
-    return [f"{name}: the flights do not show the sign of its strength; it may be the other one"
-            for name in selection.inference.without_sign if name in names]
-
-
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
     parameter = effect_class.name.partition(" ")[2]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import CELLS, cell_words, channel_cells
+from airtouch.gap.evidence.cells import CELLS, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
 from airtouch.gap.naming.records import Candidate, OverPrediction
@@ -21,7 +21,7 @@ def over_prediction_of(trial: Trial, hypothesis: Candidate | None) -> OverPredic
         return OverPrediction()
     in_a_channel_that_loses = lost[channel_cells()] > 0.0
     worst = int(np.argmin(np.where(in_a_channel_that_loses, gains, np.inf)))
-    return OverPrediction(float(lost.sum()), cell_words(worst))
+    return OverPrediction(float(lost.sum()), worst)
 
 
 def over_prediction_by_channel(gains: np.ndarray) -> np.ndarray:

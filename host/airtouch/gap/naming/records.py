@@ -114,10 +114,10 @@ class NamelessGain:
 
 
 class OverPrediction(NamedTuple):
-    """Over-prediction: held-out nats lost in cells where effects predict what flights do not show; the worst cell."""
+    """Held-out nats lost where effects predict what flights do not show, and the number of the worst cell (`cells`)."""
 
     nats: float = 0.0
-    cell: str = ""
+    worst_cell: int | None = None
 
 
 class TakenBack(NamedTuple):

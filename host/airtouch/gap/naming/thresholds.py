@@ -23,8 +23,8 @@ def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> fl
 
     base: the hypothesis of the effects before it; extended: the same with the further one.
     """
-    names = {t.name for t in base.terms}
-    new = [t for t in extended.terms if t.name not in names]
+    before = {t.slot for t in base.terms}
+    new = [t for t in extended.terms if t.slot not in before]
     looks_alike = assumes(trial.data, base.terms) and changes_loop(trial.data, new)
     share = trial.policy.loop_misfit_share if looks_alike else trial.policy.misfit_share
     return misfit(trial, base, extended, share, everywhere=is_random(extended.name))

@@ -44,7 +44,7 @@ def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: 
     each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
     which it gains, STRETCH_ROUNDS times at most; then the stretches' ends are moved.
     """
-    air, cost = problem_of(data, whole).air, cost_of_stretch(len(level_without))
+    air, cost = problem_of(data, whole).flat.air, cost_of_stretch(len(level_without))
     at_the_ends = _at_the_ends(data, air)
     acting = _explained_worst(air, level_without)
     for _ in range(STRETCH_ROUNDS):
@@ -100,9 +100,9 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.power)[:problem.replay_count]
-    in_air = problem.air.of >= 0
-    return np.bincount(problem.air.of[in_air], each[in_air])
+    each = problem.likelihood.each(values, power - problem.elements.power)[:problem.flat.replay_count]
+    in_air = problem.flat.air.of >= 0
+    return np.bincount(problem.flat.air.of[in_air], each[in_air])
 
 
 def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:

@@ -1,0 +1,29 @@
+"""Notes of a diagnosis on the effects that it names: what the flights leave open of their parameters."""
+
+from collections.abc import Sequence
+
+from airtouch.gap.naming.judging import at_bound
+from airtouch.gap.naming.records import Selection
+from airtouch.gap.result import NamedEffect
+from airtouch.gap.signatures.candidates import term_of
+
+
+def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
+    """A note on each fitted parameter that lies at the end of its range, where the model stretches."""
+    notes = []
+    for effect in effects:
+        term = term_of(effect)
+        ends = at_bound(term, term.among_all(term.scaled(term.values)))
+        notes += [f"{effect.name}: {name} is at the end of its range ({effect.parameters[name].value:.4g}): the true"
+                  " one lies beyond it, or something else is behind the gap"
+                  for name, end in zip(term.signature.free, ends, strict=True) if end]
+    return notes
+
+
+def signs_not_shown(selection: Selection) -> list[str]:
+    """A note on each effect named by the relations of signals whose parameter may have the other sign as well."""
+    if selection.inference is None:
+        return []
+    names = {s.name for s in selection.named_steps}
+    return [f"{name}: the flights do not show the sign of its strength; it may be the other one"
+            for name in selection.inference.without_sign if name in names]

@@ -1,0 +1,171 @@
+"""Blocks of flights flattened to one array of values, and what is known of each before any hypothesis."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
+from airtouch.gap.evidence.data import Data, Spectra
+from airtouch.gap.evidence.layout import AirBlocks, Layout, Piece
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail
+from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
+from airtouch.gap.signals.command_view import CommandElements, CommandView, view_of
+from airtouch.gap.signals.response import FIRST_BIN
+from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, short_time_spectra
+from airtouch.gap.workspace import Workspace
+
+OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
+#: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
+FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
+
+
+class Offset(NamedTuple):
+    """What a unit offset of one channel of one flight adds to the gap.
+
+    places (m,): of the values that it changes, in ascending order; column, complex (m,): how much there; spread:
+    standard deviation of the offset's prior, in the channel's unit.
+    """
+
+    places: np.ndarray
+    column: np.ndarray
+    spread: float
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """What a unit offset adds, complex (k,), at other places (k,), each named once; 0 where it changes nothing."""
+        out = np.zeros(len(places), complex)
+        _, there, own = np.intersect1d(places, self.places, assume_unique=True, return_indices=True)
+        out[there] = self.column[own]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """What is known of flattened values (n,) before any hypothesis.
+
+    base: the gap without effects, unit/sqrt(Hz), 0 where unknown; power: its expected power, unit^2/Hz; known: whether
+    a value counts; channel, flight: their numbers; freedom, tail: degrees of freedom and scale of the likelihood's
+    tails.
+    """
+
+    base: np.ndarray
+    power: np.ndarray
+    known: np.ndarray
+    channel: np.ndarray
+    flight: np.ndarray
+    freedom: np.ndarray
+    tail: np.ndarray
+
+    def followed_by(self, other: "Elements") -> "Elements":
+        """These and others after them."""
+        return Elements(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
+
+
+@dataclass(frozen=True, eq=False)
+class Flattened:
+    """Some blocks of flights as values (n,): first those of the replay view, then those of the commands.
+
+    layout: of the replay view's values; elements: of all values; noise (replay,): power of the replay view's floor,
+    without what lost rows add; offsets: those between flights, no two with a place in common; air: the blocks in the
+    air of the replay view; workspace: what others keep of these blocks.
+    """
+
+    layout: Layout
+    commands: CommandView
+    elements: Elements
+    noise: np.ndarray
+    offsets: Sequence[Offset]
+    air: AirBlocks
+    workspace: Workspace = field(default_factory=Workspace, init=False, repr=False)
+
+    @property
+    def replay_count(self) -> int:
+        """How many values are those of the replay view."""
+        return len(self.noise)
+
+    @functools.cached_property
+    def likelihood(self) -> Likelihood:
+        """The likelihood of all values."""
+        e = self.elements
+        return Likelihood(e.power, e.freedom, e.tail, e.known)
+
+    @functools.cached_property
+    def of_torque(self) -> np.ndarray:
+        """Whether a value of the replay view is one of the torque, bool (replay,)."""
+        channel = self.elements.channel[:self.replay_count]
+        return (channel >= TORQUE.start) & (channel < TORQUE.stop)
+
+    @functools.cached_property
+    def cells(self) -> np.ndarray:
+        """Number (n,) of the cell of each value (`cells`)."""
+        bands = {r: np.digitize(frequencies(r), BANDS_HZ)[:, None] - 1 for r in (AIR, REST)}
+        replay = self.layout.per_bin({r: cell_numbers(view, bands[r], np.arange(COUNT))
+                                      for r, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
+        of_commands = self.commands.elements
+        commands = cell_numbers(COMMAND_VIEW, np.digitize(of_commands.frequency, BANDS_HZ), of_commands.channel) \
+            if len(self.commands) else np.zeros(0)
+        return np.concatenate([replay, commands]).astype(int)
+
+    def joined(self, replay: np.ndarray, commands: np.ndarray | float = 0.0) -> np.ndarray:
+        """Values (replay,) of the replay view, followed by one value, or one each, for those of the commands."""
+        return np.concatenate([replay, np.broadcast_to(commands, len(self.commands))])
+
+
+def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
+    """Some blocks of the flights of `data`, flattened."""
+    layout = Layout(pieces, _counted(data.means_only))
+    commands = view_of(data.study.loop, data.flights, data.first, pieces)
+    noise = layout.gather([{r: data.study.floor.of_blocks(f, b[r], r) for r in b}
+                           for f, b in zip(data.flights, data.first, strict=True)]).real
+    elements = _of_replay(data, layout, noise).followed_by(_of_commands(commands.elements))
+    return Flattened(layout, commands, elements, noise, _offsets(data, layout), layout.air_blocks(data.first))
+
+
+def _counted(means_only: bool) -> dict[str, np.ndarray]:
+    """Bins and channels (bins, COUNT) of the replay view that count, by state. means_only: `Data.means_only`."""
+    keep = {r: judged_bins(r) for r in (AIR, REST)}
+    for table in keep.values():
+        table[:, COMMAND] = False  # the command view judges them
+    if means_only:
+        keep[AIR][FIRST_BIN:, TORQUE] = False
+    return keep
+
+
+def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
+    """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
+    base, counts = layout.gather(data.base), data.study.floor.block_counts
+    known = np.isfinite(base)
+    power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
+                                   for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real
+    freedom = layout.per_piece(
+        lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, REPLAY_FREEDOM))
+    return Elements(np.where(known, base, 0.0), np.where(known, power, 1.0), known, layout.channels(),
+                    layout.per_piece(lambda flight, _: flight).astype(int), freedom, tail(freedom))
+
+
+def _of_commands(commands: CommandElements) -> Elements:
+    """The values of the command view, whose floor has its tails in it."""
+    return Elements(commands.values, commands.floor, np.ones(len(commands.values), bool), commands.channel.astype(int),
+                    commands.flight.astype(int), commands.freedom, commands.freedom)
+
+
+def _offsets(data: Data, layout: Layout) -> list[Offset]:
+    """One for each of OFFSETS channels of each flight whose mean differs between nominal flights."""
+    spread, out = data.study.offset, []
+    for flight in range(len(data.flights)):
+        for channel in np.flatnonzero(spread[:OFFSETS] > 0.0):
+            column = layout.gather(_unit_offset(data, flight, int(channel)))
+            places = np.flatnonzero(column)
+            out.append(Offset(places, column[places], float(spread[channel])))
+    return out
+
+
+def _unit_offset(data: Data, flight: int, channel: int) -> list[Spectra]:
+    """Spectra by flight and state of 1 in one channel of one flight, in the air."""
+    ones = np.zeros((len(data.flights[flight]), COUNT))
+    ones[~data.flights[flight].on_ground, channel] = 1.0
+    return [{r: short_time_spectra(ones, begin, r) if j == flight else np.zeros_like(data.base[j][r])
+             for r, begin in first.items()} for j, first in enumerate(data.first)]

@@ -1,0 +1,25 @@
+"""Notes on the effects named: parameters at the end of their range, signs that do not show."""
+
+from types import SimpleNamespace
+
+from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
+from airtouch.gap.result import NamedEffect, Quantity
+
+
+def test_a_parameter_at_the_end_of_its_range_is_told():
+    """Slow motors have a factor of at most 5; a wake's turbulence of 0 is none, and no end."""
+    def named(name, **values):
+        return NamedEffect(name, {k: Quantity(v) for k, v in values.items()})
+
+    (note,) = at_end_of_range([named("motor_lag", factor=5.0, fall=1.0), named("wind", x=1.0, y=0.0, z=-9.0)])
+    assert note.startswith("motor_lag: factor is at the end of its range (5)")
+    assert len(at_end_of_range([named("wind", x=10.0, y=0.0, z=-10.0)])) == 2
+    assert not at_end_of_range([named("downwash", strength=1.0, turbulence=0.0), named("motor_lag", factor=1.0)])
+
+
+def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
+    selection = SimpleNamespace(inference=SimpleNamespace(without_sign=("mass", "inertia")),
+                                named_steps=(SimpleNamespace(name="mass"),))
+    (note,) = signs_not_shown(selection)
+    assert note.startswith("mass: ")
+    assert signs_not_shown(SimpleNamespace(inference=None)) == []

@@ -1,0 +1,88 @@
+"""The plots of a gap report: their panes, lines and labels, before they are made a PNG."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.answer.pictures import Signal, Spectrum
+from airtouch.logs.segments import KINDS
+from airtouch.report import gap_figures
+
+TIME_S = np.arange(100) * 0.1
+FREQUENCY_HZ = np.linspace(0.0, 50.0, 51)
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Draws a plot and gives its figure."""
+    figures = []
+    monkeypatch.setattr(gap_figures, "png", lambda figure, dpi: figures.append(figure) or b"")
+
+    def draw(plot, *arguments):
+        plot(*arguments)
+        return figures[-1]
+
+    return draw
+
+
+def lines(ax):
+    """The lines of a pane by their labels, each (points,)."""
+    return {line.get_label(): line.get_ydata() for line in ax.get_lines()}
+
+
+def signal(measured=True, after=True, phase=None):
+    steps = np.zeros(100, int) if phase is None else phase
+    return Signal("a.csv", "force_x", 2.0, "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
+                  np.full(100, 2.0), np.full(100, 0.5) if after else None, 0.25)
+
+
+def test_signal_has_measured_and_models_above_and_their_differences_below(drawn):
+    above, below = drawn(gap_figures.signals, signal()).axes
+    assert {name: y[0] for name, y in lines(above).items()} == {"measured": 5.0, "model": 3.0, "model with effect": 4.5}
+    assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
+    assert "floor" in below.get_legend_handles_labels()[1]
+    assert above.get_ylabel() == "forward force\nm/s^2" and below.get_xlabel() == "time, s"
+
+
+def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):
+    (only,) = drawn(gap_figures.signals, signal(measured=False, after=False)).axes
+    assert set(lines(only)) == {"gap before"} and only.get_ylabel() == "measured - model\nm/s^2"
+
+
+def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
+    """Take-off and landing alike, over a platform another; hover has none."""
+    kinds = ("take-off", "hover", "over platform", "landing")
+    phase = np.repeat([KINDS.index(k) for k in kinds], 25)
+    (ax,) = drawn(gap_figures.signals, signal(measured=False, phase=phase)).axes
+    spans = [p for p in ax.patches if p.get_label() != "floor"]
+    first, second, third = (p.get_facecolor() for p in spans)
+    assert first == third != second
+    for span, begin, end in zip(spans, (0, 50, 75), (24, 74, 99), strict=True):
+        assert (span.get_x(), span.get_x() + span.get_width()) == pytest.approx((TIME_S[begin], TIME_S[end]))
+
+
+@pytest.mark.parametrize("after", [True, False])
+def test_spectra_have_a_pane_for_each_channel(drawn, after):
+    power = np.full(51, 4.0)
+    shown = [Spectrum(name, unit, power, power / 2.0 if after else None, power / 4.0)
+             for name, unit in (("force_x", "m/s^2"), ("torque_z", "rad/s^2"))]
+    figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
+    assert [(ax.get_title(loc="left"), ax.get_ylabel()) for ax in figure.axes] == [
+        ("forward force", "(m/s^2)²/Hz"), ("yaw torque", "(rad/s^2)²/Hz")]
+    expected = {"floor": 1.0, "before": 4.0} | ({"after": 2.0} if after else {})
+    for ax in figure.axes:
+        assert {name: y[0] for name, y in lines(ax).items()} == expected
+    assert figure.axes[-1].get_xlabel() == "frequency, Hz"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(expected)
+
+
+@pytest.mark.parametrize("nominal", [{}, {"roll": np.ones(5), "yaw": np.ones(5)}])
+def test_commands_have_a_pane_for_each_axis_and_nominal_flights_beside(drawn, nominal):
+    curves = SimpleNamespace(frequency_hz=np.arange(1.0, 6.0), flown={"roll": np.full(5, 2.0), "yaw": np.full(5, 3.0)},
+                             nominal=nominal)
+    figure = drawn(gap_figures.commands, curves)
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["roll command", "yaw command"]
+    for ax, power in zip(figure.axes, (2.0, 3.0), strict=True):
+        assert lines(ax)["these flights"][0] == power
+        assert ("baseline flights" in lines(ax)) is bool(nominal)
