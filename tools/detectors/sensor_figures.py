@@ -1,8 +1,8 @@
 """What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
 of.
 
-    python tools/choose_decoder.py out/folds --json out/all.json
-    python tools/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
+    python tools/detectors/choose_decoder.py out/folds --json out/all.json
+    python tools/detectors/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
     airtouch evaluate ../shared/flights/airtouch-november --speed 0.3 --json out/november.json
     python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
         rates=out/rates.json=folds acceleration=out/november.json="another month"
@@ -32,7 +32,7 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
             raise AirTouchError(f"{path}: the model was trained on these flights; score others")
         return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise AirTouchError(f"{path}: not the JSON of tools/choose_decoder.py or `airtouch evaluate`: "
+        raise AirTouchError(f"{path}: not the JSON of tools/detectors/choose_decoder.py or `airtouch evaluate`: "
                             f"{error}") from None
 
 

@@ -31,8 +31,8 @@ from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
-from crazypad import figures as pad
-from crazypad import labels
+from recordings.crazypad import figures as pad
+from recordings.crazypad import labels
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
@@ -100,12 +100,12 @@ def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
     rows = labels.manifest(folder, part)
     vehicle = vehicles.load(labels.VEHICLE)
-    raw = np.array([describe(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
-    drone = np.array([r["drone"] for r in rows])
-    normal = np.array([labels.family(r["condition"]) == "normal" for r in rows])
-    own = np.arange(len(rows))
-    base = [raw[normal & (drone == drone[i]) & (own != i)].mean(axis=0) for i in own]
-    return Table(rows, raw - np.array(base))
+    return relative(rows, np.array([describe(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]))
+
+
+def relative(rows: list[dict[str, str]], numbers: np.ndarray) -> Table:
+    """The table of numbers (flights, k) less their mean over the drone's other normal flights."""
+    return Table(rows, numbers - np.array([numbers[labels.baseline(rows, i)].mean(axis=0) for i in range(len(rows))]))
 
 
 #: name -> classifier of labels; discriminants take each label as equally likely
@@ -164,8 +164,7 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
         cases = cross_validate(table, folds, learner)
         cells = []
         for figure in (pad.balanced_accuracy, _damage_right, pad.exact_rotors, pad.severity):
-            low, high = pad.interval(cases, figure)
-            cells.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
+            cells.append(pad.with_interval(cases, figure))
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
 
 

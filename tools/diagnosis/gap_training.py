@@ -40,8 +40,8 @@ from airtouch.gap.diagnosis import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from gap_authors import VEHICLE
-from gap_passes import apart_db, pieces
+from recordings.authors import VEHICLE
+from recordings.passes import apart_db, pieces
 
 MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis judges on 210 s at most
 #: names and parameters of effects

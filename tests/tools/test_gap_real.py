@@ -2,8 +2,8 @@
 
 import re
 
-import gap_real
-import recorded_cases
+from tools import gap_real
+from tools.diagnosis.recordings import cases
 
 
 def test_a_few_recorded_flights_of_each_kind(flights, capsys):
@@ -24,12 +24,12 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, caps
 
 
 def test_nominal_flights_are_held_against_others_of_their_group(flights):
-    build, view = (list(recorded_cases.nominal(flights, part)) for part in ("build", "view"))
+    build, view = (list(cases.nominal(flights, part)) for part in ("build", "view"))
     assert len(build) >= 60 and len(view) >= 30
     assert not {c.flight for c in build} & {c.flight for c in view}
     for case in build + view:
         assert case.truth == "none" and case.flight not in case.baseline
-        assert 2 <= len(case.baseline) <= recorded_cases.OTHERS
+        assert 2 <= len(case.baseline) <= cases.OTHERS
     days = {day for c in build if "neuralswarm" in c.flight for day in re.findall(r"_cf\d+d(\d\d)_", c.flight)}
     assert days == {"19", "20"}
 

@@ -6,6 +6,9 @@ import sys
 import pytest
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
+from airtouch.simulation.flight import fly
+from airtouch.twin.recorded import missions
 from skips import needs
 from tools.calibration import days_apart
 from twin_courses import PLAIN, made_course
@@ -13,11 +16,13 @@ from twin_courses import PLAIN, made_course
 pytestmark = needs("sklearn")
 
 
-def write(folder, fly_course, days, effects):
+def write(folder, days, effects):
+    """A folder of simulated flights with a manifest, one for each of `days`; effects: of the days that have some."""
     folder.mkdir()
+    vehicle = vehicles.load("crazyflie-2.1-flow")
     rows = []
     for number, day in enumerate(days):
-        log = fly_course(made_course(number, 0.06), effects.get(day, PLAIN), number, 3)
+        log = fly(missions.scenario_of(made_course(number, 0.06), effects.get(day, PLAIN)), vehicle, 3, number)
         logs.write(log, folder / f"f{number}.csv.gz")
         rows.append(f"f{number}.csv.gz,{day},0.3\n")
     (folder / "manifest.csv").write_text("file,day,speed_mps\n" + "".join(rows))
@@ -32,9 +37,9 @@ def table(monkeypatch, capsys, *arguments):
 
 
 @pytest.mark.slow
-def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(fly_course, tmp_path, monkeypatch, capsys):
+def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(tmp_path, monkeypatch, capsys):
     shaking = PLAIN | {"motor_noise": {"rms": 0.02, "time": 0.2, "fast": 0.03}}
-    folder = write(tmp_path / "flights", fly_course, ["1", "2", "3"] * 8, {"3": shaking})
+    folder = write(tmp_path / "flights", ["1", "2", "3"] * 8, {"3": shaking})
     scores = table(monkeypatch, capsys, folder, "--fewest", 6)
     assert set(scores) == {"two random halves", "1 against 2", "1 against 3", "2 against 3"}
     value, low, _ = (float(x) for x in re.findall(r"\d\.\d+", scores["1 against 3"]["hover"]))
@@ -43,7 +48,7 @@ def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(fly_cou
     assert low < 0.6
 
 
-def test_one_day_is_told(fly_course, tmp_path, monkeypatch, capsys):
-    folder = write(tmp_path / "flights", fly_course, ["1"], {})
+def test_one_day_is_told(tmp_path, monkeypatch, capsys):
+    folder = write(tmp_path / "flights", ["1"], {})
     with pytest.raises(SystemExit, match=r"two days with 4 flights.*1 1"):
         table(monkeypatch, capsys, folder)

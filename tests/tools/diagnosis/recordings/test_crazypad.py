@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazypad import figures, labels
+from tools.diagnosis.recordings.crazypad import figures, labels
 
 SMALL, LARGE = "cut_M3_0.5mm_0.5mm", "cut_M2_3.5mm_3.0mm_40.5mm"  # 1 mm and 6.5 mm gone; the last is the blade's length
 
@@ -26,6 +26,13 @@ def case(condition, rotors=(), name="weak_motor", verdict="effect", loss=0.1, dr
 def test_a_condition_names_family_rotors_and_millimetres(condition, family, rotors, cut_mm, large):
     assert labels.family(condition) == family and labels.rotors(condition) == rotors
     assert labels.cut_mm(condition) == pytest.approx(cut_mm, nan_ok=True) and labels.large(condition) is large
+
+
+def test_millimetres_of_a_condition():
+    assert labels.millimetres("cut_M2_3.5mm_3.0mm_40.5mm_M1_3.0mm_3.0mm_41mm") == {2: 6.5, 1: 6.0}
+    assert labels.millimetres("cut_propeller_M3_1mm") == {3: 1.0} and not labels.large("cut_propeller_M3_1mm")
+    assert labels.large("cut_M2_1mm_0.5mm_45.5mm_M1_1mm_0.5mm_45.5mm")
+    assert labels.millimetres("tape_on_propeller_M3") == {}
 
 
 def test_all_flights_of_each_fourth_defect_are_kept_for_looking():

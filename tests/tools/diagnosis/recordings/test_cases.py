@@ -2,7 +2,7 @@
 
 import pytest
 
-import recorded_cases
+from tools.diagnosis.recordings import cases as recorded_cases
 
 
 @pytest.fixture

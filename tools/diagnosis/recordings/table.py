@@ -3,15 +3,16 @@
 A case is a dict: row, truth, condition, flight and, from its diagnosis, verdict, effects and seconds.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import numpy as np
 
-import gap_lift
-from airtouch.gap.sealed.intervals import wilson
 from airtouch.gap.signatures.alike import interchangeable
-from crazypad import figures as pad
+
+from . import swarm_lift
+from .crazypad import figures as pad
+from .shares import share_text
 
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 
@@ -30,26 +31,37 @@ def answer(case: dict) -> str:
     return first["name"]
 
 
-def print_table(cases: list[dict], folder: Path) -> None:
-    """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
-    table = defaultdict(lambda: defaultdict(int))
+def counts(cases: list[dict]) -> dict[tuple[str, str], Counter[str]]:
+    """(row, truth) -> how often each answer was given. A row of neural-swarm's and of nominal flights has a condition.
+
+    Of the peers, whose flights each have an effect of their own, answers that are right count together as "right".
+    """
+    table: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for c in cases:
         kind = f"{c['row']}, {c['condition']}" if c["row"] in ("swarm", "nominal") else c["row"]
         peers = c["row"] == "peers"
         word = "right" if peers and answer(c) == c["truth"] else answer(c)
         table[kind, "any effect" if peers else c["truth"]][word] += 1
+    return table
+
+
+def line(row: str, truth: str, answers: Counter[str]) -> str:
+    """A line of the table: hits, their share with its 95 % interval, every answer, the most frequent first."""
+    hits = answers["right" if row == "peers" else truth]
+    every = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]))
+    return f"| {row} | {truth} | {share_text(hits, answers.total())} | {every} |"
+
+
+def print_table(cases: list[dict], folder: Path) -> None:
+    """Print a line for each row and truth, neural-swarm's lift, times, CrazyPAD's figures. folder: the flights."""
     print("| flights | truth | right | every answer |\n|---|---|---|---|")
-    for (row, truth), answers in sorted(table.items()):
-        n, hits = sum(answers.values()), answers["right" if row == "peers" else truth]
-        share = wilson(hits, n)
-        counts = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]) if k)
-        print(f"| {row} | {truth} | {hits} of {n} [{share['low']:.0%}, {share['high']:.0%}] | {counts} |")
-    near = [gap_lift.close(c, folder / "neuralswarm") for c in cases
+    for (row, truth), answers in sorted(counts(cases).items()):
+        print(line(row, truth, answers))
+    near = [swarm_lift.close(c, folder / "neuralswarm") for c in cases
             if (c["row"], c["truth"]) == ("swarm", "ground_effect")]
     if near:
-        share = wilson(sum(near), len(near))
-        print(f"neural-swarm, lift within {gap_lift.CLOSE:.0%} of the measured at 2 and 4 cm: "
-              f"{sum(near)} of {len(near)} [{share['low']:.0%}, {share['high']:.0%}]")
+        print(f"neural-swarm, lift within {swarm_lift.CLOSE:.0%} of the measured at 2 and 4 cm: "
+              f"{share_text(sum(near), len(near))}")
     seconds = [c["seconds"] for c in cases if "seconds" in c]
     if seconds:
         middle, most = np.quantile(seconds, [0.5, 0.9])

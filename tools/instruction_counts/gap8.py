@@ -14,16 +14,16 @@ import numpy as np
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.paper.model import Model
 from airtouch.detector.shared import export
-from tools.instruction_counts.build import CACHE, build
-from tools.instruction_counts.elf import Elf
-from tools.instruction_counts.machine import Machine
-from tools.instruction_counts.xpulp import BARRIER, Cycles, XpulpMachine
 
-ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
+from .build import CACHE, ROOT, build
+from .elf import Elf
+from .machine import Machine
+from .xpulp import BARRIER, Cycles, XpulpMachine
+
 #: folders of the C
 KERNELS, FIRMWARE = ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"
 STATE_BYTES = 4096      #: room for a rolling network's or a stream's struct
-#: names of `tools.instruction_counts.cores`
+#: names of `cores.CORES`
 RV32IMC, XPULP = "rv32imc", "rv32im-xpulp"
 #: sources of a network over whole windows
 _WINDOWED = ("conv_int8", "dense_int8", "max_pool_int8", "network_int8", "sparse_dense_int8")

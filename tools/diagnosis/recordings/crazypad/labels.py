@@ -6,9 +6,10 @@ A condition is the dataset's name of what was done to a vehicle: "cut_M2_3.5mm_3
 
 import argparse
 import csv
-import os
 import re
 from pathlib import Path
+
+from ..folder import add_folder, check_folder
 
 VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
 #: families of conditions, in the order of the tables
@@ -33,13 +34,20 @@ def building(rows: list[dict]) -> list[bool]:
     return [r["condition"] not in viewed for r in rows]
 
 
+def baseline(rows: list[dict], i: int) -> list[int]:
+    """Indices of the nominal flights that flight i is held against: the normal ones of its drone but itself."""
+    return [k for k, r in enumerate(rows) if k != i and r["drone"] == rows[i]["drone"]
+            and family(r["condition"]) == "normal"]
+
+
 def folder_and_part(description: str | None) -> argparse.Namespace:
-    """`folder` and `part` of the command line of a tool with this description."""
+    """`folder` and `part` of the command line of a script with this description."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
+    add_folder(parser, "crazypad")
     parser.add_argument("--part", choices=("build", "all"), default="build")
-    return parser.parse_args()
+    options = parser.parse_args()
+    check_folder(parser, options.folder)
+    return options
 
 
 def family(condition: str) -> str:

@@ -1,7 +1,7 @@
 """Choose the `best` detector's decoder settings from cross-validated models.
 
 First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, by fold or by day, then
-`python tools/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
+`python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
 never saw it, once for each folder; with --silence SENSOR from the log without that sensor. Prints the settings that are
 best over all folds, and an honest figure for choosing them: each fold scored with the settings best on the others.
 """

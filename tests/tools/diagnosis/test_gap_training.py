@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gap_passes
-import gap_training
 from airtouch import logs
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
@@ -20,6 +18,8 @@ from airtouch.logs.flight_log import PWM
 from airtouch.simulation import batch, effects, replay, scenario
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
+from tools.diagnosis import gap_training
+from tools.diagnosis.recordings import passes
 
 
 def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):
@@ -91,17 +91,17 @@ def test_half_the_swing_is_six_decibels_apart(tmp_path):
     flights = gap_training.training_flights(text, 3, 0, tmp_path)
     half = [log.with_columns({c: 0.5 * log[c] for c in log.columns if c.startswith(("acc", "gyro")) or c in PWM})
             for log in flights]
-    assert gap_passes.apart_db(half, flights) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
-    assert gap_passes.apart_db(flights, flights) == pytest.approx([0.0, 0.0])
+    assert passes.apart_db(half, flights) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
+    assert passes.apart_db(flights, flights) == pytest.approx([0.0, 0.0])
 
 
 def test_the_pieces_of_a_pass_share_no_sample(tmp_path):
     for log in gap_training.training_flights(gap_training.scene_text([]), 3, 0, tmp_path):
         entry, leave = (e.sample for e in logs.true_edges(log))
-        over, before = gap_passes.pieces(log)
+        over, before = passes.pieces(log)
         assert before["t_s"][-1] < over["t_s"][0] < log["t_s"][entry] < log["t_s"][leave] < over["t_s"][-1]
         assert logs.airborne(before).all() and not logs.true_edges(before)
-    assert gap_passes.pieces(log.slice(0, entry)) is None
+    assert passes.pieces(log.slice(0, entry)) is None
 
 
 @pytest.mark.parametrize("mean", [0.0, 0.4, 1.7])

@@ -15,7 +15,7 @@ from tools.firmware_emulation import build, height
 from tools.firmware_emulation.__main__ import main
 from tools.firmware_emulation.replay import rows
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def emulate(*arguments, **environment):

@@ -56,6 +56,12 @@ def interval(table: list[dict], figure: Callable[[list[dict]], float]) -> tuple[
     return low, high
 
 
+def with_interval(table: list[dict], figure: Callable[[list[dict]], float], digits: int = 2) -> str:
+    """A figure and its 90 % interval, as text."""
+    low, high = interval(table, figure)
+    return f"{figure(table):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
 def forgiven(table: list[dict]) -> float:
     """`balanced_accuracy`, where a cut of less than LEAST_MM may be called normal."""
     def is_excused(c: dict) -> bool:
@@ -120,8 +126,7 @@ def print_answers(table: list[dict]) -> None:
             g[0] + (f" {g[1]} {g[2]:.2f}" if g[1] else "") for g in group))
     print(f"\n{len(table)} flights; 90 % intervals, conditions resampled")
     for text, figure in FIGURES.items():
-        low, high = interval(table, figure)
-        print(f"{text:48s} {figure(table):.3f} ({low:.3f} to {high:.3f})")
+        print(f"{text:48s} {with_interval(table, figure, 3)}")
     for drone in sorted({c["drone"] for c in table}):
         for which in ("M1", "M3"):
             part = [c for c in table if c["drone"] == drone and c["condition"].startswith("cut")

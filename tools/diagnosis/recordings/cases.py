@@ -1,4 +1,4 @@
-"""The cases of `gap_real.py`: recorded flights, each with its truth and the baseline that it is diagnosed against."""
+"""The cases of tools/gap_real.py: recorded flights, each with its truth and the baseline it is diagnosed against."""
 
 import csv
 from collections import defaultdict
@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import swarm_cuts
-from crazypad.labels import VEHICLE as CRAZYPAD_VEHICLE
-from crazypad.labels import building, family, manifest
-from gap_authors import VEHICLE as AUTHORS_VEHICLE
-from gap_authors import questions
-from gap_peers import NAMES
+from . import peers as peer_flights
+from . import swarm_cuts
+from .authors import VEHICLE as AUTHORS_VEHICLE
+from .authors import questions
+from .crazypad.labels import VEHICLE as CRAZYPAD_VEHICLE
+from .crazypad.labels import baseline, building, family, manifest
 
 OTHERS = 5  #: most baseline flights of one; as tools/calibration/nominal_scatter.py, whose table the diagnosis uses
 PER_GROUP = 4  #: flights tested of a day and condition; no source: enough for a count, few enough for time
@@ -93,10 +93,9 @@ def crazypad(folder: Path, part: str) -> Iterator[Case]:
     """CrazyPAD's flights against the other normal ones of the same drone; truth is the family of the defect."""
     own = folder / "crazypad"
     rows = manifest(own, "all")
-    normal = [r for r in rows if family(r["condition"]) == "normal"]
-    for r, build in zip(rows, building(rows), strict=True):
+    for i, (r, build) in enumerate(zip(rows, building(rows), strict=True)):
         if _in_part(part, build):
-            others = tuple(str(own / o["file"]) for o in normal if o["drone"] == r["drone"] and o["file"] != r["file"])
+            others = tuple(str(own / rows[k]["file"]) for k in baseline(rows, i))
             yield Case("crazypad", family(r["condition"]), CRAZYPAD_VEHICLE, str(own / r["file"]), others,
                        r["condition"])
 
@@ -112,10 +111,10 @@ def fan(folder: Path, part: str) -> Iterator[Case]:
 def peers(folder: Path, part: str) -> Iterator[Case]:
     """Flights of other people's simulators."""
     own = folder / "peers"
-    for r in csv.DictReader((own / "manifest.csv").open()):
-        if not r["file"].startswith("cal") and _in_part(part, False):
-            yield Case("peers", NAMES.get(r["effect"], r["effect"]), str(own / f"vehicle_{r['vehicle'].lower()}.toml"),
-                       str(own / r["file"]), tuple(str(own / f"cal_{r['vehicle']}_{i}.csv.gz") for i in (0, 1)))
+    for row in peer_flights.labelled(own):
+        if _in_part(part, False):
+            yield Case("peers", peer_flights.truth(row), str(peer_flights.vehicle_file(own, row)),
+                       str(own / row["file"]), tuple(map(str, peer_flights.baseline(own, row))))
 
 
 def _calm_groups(folder: Path, part: str) -> dict[tuple[str, ...], list[str]]:
@@ -135,4 +134,7 @@ def _in_part(part: str, build: bool) -> bool:
 
 #: name of a row -> its cases in a folder of flights and a part
 ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers, "nominal": nominal}
+#: name of a row -> folders of the data sets that its cases come from
+DATA_SETS = {"authors": ("airtouch",), "swarm": ("neuralswarm",), "crazypad": ("crazypad",), "fan": ("airtouch",),
+             "peers": ("peers",), "nominal": ("airtouch", "neuralswarm")}
 DEFAULT_ROWS = [row for row in ROWS if row != "nominal"]  #: without the one that takes 25 min

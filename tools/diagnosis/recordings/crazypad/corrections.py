@@ -10,11 +10,9 @@ from scipy.optimize import least_squares
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
-from airtouch.gap.balance.hover_pattern import hover_pattern
-from airtouch.gap.flights.flight import ready
-from airtouch.logs import read
 
 from .labels import VEHICLE, family, manifest
+from .patterns import hover_patterns
 
 POWER_NAMES = ("unsteady", "heave")  #: of the powers of a `HoverPattern`, as they are printed
 
@@ -23,7 +21,7 @@ def show_corrections(folder: Path) -> None:
     """Print the fit of `hover_balance.ANSWER` to both drones and to each, and the rest of the powers by family."""
     rows = manifest(folder, "build")
     vehicle = vehicles.load(VEHICLE)
-    patterns = [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
+    patterns = hover_patterns(folder, rows, vehicle)
     power, corrections = np.array([p.power for p in patterns]), np.array([p.corrections for p in patterns])
     drone = np.array([r["drone"] for r in rows])
     for k, power_name in enumerate(POWER_NAMES):

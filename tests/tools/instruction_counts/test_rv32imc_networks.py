@@ -23,9 +23,10 @@ from airtouch.kernels.rolling import fixed_scale, rolling_size, run_rolling
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.kernels.stream import run_stream
 from airtouch.reference.networks.int8_network import quantise
-from tools.firmware import gap8_counts
+from tools.instruction_counts import gap8
+from tools.instruction_counts.build import ROOT
 
-BUDGET = tomllib.loads(Path(__file__).with_name("gap8_budget.toml").read_text())
+BUDGET = tomllib.loads((ROOT / "tools/instruction_counts/gap8_budget.toml").read_text())
 CORES = (1, 2, 4, 8)
 
 
@@ -37,13 +38,13 @@ def models():
 @pytest.fixture(scope="module")
 def chips(models):
     """The shipped models, compiled for plain rv32imc."""
-    return {name: gap8_counts.compile_model(model) for name, model in models.items()}
+    return {name: gap8.compile_model(model) for name, model in models.items()}
 
 
 @pytest.fixture(scope="module")
 def clusters(models):
     """Those that run over windows, compiled for XPULP."""
-    return {name: gap8_counts.compile_model(models[name], gap8_counts.XPULP) for name in ("paper", "paper-stream")}
+    return {name: gap8.compile_model(models[name], gap8.XPULP) for name in ("paper", "paper-stream")}
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def tflite_micro(content: bytes, quantised: np.ndarray) -> np.ndarray:
 def test_real_windows_have_the_desktops_and_tflite_micros_bits(name, models, chips, fused):
     model, quantised = models[name], quantised_windows(models[name], fused)
     assert len(quantised) > 100
-    outputs = gap8_counts.windows(chips[name], quantised).outputs
+    outputs = gap8.windows(chips[name], quantised).outputs
     np.testing.assert_array_equal(outputs, run_int8(model.int8, quantised))
     np.testing.assert_array_equal(outputs, tflite_micro(model.tflite, quantised))
     assert len(np.unique(outputs, axis=0)) > 20
@@ -89,7 +90,7 @@ def test_a_real_flight_as_a_stream_has_the_bits_of_its_windows(stride, models, c
     inputs = fixed_scale(model.scale.mean, model.scale.deviation, fused[0][:700])
     quantised = quantise(inputs, first.input_scale, first.input_zero_point)
     expected, valid = run_rolling(model.int8, quantised, stride)
-    outputs = gap8_counts.rolling(chips["paper-stream"], quantised, stride).outputs
+    outputs = gap8.rolling(chips["paper-stream"], quantised, stride).outputs
     np.testing.assert_array_equal(outputs, expected[valid])
     ends = np.flatnonzero(valid) + rolling_size(model.int8, stride).ahead
     ends = ends[ends < len(quantised)]
@@ -103,7 +104,7 @@ def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
     channels, _ = channels_of(log, model.recipe.motion)
     first = model.int8.layers[0]
     quantised = quantise(channels[200:800], first.input_scale, first.input_zero_point)
-    np.testing.assert_array_equal(gap8_counts.stream(chips["best"], quantised).outputs,
+    np.testing.assert_array_equal(gap8.stream(chips["best"], quantised).outputs,
                                   run_stream(model.int8, quantised))
 
 
@@ -111,7 +112,7 @@ def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
 @pytest.mark.parametrize("cores", CORES)
 def test_xpulp_cores_have_the_desktops_bits(name, cores, models, clusters):
     quantised, _ = golden_vectors(models[name].int8)
-    cycles, outputs = gap8_counts.team_cycles(clusters[name], quantised[cores], cores)
+    cycles, outputs = gap8.team_cycles(clusters[name], quantised[cores], cores)
     np.testing.assert_array_equal(outputs,
                                   np.repeat(run_int8(models[name].int8, quantised[cores:cores + 1]), cores, axis=0))
     if f"cycles_{cores}" in BUDGET[name]:
@@ -120,21 +121,21 @@ def test_xpulp_cores_have_the_desktops_bits(name, cores, models, clusters):
 
 def test_eight_cores_are_at_least_six_times_as_fast_as_one(models, clusters):
     window = golden_vectors(models["paper"].int8)[0][0]
-    single, team = (gap8_counts.team_cycles(clusters["paper"], window, cores)[0].looped for cores in (1, 8))
+    single, team = (gap8.team_cycles(clusters["paper"], window, cores)[0].looped for cores in (1, 8))
     assert single / team > 6
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-stream"])
 def test_windows_stay_in_the_budget(name, models, chips):
-    counts = gap8_counts.windows(chips[name], golden_vectors(models[name].int8)[0])
+    counts = gap8.windows(chips[name], golden_vectors(models[name].int8)[0])
     assert counts.instructions.max() <= BUDGET[name]["window_instructions"]
     assert counts.stack <= BUDGET[name]["stack_bytes"]
 
 
 def test_streams_stay_in_the_budget(models, chips):
-    rolled = gap8_counts.rolling(chips["paper-stream"], golden_vectors(models["paper"].int8)[0][0].reshape(-1, 3)[:100],
+    rolled = gap8.rolling(chips["paper-stream"], golden_vectors(models["paper"].int8)[0][0].reshape(-1, 3)[:100],
                                  4)
-    streamed = gap8_counts.stream(chips["best"], golden_flight(models["best"].int8)[0][:100])
+    streamed = gap8.stream(chips["best"], golden_flight(models["best"].int8)[0][:100])
     for name, counts in (("paper-stream", rolled), ("best", streamed)):
         assert counts.instructions.mean() <= BUDGET[name]["step_instructions"]
         assert counts.instructions.max() <= BUDGET[name]["step_instructions_worst"]

@@ -1,6 +1,6 @@
 """Prints what each network costs on the GAP8 and what it is worth, as a Markdown table, beside the paper's figures.
 
-    python tools/firmware/gap8_figures.py [FLIGHTS] [--out out/gap8] [--counts]
+    python -m tools.instruction_counts.gap8_figures [FLIGHTS] [--out out/gap8] [--counts]
 
 Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept
 in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
@@ -14,8 +14,6 @@ from typing import Any
 
 import click
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for `tools`; Python itself puts only this folder there
 
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import paper, registry
@@ -31,9 +29,10 @@ from airtouch.kernels.rolling import rolling_size
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.logs.files import write_bytes
 from airtouch.reference.networks.int8_network import multiplications, rolling_multiplications
-from tools.firmware import gap8_counts
 
-ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
+from . import gap8
+from .build import ROOT
+
 RESAMPLES = 2000  #: bootstrap samples over flights; no source: round number
 
 
@@ -74,30 +73,30 @@ HEAD = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|"
 
 def cost(row: Row, model: Any) -> dict[str, Any]:
     """Bytes, multiplications, instructions and cycles of a model."""
-    chip = gap8_counts.compile_model(model)
+    chip = gap8.compile_model(model)
     network = model.int8
     figures: dict[str, Any] = {"parameters": parameter_bytes(network), "flash": chip.flash_bytes}
     if chip.kind == "stream":
-        run = gap8_counts.stream(chip, golden_flight(network)[0][:200])
+        run = gap8.stream(chip, golden_flight(network)[0][:200])
         arena, columns = stream_arena_bytes(network), network.channels
         figures["mac"] = network.multiplications / network.stride
     elif chip.kind == "rolling":
         stride = paper.stride(model)
-        run = gap8_counts.rolling(chip, export.golden_samples(network, stride)[0][:200], stride)
+        run = gap8.rolling(chip, export.golden_samples(network, stride)[0][:200], stride)
         arena, columns = rolling_size(network, stride).arena_bytes, network.input_shape[1]
         figures["mac"] = rolling_multiplications(network, stride)
     else:
-        run = gap8_counts.windows(chip, export.golden_vectors(network)[0])
+        run = gap8.windows(chip, export.golden_vectors(network)[0])
         figures["mac"] = multiplications(network)
         arena, columns = arena_bytes(network), int(np.prod(network.input_shape))
     figures |= {"instructions": float(run.instructions.mean()), "worst": int(run.instructions.max()),
                 "stack": run.stack,
                 "l1": chip.constant_bytes + arena + columns + run.stack}
     if chip.kind != "stream":
-        cluster = gap8_counts.compile_model(model, gap8_counts.XPULP)
+        cluster = gap8.compile_model(model, gap8.XPULP)
         window = export.golden_vectors(network)[0][0]
         for cores in (1, 8):
-            cycles, _ = gap8_counts.team_cycles(cluster, window, cores)
+            cycles, _ = gap8.team_cycles(cluster, window, cores)
             figures[f"cycles_{cores}"], figures[f"branching_{cores}"] = cycles.looped, cycles.cycles
     return figures
 

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-import swarm_cuts
+from tools.diagnosis.recordings import swarm_cuts
 
 HEADER = "file,flight,cf,start_s,stop_s\n"
 #: a cut of vehicle 50 in flight 01, one of 51 that begins 3 s later, one of 51 after both have ended, and flight 02
