@@ -1,14 +1,16 @@
 """Choose the `best` detector's decoder settings from cross-validated models.
 
-First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, by fold or by day, then
-`python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
-never saw it, once for each folder; with --silence SENSOR from the log without that sensor. Prints the settings that are
-best over all folds, and an honest figure for choosing them: each fold scored with the settings best on the others.
+    airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
+    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...
+
+Each flight is decoded from the logits of the model that never saw it, once for each folder; with --silence SENSOR from
+the log without that sensor. Prints the settings that are best over all folds, and an honest figure for choosing them:
+each fold scored with the settings best on the others. host/docs/results.md has that figure of the shipped settings.
 """
 
 import argparse
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from airtouch import kernels, logs
 from airtouch.cli.shared import scores as show_scores
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -25,6 +28,7 @@ from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, 
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.logs.edges import Edge
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
 
@@ -32,18 +36,41 @@ MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: rou
 FALSE_M = 0.02  #: m of mean error, cost of one false edge a minute; no source: round number
 
 
+@dataclass(frozen=True)
 class HeldOutFlight:
-    """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
+    """A flight as the model of its fold sees it, which was not trained on it.
 
-    def __init__(self, file: dataset.FlightFile, fold: int, model, silent: tuple[str, ...]) -> None:
-        log = logs.read(file.path)
-        events = best.flight_events(sensors.without(log, silent), model)
-        self.file, self.fold, self.speed = file, fold, file.condition.speed_mps
-        self.true, self.flying = logs.true_edges(log), logs.airborne(log)
-        self.over = np.where(events.airborne, 1.0 / (1.0 + np.exp(-events.logits[:, 0].astype(float))), 0.0)
-        self.logits, self.airborne = events.logits[events.ready], events.airborne[events.ready]
-        self.edges = [e.sample for e in self.true]
-        self.minutes = float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60
+    speed: m/s; true: its edges; flying (n,): samples in the air; over (n,): probability of being over a platform;
+    logits (steps, 3) and airborne (steps,): what the decoder reads; minutes: in the air.
+    """
+
+    file: dataset.FlightFile
+    fold: int
+    speed: float
+    true: list[Edge]
+    flying: np.ndarray
+    over: np.ndarray
+    logits: np.ndarray
+    airborne: np.ndarray
+    minutes: float
+
+    @property
+    def edges(self) -> list[int]:
+        """Samples of the true edges."""
+        return [e.sample for e in self.true]
+
+
+def held_out_flight(file: dataset.FlightFile, fold: int, model: BestModel, silent: tuple[str, ...]) -> HeldOutFlight:
+    """A flight read and run through the model of its fold, without the sensors `silent`."""
+    if file.condition.speed_mps is None:
+        raise AirTouchError(f"{file.path}: no speed, which turns seconds into metres; add a column speed_mps to the "
+                            "manifest.csv beside it")
+    log = logs.read(file.path)
+    events = best.flight_events(sensors.without(log, silent), model)
+    over = np.where(events.airborne, 1.0 / (1.0 + np.exp(-events.logits[:, 0].astype(float))), 0.0)
+    return HeldOutFlight(file, fold, file.condition.speed_mps, logs.true_edges(log), logs.airborne(log), over,
+                         events.logits[events.ready], events.airborne[events.ready],
+                         float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60)
 
 
 def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[HeldOutFlight]:
@@ -51,13 +78,14 @@ def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[He
     files = {file.path.name: file for file in dataset.collect([folder])}
     entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
     if len({entry["fold"] for entry in entries}) != len(entries):
-        raise SystemExit(f"{out}: folds of more than one cross-validation; give a folder with one")
+        raise AirTouchError(f"{out}: folds of more than one cross-validation; give a folder with one")
+    if absent := {score["file"] for entry in entries for score in entry["per_flight"]} - set(files):
+        raise AirTouchError(f"{folder}: no {min(absent)}, which {out} was made of; set AIRTOUCH_FLIGHTS to its folder")
     flights = []
     for entry in track(entries, "logits"):
         model = best.load(out / entry["model"])
-        for name in (score["file"] for score in entry["per_flight"]):
-            file = files[name]
-            flights.append(HeldOutFlight(file, entry["fold"], model, silent))
+        flights += [held_out_flight(files[score["file"]], entry["fold"], model, silent)
+                    for score in entry["per_flight"]]
     return flights
 
 
@@ -102,6 +130,25 @@ def cost(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]
     return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
 
 
+#: for each of some settings, the `outcomes` of all flights
+Results = list[list[tuple[np.ndarray, int]]]
+
+
+def cheapest(flights: list[HeldOutFlight], results: Results) -> int:
+    """Index of the settings whose outcomes cost least."""
+    return int(np.argmin([cost(flights, outcomes_of) for outcomes_of in results]))
+
+
+def choices(flights: list[HeldOutFlight], results: Results) -> dict[int, tuple[int, float]]:
+    """Fold -> (index of the settings that are best on the flights of the other folds, their lag there)."""
+    chosen = {}
+    for fold in {flight.fold for flight in flights}:
+        others = [k for k, flight in enumerate(flights) if flight.fold != fold]
+        choice = cheapest([flights[k] for k in others], [[of[k] for k in others] for of in results])
+        chosen[fold] = choice, lag_of([results[choice][k] for k in others])
+    return chosen
+
+
 def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderConfig]:
     """Random settings, drawn without a look at any flight."""
     out = []
@@ -133,15 +180,11 @@ def main() -> None:
     results = [outcomes(flights, config) for config in track(settings, "settings")]
     print_figures("as shipped", flights, outcomes(flights, best.DECODER))
     print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
-    winner = int(np.argmin([cost(flights, f) for f in results]))
+    winner = cheapest(flights, results)
     print_figures("one setting, best over all folds", flights, results[winner])
     print(json.dumps(asdict(settings[winner])))
     nested: list[FlightScore] = []
-    for fold in {flight.fold for flight in flights}:
-        others = [k for k, flight in enumerate(flights) if flight.fold != fold]
-        rest = [flights[k] for k in others]
-        choice = int(np.argmin([cost(rest, [f[k] for k in others]) for f in results]))
-        lag = lag_of([results[choice][k] for k in others])
+    for fold, (choice, lag) in choices(flights, results).items():
         nested += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
     result = evaluate.as_json("best", nested, [], lag_of(results[winner]), asdict(settings[winner]))
     show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},

@@ -141,11 +141,11 @@ def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[
         cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
         for i, family, rotors, mm in zip(np.flatnonzero(fold), predicted["family"], predicted["rotors"], cut,
                                          strict=True):
-            out[i] = {**table.rows[i], **_case(family, rotors, mm)}
+            out[i] = {**table.rows[i], **as_case(family, rotors, mm)}
     return out
 
 
-def _case(family: str, rotors: str, mm: float) -> dict:
+def as_case(family: str, rotors: str, mm: float) -> dict:
     """A learner's answer in the form of a diagnosis; millimetres stand for the loss of thrust."""
     if family == "normal":
         return {"verdict": "none", "effects": []}
