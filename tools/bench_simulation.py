@@ -1,6 +1,6 @@
 """Simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
-    .venv/bin/python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
+    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.
@@ -8,7 +8,7 @@ RotorPy (extra `bench`) flies its Crazyflie in a closed loop with its own contro
 it has no batch of its own without PyTorch. crazyflow (JAX, 1.2 GB, not among AirTouch's packages)
 flies 64 worlds on all cores, without sensors, log or effects: `--crazyflow` names the Python that has
 it, made with `python -m venv crazyflow && crazyflow/bin/pip install crazyflow==0.4.0`. Three rounds in
-turn, medians.
+turn, medians. host/docs/simulation-checks.md has the figures.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
@@ -122,4 +123,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("bench_simulation"):
+        main()

@@ -26,7 +26,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
 from airtouch.logs import read
@@ -126,4 +126,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with in_one_line("gap_real"):
+        sys.exit(main())

@@ -6,7 +6,8 @@
 
 Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
 other groups, and a network trained on the same K alone. Prints a Markdown table: means over all draws and seeds, 95 %
-intervals by bootstrap over flights, and missed edges by height. --help explains the options.
+intervals by bootstrap over flights, and missed edges by height. --help explains the options. host/docs/twin.md has the
+table of the authors' flights, host/docs/results.md that of another month.
 """
 
 import argparse

@@ -16,7 +16,7 @@ import json
 from pathlib import Path
 
 from airtouch.detector.shared import sensors
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
 
 FILE = Path(__file__).parents[2] / "host" / "airtouch" / "models" / "best_sensors.json"  #: where the figures go
@@ -51,4 +51,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("sensor_figures"):
+        main()

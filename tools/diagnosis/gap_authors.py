@@ -1,6 +1,6 @@
 """The authors' flights against the simulator: the three questions of host/docs/gap-real.md, one report each.
 
-    python tools/diagnosis/gap_authors.py [FLIGHTS/airtouch] [OUT]
+    python tools/diagnosis/gap_authors.py [FLIGHTS/airtouch] [OUT]    # 1 to 2 min a question
 
 Writes all.html, close.html and wind.html (with .json) to OUT, out/gap-authors by default.
 """

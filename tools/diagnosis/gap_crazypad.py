@@ -1,14 +1,13 @@
 """CrazyPAD: every flight diagnosed alone, calibrated on the other normal flights of its drone.
 
-    python tools/diagnosis/gap_crazypad.py [FOLDER] [--json cases.jsonl] [--leave-one-out]
+    python tools/diagnosis/gap_crazypad.py [FOLDER] [--json cases.jsonl] [--leave-one-out]    # 20 s
     python tools/diagnosis/gap_crazypad.py [FOLDER] --corrections
 
-FOLDER holds the flights and their manifest.csv. The label is read after the diagnosis. With
---json, cases that the file holds already are not diagnosed again. What the diagnosis
-takes as known beforehand (`priors.Priors`) was chosen with these conditions in view;
---leave-one-out chooses it anew for each condition, from a grid, by the others alone.
---corrections fits how unsteadiness and heave follow the corrections of the estimated velocity
-(`hover_balance.ANSWER`), on the building part: all but every fourth condition.
+The figures are in host/docs/gap-crazypad.md. FOLDER holds the flights and their manifest.csv. The label is read after
+the diagnosis. With --json, cases that the file holds already are not diagnosed again. What the diagnosis takes as known
+beforehand (`priors.Priors`) was chosen with these conditions in view; --leave-one-out chooses it anew for each
+condition, from a grid, by the others alone. --corrections fits how unsteadiness and heave follow the corrections of
+the estimated velocity (`hover_balance.ANSWER`), on the building part: all but every fourth condition.
 """
 
 import argparse
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import HoverPattern
@@ -123,4 +123,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_crazypad"):
+        main()

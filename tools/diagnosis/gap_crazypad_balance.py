@@ -1,6 +1,6 @@
 """What the balance of the motors in hover can tell on CrazyPAD at all: of the rotor, and of the family.
 
-    python tools/diagnosis/gap_crazypad_balance.py [FOLDER] [--part build|all]
+    python tools/diagnosis/gap_crazypad_balance.py [FOLDER] [--part build|all]    # 20 s
 
 One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, by their labels. The residual
 is how a vehicle differs after maintenance: another set of propellers, for the most part. `Priors.maintenance` is this
@@ -9,6 +9,7 @@ scatter in the building conditions. Then
   conditions; it only chooses which rotors. Severity is then measured along the right rotors' change.
 - the diagnosis itself on drawn flights whose changes and scatter are those of its priors: no test on the same six
   numbers is right more often in the mean of the families. Cut rotors are drawn from the conditions of at least 1.5 mm.
+The figures are in host/docs/gap-crazypad.md.
 """
 
 import os
@@ -23,6 +24,7 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_pattern import LEAST_POWER, HoverPattern
@@ -251,4 +253,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_crazypad_balance"):
+        main()

@@ -1,6 +1,6 @@
 """What tests with more knowledge than the diagnosis reach on CrazyPAD: how far its goals can be reached at all.
 
-    python tools/diagnosis/gap_crazypad_ideal.py [FOLDER] [--part build|all]
+    python tools/diagnosis/gap_crazypad_ideal.py [FOLDER] [--part build|all]    # 5 min
 
 Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
 unsteadiness, heave and corrections of `hover_pattern`, the voltage, commanded thrust of each rotor, and spectra of
@@ -8,7 +8,7 @@ commands and accelerations in seven bands. Four learners (a discriminant on the 
 the nearest flight) have the labels of (1) all other conditions of both drones, (2) all other flights, those of the
 same condition too, (3) the other drone. The diagnosis has none. That several are tried and the best may be read
 favours these tests. Intervals resample conditions within families. What the balance alone can tell:
-`gap_crazypad_balance.py`.
+`gap_crazypad_balance.py`. The figures are in host/docs/gap-crazypad.md.
 """
 
 import os
@@ -27,6 +27,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
@@ -199,4 +200,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_crazypad_ideal"):
+        main()

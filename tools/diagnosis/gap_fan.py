@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready_flights
 from airtouch.gap.nominal import calibrate
@@ -69,4 +70,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_fan"):
+        main()

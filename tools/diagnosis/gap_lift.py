@@ -1,6 +1,6 @@
 """How well one flight shows its lift near the floor: a regression that knows the curve measured on neural-swarm's.
 
-    python tools/diagnosis/gap_lift.py [FLIGHTS]
+    python tools/diagnosis/gap_lift.py [FLIGHTS]    # 7 s
 
 Prints, for each day and vehicle, in how many of neural-swarm's flights the regression is within a quarter of the
 measured lift; the figures are in host/docs/gap-real.md. The regression takes the vertical force that the commanded
@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.logs import read
 from recordings.folder import add_folder, check_folder
@@ -67,4 +68,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_lift"):
+        main()

@@ -15,6 +15,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.sealed.intervals import wilson
@@ -99,4 +100,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_peers"):
+        main()

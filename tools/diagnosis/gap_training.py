@@ -1,6 +1,8 @@
 """Does closing the gap close the error? Found effects added one by one, a detector trained on each.
 
-    AIRTOUCH_FLIGHTS=../shared/flights .venv/bin/python tools/diagnosis/gap_training.py --out out/gap-training
+    python tools/diagnosis/gap_training.py --out out/gap-training    # 40 min on a busy machine
+
+On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is in host/docs/gap-real.md.
 
 1. Diagnosis. The folds of the authors' clean flights are divided in two groups (--groups). Those of a group are
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);
@@ -35,7 +37,7 @@ from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.score import FlightScore, WindowCounts
 from airtouch.detector.evaluation.summary import summarise
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
@@ -207,4 +209,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_training"):
+        main()

@@ -1,6 +1,6 @@
 """How many of neural-swarm's flights under another vehicle a test sees that knows when it was under it.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]    # 15 s
 
 The seconds come from the other vehicles' own logs, where the data hold a cut of the same time: another vehicle within
 0.15 m sideways and 0.1 to 0.6 m above, as the data's labels say. In these seconds against the rest of the flight: the
@@ -18,7 +18,7 @@ vehicle had been overhead in the seconds of each downwash flight of its kind: ho
     python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test that is not told the seconds, 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
-the two apart.
+the two apart. The figures of all three are in host/docs/gap-real.md.
 """
 
 import argparse
@@ -34,6 +34,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.naming.passing_effect import passing_evidence
@@ -246,4 +247,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_wakes"):
+        main()

@@ -72,8 +72,13 @@ def networks() -> int:
     return sum(int(text) + int(data) for text, data, *_ in (line.split() for line in lines))
 
 
-def main(base: Path) -> None:
+def main() -> None:
     """Build and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    base = parser.parse_args().base.expanduser().resolve()
+    if not (base / "tools" / "make" / "oot.mk").is_file():
+        parser.error(f"{base} is no checkout of bitcraze/crazyflie-firmware (no tools/make/oot.mk)")
     print("| image | flash / RAM / CCM | added to stock | left | deepest stack of the app, bytes "
           "|\n|---|---|---|---|---|")
     for platform in dict.fromkeys(platform for _, platform, _ in IMAGES):
@@ -88,6 +93,4 @@ def main(base: Path) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
-    main(parser.parse_args().base.expanduser().resolve())
+    main()

@@ -5,6 +5,7 @@
 Sums frames along the deepest chain of calls. Calls through pointers are not seen; libraries and recursions are not
 counted: their names are printed, add what they need. What follows a failed assertion is left out: the drone has
 stopped by then. CONFIG_APP_STACKSIZE (firmware/app/app-config) counts words of four bytes.
+host/docs/flash.md has the figures.
 """
 
 import argparse

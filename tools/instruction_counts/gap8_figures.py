@@ -7,7 +7,6 @@ in --out and not trained again (about seven minutes a row on two cores). --count
 """
 
 import json
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper import export
-from airtouch.errors import AirTouchError
+from airtouch.errors import in_one_line
 from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
@@ -185,8 +184,5 @@ def main(folder: Path | None, out: Path, counts: bool) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with in_one_line("gap8_figures"):
         main()
-    except AirTouchError as error:
-        click.echo(f"gap8_figures: {error}", err=True)
-        sys.exit(2)

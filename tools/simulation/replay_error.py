@@ -3,6 +3,7 @@
     python tools/simulation/replay_error.py    # a minute: eight simulated flights against five nominal ones
 
 Weak motors of 5 to 16 % and masses of 5 to 20 % are switched on in the scenario `diagnosis`, one a flight, and fitted.
+host/docs/looks.md has the figures.
 """
 
 import argparse
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.result import Diagnosis
@@ -63,4 +65,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("replay_error"):
+        main()
