@@ -280,14 +280,9 @@ def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
         raise SystemExit("--beside goes on from a model: give --start, and no --twin")
 
 
-def main() -> None:
-    """Print each row as soon as its last draw is done."""
-    options = arguments()
-    options.out.mkdir(parents=True, exist_ok=True)
-    listed = dataset.collect(options.folders, options.speed)
-    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
+def groups_of(options: argparse.Namespace, listed: Sequence[FlightFile],
+              readable: dict[Path, FlightLog]) -> list[Group]:
+    """The groups of all flights. Ends the program, with one line, where the options do not fit them."""
     names = sorted({group_of(file, options.by) for file in listed})
     check(options, names)
     models = [best.load(path) for path in options.start]
@@ -298,30 +293,40 @@ def main() -> None:
     beside = {g: twin_flights(twins[g], pools[g]) for g in twins}
     if options.beside:
         beside = dict.fromkeys(names, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
+    return [Group(name, [f for f in listed if group_of(f, options.by) == name], pools[name], starts.get(name),
+                  beside.get(name)) for name in names]
 
-    groups = [Group(name, [f for f in listed if group_of(f, options.by) == name], pools[name], starts.get(name),
-                    beside.get(name)) for name in names]
 
-    def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
-        """Print the row of a kind of training, over pairs of draw and seed."""
-        scores: list[FlightScore] = []
-        for draw, seed in draws:
-            for group in groups:
-                scores += scores_of(Training(kind, count, draw, seed), group, readable, options)
-        print(line(title, scores, len(draws)), flush=True)
+def rows_of(options: argparse.Namespace) -> Iterable[tuple[str, str, int]]:
+    """(title, kind of training, number of labelled flights) of each row of the table."""
+    if options.start:
+        yield "as it is", "start", 0
+    for count in options.labelled or COUNTS:
+        if options.start:
+            yield f"and {count} labelled", "labelled", count
+        if options.unlabelled:
+            yield f"and {count} labelled, the others without labels", "unlabelled", count
+        if options.alone_steps:
+            yield f"{count} labelled alone", "alone", count
 
+
+def main() -> None:
+    """Print each row as soon as its last draw is done."""
+    options = arguments()
+    options.out.mkdir(parents=True, exist_ok=True)
+    listed = dataset.collect(options.folders, options.speed)
+    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
+    if left_out:
+        raise SystemExit(f"not usable: {left_out[0][1]}")
+    groups = groups_of(options, listed, readable)
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "
           "| false before / over / behind |\n|---|---|---|---|---|---|---|---|---|", flush=True)
-    draws = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
-    if starts:
-        row("as it is", "start", 0, [(0, 0)])
-    for count in options.labelled or COUNTS:
-        if starts:
-            row(f"and {count} labelled", "labelled", count, draws)
-        if options.unlabelled:
-            row(f"and {count} labelled, the others without labels", "unlabelled", count, draws)
-        if options.alone_steps:
-            row(f"{count} labelled alone", "alone", count, draws)
+    for title, kind, count in rows_of(options):
+        draws = [(0, 0)] if kind == "start" else [(draw, seed) for draw in range(options.draws)
+                                                  for seed in range(options.seeds)]
+        scores = [score for draw, seed in draws for group in groups
+                  for score in scores_of(Training(kind, count, draw, seed), group, readable, options)]
+        print(line(title, scores, len(draws)), flush=True)
 
 
 if __name__ == "__main__":

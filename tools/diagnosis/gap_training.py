@@ -167,6 +167,29 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
                        cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0), off))
 
 
+def print_table(chains: Sequence[Sequence[tuple[str, Effects]]], group_names: Sequence[str], groups: Sequence[Flights],
+                options: argparse.Namespace) -> None:
+    """Print a row for each effect added, then one for the scenario's own.
+
+    chains: of each group, as `chain` gives it; a group's effects are tested on the next group's flights.
+    """
+    tested = [groups[(i + 1) % len(groups)] for i in range(len(groups))]
+    edges = sum(len(logs.true_edges(log)) for group in groups for log in group.values())
+    print(f"{sum(map(len, groups))} recorded flights, {edges} edges; {options.seeds} trainings a row, "
+          f"{options.steps} steps on {options.flights} flights\n\n| added to the simulator, found in folds "
+          f"{' / '.join(group_names)} | error, m | each training | missed, % | false/min | "
+          "balanced, % | spectra off, dB: before, over |\n|---|---|---|---|---|---|---|", flush=True)
+    for i in range(max(map(len, chains))):
+        names = [c[i][0] if i < len(c) else "-" for c in chains]
+        texts = [scene_text(c[min(i, len(c) - 1)][1]) for c in chains]
+        try:
+            cells = row(texts, tested, options)
+        except AirTouchError as error:
+            cells = f"not flown: {error} | | | | |"
+        print(f"| {names[0] if len(set(names)) == 1 else ' / '.join(names)} | {cells} |", flush=True)
+    print(f"| the scenario's own, set by hand | {row([simulated.SCENARIO] * len(tested), tested, options)} |")
+
+
 def main() -> None:
     """Diagnose, train, test, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -189,23 +212,8 @@ def main() -> None:
             store.unlink(missing_ok=True)
         chains.append(chain(diagnoses(group, store)))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
-    if options.diagnose:
-        return
-    tested = [groups[(i + 1) % len(groups)] for i in range(len(groups))]
-    edges = sum(len(logs.true_edges(log)) for group in groups for log in group.values())
-    print(f"{sum(map(len, groups))} recorded flights, {edges} edges; {options.seeds} trainings a row, "
-          f"{options.steps} steps on {options.flights} flights\n\n| added to the simulator, found in folds "
-          f"{' / '.join(group_names)} | error, m | each training | missed, % | false/min | "
-          "balanced, % | spectra off, dB: before, over |\n|---|---|---|---|---|---|---|", flush=True)
-    for i in range(max(map(len, chains))):
-        names = [c[i][0] if i < len(c) else "-" for c in chains]
-        texts = [scene_text(c[min(i, len(c) - 1)][1]) for c in chains]
-        try:
-            cells = row(texts, tested, options)
-        except AirTouchError as error:
-            cells = f"not flown: {error} | | | | |"
-        print(f"| {names[0] if len(set(names)) == 1 else ' / '.join(names)} | {cells} |", flush=True)
-    print(f"| the scenario's own, set by hand | {row([simulated.SCENARIO] * len(tested), tested, options)} |")
+    if not options.diagnose:
+        print_table(chains, group_names, groups, options)
 
 
 if __name__ == "__main__":
