@@ -87,7 +87,7 @@ def fft_instructions(source: Path, compiler: str, optimise: str) -> int:
 
 def main() -> None:
     """Print instructions of CMSIS-DSP's transforms beside those of one step of the pipeline."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sdist", type=Path, help="the archive, instead of a download")
     source = unpack(parser.parse_args().sdist)
     flight = made_flight()

@@ -101,7 +101,7 @@ def _flights(code: FlightCode, folder: Path) -> None:
 
 def main() -> None:
     """Count the instructions and memory of every kernel on one core."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--core", default="cortex-m4", choices=["cortex-m4", "rv32imc"])
     parser.add_argument("--optimise", default="-O2")
     parser.add_argument("--compiler", choices=["zig", "gcc"])

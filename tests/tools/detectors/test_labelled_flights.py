@@ -12,6 +12,7 @@ from airtouch.errors import AirTouchError
 from airtouch.twin import adapt
 from made_flight import SMALL, made_flight
 from tools.detectors import labelled_flights
+from tools.detectors.labelled import training
 
 
 @pytest.fixture
@@ -147,7 +148,7 @@ def test_false_edges_are_counted_by_place():
 
 def test_smaller_draws_lie_within_larger_ones():
     pool = [made_flight(0, 500) for _ in range(9)]
-    small, large = (labelled_flights.draw_flights(pool, k, draw=3) for k in (2, 5))
+    small, large = (training.draw_flights(pool, k, draw=3) for k in (2, 5))
     assert all(any(a is b for b in large) for a in small)
     with pytest.raises(AirTouchError, match="ask for fewer"):
-        labelled_flights.draw_flights(pool, 10, 0)
+        training.draw_flights(pool, 10, 0)
