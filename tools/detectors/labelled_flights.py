@@ -22,8 +22,8 @@ from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.data.dataset import FlightFile
-from airtouch.detector.evaluation.score import FlightScore, WindowCounts
-from airtouch.detector.evaluation.summary import summarise
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.summary import one_a_flight, summarise
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.flight_log import FlightLog
 from airtouch.twin import adapt
@@ -39,23 +39,6 @@ def group_of(file: FlightFile, by: str) -> str:
     if known is None:
         raise AirTouchError(f"{file.path}: no {'fold' if by == 'halves' else 'day'} in the manifest beside it")
     return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
-
-
-def merge(scores: Iterable[FlightScore]) -> list[FlightScore]:
-    """One score a flight, with the edges, false detections and minutes of all its draws."""
-    flights: dict[str, list[FlightScore]] = {}
-    for score in scores:
-        flights.setdefault(score.file, []).append(score)
-    return [_merge(name, draws) for name, draws in flights.items()]
-
-
-def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
-    """The scores of several draws of one flight as one."""
-    windows = WindowCounts(*(sum(counts) for counts in zip(*(s.windows for s in scores), strict=True)))
-    return FlightScore(name, scores[0].condition, tuple(e for s in scores for e in s.edges),
-                       tuple(e for s in scores for e in s.false or ()), sum(s.detections for s in scores),
-                       sum(s.airborne_s for s in scores), windows,
-                       np.sum([s.bins for s in scores], axis=0))
 
 
 def missed_by_height(scores: Sequence[FlightScore]) -> str:
@@ -82,7 +65,7 @@ def false_by_place(scores: Sequence[FlightScore]) -> str:
 
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
-    figures: dict[str, Any] = summarise(merge(scores))
+    figures: dict[str, Any] = summarise(one_a_flight(scores))
 
     def text(name: str, scale: float, digits: int) -> str:
         """A figure times `scale` with its interval."""

@@ -23,7 +23,6 @@ import argparse
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -35,8 +34,8 @@ from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
-from airtouch.detector.evaluation.score import FlightScore, WindowCounts
-from airtouch.detector.evaluation.summary import summarise
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.summary import one_a_flight, summarise
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs.files import write_bytes
@@ -133,14 +132,6 @@ def train(text: str, seed: int, options: argparse.Namespace) -> Any:
     return best.load(path)
 
 
-def together(runs: Sequence[Sequence[FlightScore]]) -> list[FlightScore]:
-    """Scores of several trainings on the same flights as one a flight, so that a flight is drawn whole."""
-    return [replace(same[0], edges=sum((s.edges for s in same), ()), false=sum((s.false for s in same), ()),
-                    detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),
-                    windows=WindowCounts(*np.sum([s.windows for s in same], axis=0).tolist()),
-                    bins=np.sum([s.bins for s in same], axis=0)) for same in zip(*runs, strict=True)]
-
-
 def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Namespace) -> str:
     """Cells of one row: scenario texts, one a group of flights tested with it, all seeds."""
     runs, differences = [], []
@@ -152,7 +143,7 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
             differences.append(apart_db(training_flights(text, options.flights, seed, options.out),
                                         list(flights.values())))
         runs.append(run)
-    figures = summarise(together(runs))
+    figures = summarise(one_a_flight(score for run in runs for score in run))
     each = [summarise(r, replicates=2)["mean_abs_error_m"] for r in runs]
     seeds = ", ".join("-" if x is None else f"{x:.3f}" for x in each)
 

@@ -122,15 +122,6 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
             "--out", tmp_path / "out")
 
 
-def test_draws_of_a_flight_add_up():
-    edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
-    score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
-    both = labelled_flights.merge([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
-    assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
-        ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
-    assert both[0].windows == (2, 4, 6, 8)
-
-
 def test_missed_edges_are_counted_by_height():
     hit_edge, missed_edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
     low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)

@@ -8,8 +8,6 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
-from airtouch.detector.evaluation.score import EdgeScore, FlightScore
-from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.named_effects import with_random_part
 from airtouch.gap.result import NamedEffect, Quantity
@@ -61,29 +59,6 @@ def test_no_flight_is_in_two_groups():
     for day_groups in (["01", "123", "4"], ["01", "23"]):
         with pytest.raises(AirTouchError, match="fold"):
             gap_training.cut(flights, day_groups)
-
-
-def _scores(seed):
-    rng = np.random.default_rng(seed)
-    edges = [tuple(EdgeScore("entry", 100, 90, "entry", 0.1, float(e)) if e > 0 else EdgeScore("entry", 100)
-                   for e in rng.normal(0.05, 0.05, 4)) for _ in range(12)]
-    return [FlightScore(f"{i}", Condition(), e, tuple(range(rng.integers(0, 3))), 5, 30.0, (3, 4, 5, 9))
-            for i, e in enumerate(edges)]
-
-
-def test_two_equal_trainings_say_no_more_than_one():
-    """Flights are drawn whole: the same scores twice leave figures and intervals as they are."""
-    once = _scores(1)
-    twice = gap_training.together([once, once])
-    for name in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy"):
-        assert summarise(twice)[name] == pytest.approx(summarise(once)[name])
-        assert summarise(twice)["intervals"][name] == pytest.approx(summarise(once)["intervals"][name])
-
-
-def test_trainings_are_averaged_by_edge():
-    first, second = _scores(1), _scores(2)
-    distances = [abs(e.error_m) for s in (*first, *second) for e in s.edges if e.error_m is not None]
-    assert summarise(gap_training.together([first, second]))["mean_abs_error_m"] == pytest.approx(np.mean(distances))
 
 
 def test_half_the_swing_is_six_decibels_apart(tmp_path):
