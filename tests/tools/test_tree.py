@@ -58,6 +58,11 @@ def test_every_script_and_every_package_is_in_the_list_of_tools():
     assert there - listed == set()
 
 
+def test_the_top_of_tools_holds_what_make_runs_and_what_is_called_by_path():
+    run = set(re.findall(r"tools/(\w+\.py)", (ROOT / "Makefile").read_text("utf-8")))
+    assert {path.name for path in (ROOT / "tools").glob("*.py")} == run | {"gap_real.py"}
+
+
 def test_no_folder_of_tools_holds_more_than_a_reader_overlooks():
     folders = [path for path in [ROOT / "tools", *(ROOT / "tools").glob("*/")] if path.name != "__pycache__"]
     assert len(folders) > 8 and {f.name: n for f in folders if (n := len(list(f.glob("*.py")))) > 14} == {}

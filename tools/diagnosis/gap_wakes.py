@@ -44,14 +44,13 @@ from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing import gates, overhead
 from airtouch.gap.passing.bursts import UNSTEADY_YAW
 from airtouch.gap.passing.one_sided import DOWNWARD
-from airtouch.gap.sealed.intervals import auroc
+from airtouch.gap.sealed.intervals import auroc, share_text
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
 from airtouch.logs import read
 from recordings import cases, swarm_cuts
 from recordings.folder import add_folder, check_folder
-from recordings.shares import share_text
 
 LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number
 LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number

@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
 from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
-from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.sealed.make import VEHICLE, stripped
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
@@ -65,8 +65,7 @@ def _cases(scene: str, flights: int, seed: int) -> Iterator[tuple[str, FlightLog
 def share(rows: list[tuple[str, str, float]]) -> str:
     """How many first answers are right, and the interval of their share."""
     hits = sum(interchangeable(truth, first) for truth, first, _ in rows)
-    interval = wilson(hits, len(rows))
-    return f"{hits} of {len(rows)} [{interval['low']:.0%}, {interval['high']:.0%}]"
+    return share_text(hits, len(rows))
 
 
 def main() -> None:

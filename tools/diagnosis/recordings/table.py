@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.signatures.alike import interchangeable
 
 from . import swarm_lift
 from .crazypad import figures as pad
-from .shares import share_text
 
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 
