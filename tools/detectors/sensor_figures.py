@@ -31,7 +31,7 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
         if table.get("in_training"):
             raise AirTouchError(f"{path}: the model was trained on these flights; score others")
         return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise AirTouchError(f"{path}: not the JSON of tools/detectors/choose_decoder.py or `airtouch evaluate`: "
                             f"{error}") from None
 
@@ -43,6 +43,8 @@ def main() -> None:
                         help="all, and each sensor that may be missing")
     parser.add_argument("--out", type=Path, default=FILE)
     options = parser.parse_args()
+    if odd := [pair for pair in options.pairs if pair.count("=") != 2]:
+        parser.error(f"{odd[0]} is not NAME=JSON=WHERE")
     content = {name: figures(Path(path), where) for name, path, where in (pair.split("=") for pair in options.pairs)}
     if set(content) != {"all", *sensors.SENSORS}:
         raise SystemExit(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
