@@ -137,6 +137,7 @@ def understood_by_tool(arguments: list[str], path: Path, typed: bool, monkeypatc
     monkeypatch.setattr(click.Command, "main", main)
     monkeypatch.setattr(sys, "argv", [str(path), *arguments])
     monkeypatch.syspath_prepend(ROOT if module else path.parent)  # as Python does
+    monkeypatch.delitem(sys.modules, module, raising=False)  # which another test has imported
     with pytest.raises(Understood):
         if module:
             runpy.run_module(module, run_name="__main__")

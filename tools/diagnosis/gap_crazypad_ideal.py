@@ -32,8 +32,7 @@ from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
-from recordings.crazypad import figures as pad
-from recordings.crazypad import labels
+from recordings.crazypad import figures, labels
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
@@ -109,15 +108,18 @@ def relative(rows: list[dict[str, str]], numbers: np.ndarray) -> Table:
     return Table(rows, numbers - np.array([numbers[labels.baseline(rows, i)].mean(axis=0) for i in range(len(rows))]))
 
 
-#: name -> classifier of labels; discriminants take each label as equally likely
+def discriminant(classes: np.ndarray) -> LinearDiscriminantAnalysis:
+    """A linear discriminant that takes each class as equally likely."""
+    count = len(set(classes))
+    return LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(count, 1.0 / count))
+
+
+#: name -> classifier, made for the classes (flights,) that it learns
 LEARNERS: dict[str, Callable] = {
-    "discriminant on the balance": lambda labels: LinearDiscriminantAnalysis(
-        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
-    "discriminant on all numbers": lambda labels: LinearDiscriminantAnalysis(
-        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
-    "forest on all numbers": lambda labels: RandomForestClassifier(
+    "discriminant on the balance": discriminant, "discriminant on all numbers": discriminant,
+    "forest on all numbers": lambda _: RandomForestClassifier(
         TREES, class_weight="balanced_subsample", random_state=0),
-    "nearest flight, all numbers": lambda labels: KNeighborsClassifier(1)}
+    "nearest flight, all numbers": lambda _: KNeighborsClassifier(1)}
 #: name -> regression of the millimetres cut
 MEASURES: dict[str, Callable] = {
     "discriminant on the balance": lambda: Ridge(1.0), "discriminant on all numbers": lambda: Ridge(RIDGE),
@@ -164,14 +166,14 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
     for learner in LEARNERS:
         cases = cross_validate(table, folds, learner)
         cells = []
-        for figure in (pad.balanced_accuracy, _damage_right, pad.exact_rotors, pad.severity):
-            cells.append(pad.with_interval(cases, figure))
+        for figure in (figures.balanced_accuracy, _damage_right, figures.exact_rotors, figures.severity):
+            cells.append(figures.with_interval(cases, figure))
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
 
 
 def _damage_right(cases: list[dict]) -> float:
     """Share of flights with rotor damage that are called so."""
-    right = [pad.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
+    right = [figures.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
     return float(np.mean(right)) if right else float("nan")
 
 

@@ -12,7 +12,7 @@ from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.signatures.alike import interchangeable
 
 from . import swarm_lift
-from .crazypad import figures as pad
+from .crazypad import figures as crazypad
 
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 
@@ -20,7 +20,7 @@ COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, 
 def answer(case: dict) -> str:
     """What a diagnosis says first, in the words of its row's truths."""
     if case["row"] == "crazypad":
-        return pad.answer(case)[0]
+        return crazypad.answer(case)[0]
     if case["verdict"] != "effect":
         return case["verdict"]
     first = case["effects"][0]
@@ -68,8 +68,9 @@ def print_table(cases: list[dict], folder: Path) -> None:
         print(f"{len(seconds)} diagnoses: {middle:.0f} s in the middle, {most:.0f} s at most in nine of ten")
     pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
     if pads:
-        figures = {"family, balanced": pad.balanced_accuracy, "only damaged rotors named": pad.only_damaged_rotors,
-                   "severity, Spearman": pad.severity}
+        figures = {"family, balanced": crazypad.balanced_accuracy,
+                   "only damaged rotors named": crazypad.only_damaged_rotors,
+                   "severity, Spearman": crazypad.severity}
         for text, figure in figures.items():
-            low, high = pad.interval(pads, figure)
+            low, high = crazypad.interval(pads, figure)
             print(f"CrazyPAD, {len(pads)} flights: {text} {figure(pads):.2f} (90 % interval {low:.2f} to {high:.2f})")
