@@ -99,6 +99,15 @@ def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(mon
     assert len(infer(library(), values).classes) == 1
 
 
+@pytest.mark.parametrize(("second", "named"), [(45.0, {"mass", "wind"}), (20.0, {"mass"})])
+def test_two_effects_may_be_behind_something_without_a_name_by_a_fraction_of_what_the_second_gains(second, named):
+    """What has no name lies along the second effect and one axis more, of which 50 nats are in the flight."""
+    nameless = np.eye(Q)[:, [1, 7]] / np.sqrt(2.0)
+    of = replace(library(), model=replace(library().model, nameless=nameless))
+    values = noise() + 48.0 * np.eye(Q)[0] + second * np.eye(Q)[1] + 10.0 * np.eye(Q)[7]
+    assert {c.name for c in infer(of, values[None]).classes} == named
+
+
 def test_the_mean_of_flights_is_as_one_of_less_noise():
     """Four flights: evidence is that of one whose noise is half as large, whose shift is twice as long."""
     way = np.eye(Q)[0]
@@ -234,3 +243,32 @@ def test_effects_are_not_refitted_to_something_less_likely():
                             for c, s in zip(model.classes, (60.0, 40.0), strict=True)])
     assert flight.refitted(whole) is whole
     assert flight.with_two(*model.classes).level == pytest.approx(whole.level - 0.5 * 10.0 ** 2, abs=0.5)
+
+
+def test_a_third_effect_is_added_only_where_two_do_not_suffice(monkeypatch):
+    """Two effects with a weak third: the two lie within what right names leave, until the third is strong."""
+    monkeypatch.setattr(inference, "OVER_NAMELESS", -np.inf)
+    for size, count in ((6.5, 2), (30.0, 3)):
+        values = noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1] + size * np.eye(Q)[2]
+        wide = replace(library(), nameless_share=np.full(len(NAMES), 0.05))
+        result = infer(wide, values[None])
+        assert len(result.classes) == count
+        assert not result.against.is_too_much
+
+
+def test_names_of_one_thing_count_together():
+    """Mass and thrust coefficient are one thing: together likelier than another effect that is a little ahead of each.
+
+    The classes differ by how long they may be: each is fitted to the same shift.
+    """
+    one = library().model.classes[0]
+    names = ["mass", "thrust_coefficient", "battery_sag"]
+    spread = [one.knots, one.knots, one.knots + np.array([0.1, *np.zeros(len(one.knots) - 1)])]  # shorter: likelier
+    classes = tuple(replace(one, name=n, effect=n, knots=k) for n, k in zip(names, spread, strict=True))
+    shares = {k: np.zeros(3) for k in ("nameless_share", "second_share", "distance_scatter")}
+    alike = replace(library(), model=replace(library().model, classes=classes), **shares)
+    values = (noise() + 45.0 * np.eye(Q)[0])[None]
+    result = infer(alike, values)
+    assert result.likeliest == "battery_sag"
+    assert [c.effect for c in result.classes] == ["mass"]
+    assert [c.effect for c in infer(alike.without(["mass"]), values).classes] == ["battery_sag"]

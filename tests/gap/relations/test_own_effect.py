@@ -62,7 +62,7 @@ def test_a_gyro_that_reads_too_much_is_the_likeliest_class_of_its_flights_and_si
         flight = FlightHypotheses(learned.coordinates(fly(scene, number, [Active(effect, {"share": share})])[None])[0],
                                   learned.model)
         first = flight.single_effects()[0]
-        assert first.effects == {effect.name}
+        assert first.effect_names == (effect.name,)
         (amount,), (deviation,) = own.readout(first.fits[0].strength)
         assert 0.05 * amount == pytest.approx(share, rel=0.4) and abs(0.05 * amount - share) < 3.0 * 0.05 * deviation
     nothing = FlightHypotheses(learned.coordinates(fly(scene, 7003)[None])[0], learned.model)

@@ -70,7 +70,7 @@ class EffectClass:
 
     def mean(self, strength: np.ndarray) -> np.ndarray:
         """Expected shift (n, Q) at strengths (n, parameters), in units of the class."""
-        parts, hats = _parts(strength, self.signed), _hats(np.linalg.norm(strength, axis=1), self.knots)
+        parts, hats = _parts(strength, self.signed), _hats(_size(strength), self.knots)
         together = parts[:, :, None] * hats[:, None]
         return together.reshape(len(strength), -1) @ self.table.reshape(together[0].size, -1)
 
@@ -83,15 +83,20 @@ class EffectClass:
         return strength, self.mean(strength)
 
 
+def _size(strength: np.ndarray) -> np.ndarray:
+    """Lengths (n,) of strengths (n, parameters)."""
+    return np.abs(strength[:, 0]) if strength.shape[1] == 1 else np.linalg.norm(strength, axis=1)
+
+
 def _parts(strength: np.ndarray, signed: bool) -> np.ndarray:
     """What multiplies each part of a curve (n, parts)."""
-    return np.column_stack([strength, np.linalg.norm(strength, axis=1)]) if signed else strength
+    return np.column_stack([strength, _size(strength)]) if signed else strength
 
 
 def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Weights (n, k) of the knots at strengths (n,): straight lines in the logarithm, constant outside."""
-    x = np.clip(np.log(np.maximum(size, SMALLEST)), knots[0], knots[-1])
-    left = np.clip(np.searchsorted(knots, x) - 1, 0, len(knots) - 2)
+    x = np.minimum(np.maximum(np.log(np.maximum(size, SMALLEST)), knots[0]), knots[-1])
+    left = np.minimum(np.maximum(np.searchsorted(knots, x) - 1, 0), len(knots) - 2)
     share = (x - knots[left]) / (knots[left + 1] - knots[left])
     out = np.zeros((len(x), len(knots)))
     place = np.arange(len(x))

@@ -48,9 +48,9 @@ class Hypothesis:
         return tuple(f.of.name for f in self.fits)
 
     @property
-    def effects(self) -> frozenset[str]:
-        """Names of the effects in the registry."""
-        return frozenset(f.of.effect for f in self.fits)
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the classes' effects in the registry, in their order."""
+        return tuple(f.of.effect for f in self.fits)
 
     @cached_property
     def shift(self) -> np.ndarray:

@@ -14,7 +14,7 @@ from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import SEEN
-from airtouch.gap.signatures.alike import interchangeable
+from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
 
 Answer = Mapping[str, Any]  #: a diagnosis as JSON
@@ -96,7 +96,7 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     return {
         "flights": len(key.flights), "diagnosed": len(answers), "effects": len({e.name for e in single.values()}),
         "top_1": share(sheet.is_first.values()), "top_3": share(sheet.in_first_three.values()),
-        "exact": share(_same(_named(answers.get(n)), [e.name]) for n, e in single.items()),
+        "exact": share(same_things(_named(answers.get(n)), [e.name]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
         "unknown": unknown(sheet), "shrink": shrink(sheet), "parameters": parameters(sheet),
@@ -150,7 +150,7 @@ def of_flights_without_effect(sheet: Sheet) -> dict[str, Any]:
 def of_pairs(sheet: Sheet) -> dict[str, Any]:
     """pairs_exact: flights with two effects of which both are named and nothing else; pairs_one_right: one or both."""
     named = {n: _named(sheet.full_registry.get(n)) for n in sheet.pairs}
-    return {"pairs_exact": share(_same(named[n], e) for n, e in sheet.pairs.items()),
+    return {"pairs_exact": share(same_things(named[n], e) for n, e in sheet.pairs.items()),
             "pairs_one_right": share(any(interchangeable(a, b) for a in named[n] for b in e)
                                      for n, e in sheet.pairs.items())}
 
@@ -276,17 +276,6 @@ def _verdict(case: Answer | None) -> str:
 def _named(case: Answer | None) -> list[str]:
     """Names of the effects that a diagnosis names; empty without one."""
     return [f["name"] for f in case["effects"]] if case else []
-
-
-def _same(named: Sequence[str], true: Sequence[str]) -> bool:
-    """Whether two lists of effects hold the same, names of one thing counted as one."""
-    left = list(true)
-    for n in named:
-        match = next((t for t in left if interchangeable(n, t)), None)
-        if match is None:
-            return False
-        left.remove(match)
-    return not left
 
 
 def _chance(case: Answer, name: str) -> float:

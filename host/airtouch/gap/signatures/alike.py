@@ -55,6 +55,17 @@ def interchangeable(one: str, other: str) -> bool:
     return one == other or (alike is not None and other in alike.effects)
 
 
+def same_things(names: Sequence[str], others: Sequence[str]) -> bool:
+    """Whether two lists of effects stand for the same things in these logs, whatever their order."""
+    left = list(others)
+    for name in names:
+        same = next((other for other in left if interchangeable(name, other)), None)
+        if same is None:
+            return False
+        left.remove(same)
+    return not left
+
+
 def confusion_among(names: Sequence[str]) -> Confusion:
     """What tells effects from one another, or first those of them that are names of one thing, as the first is."""
     first = names_alike(names[0])
