@@ -19,8 +19,9 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
 
 #: files that take longest, in this order: begun first, so that no worker is left with one of them at the end
-LONGEST = ("test_blind.py", "test_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
-           "test_user_effect.py", "test_adapt.py", "test_crazypad_ideal.py", "test_overhead.py", "test_own_effect.py")
+LONGEST = ("test_blind.py", "test_gap_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
+           "test_user_effect.py", "test_adapt.py", "test_gap_crazypad_ideal.py", "test_overhead.py",
+           "test_own_effect.py")
 
 pytest_make_collect_report = skips.pytest_make_collect_report
 pytest_runtest_makereport = skips.pytest_runtest_makereport

@@ -22,6 +22,7 @@ from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.paper.features import flight_features
 from airtouch.detector.shared.channels import nine_channels
+from airtouch.errors import in_one_line
 from airtouch.kernels.network import run_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
@@ -190,4 +191,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("bench"):
+        main()

@@ -1,6 +1,6 @@
 """Simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
-    .venv/bin/python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
+    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.
@@ -8,7 +8,7 @@ RotorPy (extra `bench`) flies its Crazyflie in a closed loop with its own contro
 it has no batch of its own without PyTorch. crazyflow (JAX, 1.2 GB, not among AirTouch's packages)
 flies 64 worlds on all cores, without sensors, log or effects: `--crazyflow` names the Python that has
 it, made with `python -m venv crazyflow && crazyflow/bin/pip install crazyflow==0.4.0`. Three rounds in
-turn, medians.
+turn, medians. host/docs/simulation-checks.md has the figures.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
@@ -81,6 +82,29 @@ def crazyflow_rates(python: str | None) -> dict[str, list[float]]:
     return json.loads(run.stdout.splitlines()[-1]) if run.returncode == 0 else {}
 
 
+def figures_of(own: list[dict[str, Any]], other: list[dict[str, Any]], rotorpy: list[float],
+               crazyflow: list[dict[str, list[float]]]) -> dict[str, Any]:
+    """Medians over rounds of the rates, and of their ratios to the peers' of the same round.
+
+    own, other: of `measure` with every effect and with none; rotorpy, crazyflow: the peers' rates, empty without them.
+    """
+    figures = {**own[-1], "first_flight_s": own[0]["first_flight_s"]}
+    for k, unit in enumerate(("wall_s", "cpu_s")):
+        rate = f"simulated_s_per_{unit}"
+        figures[rate] = statistics.median(r[rate] for r in own)
+        figures[f"no_effects_s_per_{unit}"] = statistics.median(r[rate] for r in other)
+        for name in crazyflow[0]:
+            figures[f"crazyflow_{name}_s_per_{unit}"] = statistics.median(r[name][k] for r in crazyflow)
+            for label, ours in (("", own), ("no_effects_", other)):
+                figures[f"{label}times_crazyflow_{name}_{unit}"] = round(statistics.median(
+                    r[rate] / c[name][k] for r, c in zip(ours, crazyflow, strict=True)), 2)
+    if rotorpy:
+        figures["rotorpy_s_per_wall_s"] = round(statistics.median(rotorpy), 2)
+        figures["times_rotorpy"] = round(statistics.median(
+            r["simulated_s_per_wall_s"] / peer for r, peer in zip(own, rotorpy, strict=True)))
+    return figures
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -95,21 +119,8 @@ def main() -> None:
         other.append(measure(options.flights, options.workers, on=False))
         rotorpy.append(rotorpy_rate())
         crazyflow.append(crazyflow_rates(options.crazyflow))
-    figures = {**own[-1], "first_flight_s": own[0]["first_flight_s"]}
-    for k, unit in enumerate(("wall_s", "cpu_s")):
-        rate = f"simulated_s_per_{unit}"
-        figures[rate] = statistics.median(r[rate] for r in own)
-        figures[f"no_effects_s_per_{unit}"] = statistics.median(r[rate] for r in other)
-        for name in crazyflow[0]:
-            figures[f"crazyflow_{name}_s_per_{unit}"] = statistics.median(r[name][k] for r in crazyflow)
-            for label, ours in (("", own), ("no_effects_", other)):
-                figures[f"{label}times_crazyflow_{name}_{unit}"] = round(statistics.median(
-                    r[rate] / c[name][k] for r, c in zip(ours, crazyflow, strict=True)), 2)
     peers = [rate for rate in rotorpy if rate is not None]
-    if peers:
-        figures["rotorpy_s_per_wall_s"] = round(statistics.median(peers), 2)
-        figures["times_rotorpy"] = round(statistics.median(
-            r["simulated_s_per_wall_s"] / peer for r, peer in zip(own, peers, strict=True)))
+    figures = figures_of(own, other, peers, crazyflow)
     print("\n".join(f"{key}: {value}" for key, value in figures.items()))
     if not peers:
         print("RotorPy is not installed (extra 'bench'), so it is not compared")
@@ -122,4 +133,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("bench_simulation"):
+        main()

@@ -29,16 +29,16 @@ from pathlib import Path
 
 from fuzzing.fuzz_build import BUILD, FUZZ, LONG, ROOT, build, engine, product_sources, targets
 
-SEEDS = FUZZ / "seeds"  # archives of inputs, one for each target, in git
-# Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
-# says it.
+SEEDS = FUZZ / "seeds"  #: archives of inputs, one for each target, in git
+#: Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
+#: says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
            "ASAN_OPTIONS": "quarantine_size_mb=2:thread_local_quarantine_size_kb=64:malloc_context_size=0"}
-LONGEST = 2048  # bytes of an input; no source: round number, a few packets or some ten samples
-TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
-BATCH = 50_000  # inputs that are run with one seed, and counted together; no source: round number, minutes of work
-SEED_BYTES = 9_000  # of a target's seeds in git, at most, with what the archive needs for each; no source: for size
-ENTRY_BYTES = 110  # of the archive
+LONGEST = 2048  #: bytes of an input; no source: round number, a few packets or some ten samples
+TIMEOUT = 20  #: seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
+BATCH = 50_000  #: inputs that are run with one seed, and counted together; no source: round number, minutes of work
+SEED_BYTES = 9_000  #: of a target's seeds in git, at most, with what the archive needs for each; no source: for size
+ENTRY_BYTES = 110  #: of the archive
 
 
 @dataclass(frozen=True)

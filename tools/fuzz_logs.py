@@ -7,7 +7,7 @@
 Prints per format the number of inputs, logs, refusals and failures, and the worst time and memory.
 Exit code 1 when anything failed. One input is known by seed, format and number: the last line of a
 failure is the command that repeats it, and --first goes on where a run ended. With --shapes, files made
-to cost time or memory, so many samples, lines or parts long, go the same way.
+to cost time or memory, so many samples, lines or parts long, go the same way. host/docs/fuzzing.md says what was found.
 """
 
 import argparse

@@ -24,16 +24,16 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).with_name("diagnosis")))  # Python itself puts only this script's folder there
 
 from airtouch import vehicle as vehicles
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
-from gap_real_table import answer, print_table
-from recorded_cases import DEFAULT_ROWS, ROWS, Case, with_partners
+from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners
+from diagnosis.recordings.folder import add_folder, check_folder
+from diagnosis.recordings.table import answer, print_table
 
 #: (row, truth) -> flights of --quick
 QUICK = {("swarm", "ground_effect"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
@@ -96,8 +96,7 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
 def main(arguments: list[str] | None = None) -> int:
     """Diagnose the cases that the options name, and print the table; 1 where --quick has too many wrong ones."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
+    add_folder(parser, name="flights")
     parser.add_argument("--part", choices=("build", "view", "all"), default="build")
     parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=DEFAULT_ROWS)
     parser.add_argument("--jobs", type=int, default=2)
@@ -107,6 +106,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
+    for data_set in {data_set for row in args.rows for data_set in DATA_SETS[row]}:
+        check_folder(parser, args.flights / data_set)
     if args.quick:  # of the parts for building, and two peers
         cases = quick([c for row in DEFAULT_ROWS
                        for c in ROWS[row](args.flights, "view" if row == "peers" else "build")])
@@ -125,4 +126,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with in_one_line("gap_real"):
+        sys.exit(main())

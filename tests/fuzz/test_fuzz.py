@@ -8,8 +8,8 @@ import subprocess
 
 import pytest
 
-import fuzz
-from fuzzing import fuzz_build
+from tools import fuzz
+from tools.fuzzing import fuzz_build
 
 MUTATIONS = 300
 #: Defects by target: a source, what stands there and what is put in its place.

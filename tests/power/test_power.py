@@ -156,7 +156,8 @@ def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):
 
 
 def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():
-    budget, gap8 = (stages.counts(ROOT / "tests" / "emulation" / f"{name}.toml") for name in ("budget", "gap8_budget"))
+    folder = ROOT / "tools" / "instruction_counts"
+    budget, gap8 = (stages.counts(folder / f"{name}.toml") for name in ("budget", "gap8_budget"))
     estimates = stages.estimate(budget, gap8)
     load = budget["cortex-m4"]["band_power"]["instructions_mean"] * 100 / 168e6  # share of the core at a cycle each
     assert estimates["FC-FE"].low_mw == pytest.approx(load * 20 * 3.7)

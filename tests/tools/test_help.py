@@ -1,12 +1,16 @@
-"""Every script of tools starts, finds what it imports, and says what it does."""
+"""Every script and every module of tools that is run starts, finds what it imports, and says what it does."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 TOOLS = Path(__file__).parents[2] / "tools"
-SCRIPTS = sorted(p for p in TOOLS.rglob("*.py") if "__name__ == \"__main__\"" in p.read_text("utf-8")
-                 and not (p.parent / "__init__.py").exists())
+RUN_AS = '__name__ == "__main__"'  #: in each file that is run
+#: files that are run by their path, and names of modules that are run with `python -m`
+SCRIPTS = sorted(map(str, (p for p in TOOLS.rglob("*.py") if RUN_AS in p.read_text("utf-8")
+                           and not (p.parent / "__init__.py").exists())))
+MODULES = sorted(".".join(p.relative_to(TOOLS.parent).with_suffix("").parts).removesuffix(".__main__")
+                 for p in TOOLS.rglob("*.py") if RUN_AS in p.read_text("utf-8") and (p.parent / "__init__.py").exists())
 #: runs scripts one after another in one process, as each of them imports much of the same
 RUN = """
 import io, runpy, sys
@@ -14,10 +18,10 @@ from contextlib import redirect_stdout
 from pathlib import Path
 for path in sys.argv[1:]:
     sys.argv, here, said = [path, "--help"], list(sys.path), io.StringIO()
-    sys.path.insert(0, str(Path(path).parent))
+    sys.path[0] = str(Path(path).parent) if path.endswith(".py") else ""  # as Python does
     try:
         with redirect_stdout(said):
-            runpy.run_path(path, run_name="__main__")
+            (runpy.run_path if path.endswith(".py") else runpy.run_module)(path, run_name="__main__")
     except SystemExit as stop:
         print(path, 0 if stop.code in (0, None) and said.getvalue().lower().startswith("usage:") else 1)
     except Exception as error:
@@ -27,8 +31,8 @@ for path in sys.argv[1:]:
 
 
 def test_every_script_has_a_help_text():
-    run = subprocess.run([sys.executable, "-c", RUN, *map(str, SCRIPTS)], capture_output=True, text=True,
+    run = subprocess.run([sys.executable, "-c", RUN, *SCRIPTS, *MODULES], capture_output=True, text=True,
                          cwd=TOOLS.parent)
     answers = dict(line.split(" ", 1) for line in run.stdout.splitlines())
-    assert len(SCRIPTS) > 30 and set(answers) == set(map(str, SCRIPTS)), run.stderr[-1000:]
+    assert len(SCRIPTS) > 30 and len(MODULES) > 3 and set(answers) == {*SCRIPTS, *MODULES}, run.stderr[-1000:]
     assert {path: answer for path, answer in answers.items() if answer != "0"} == {}

@@ -110,10 +110,13 @@ class Understood(Exception):
     """The arguments fit, and the program would begin."""
 
 
-def understood_by_tool(arguments: list[str], path: Path, typed: bool, monkeypatch) -> None:
-    """Run a tool up to the point where it has parsed its arguments. One that is mentioned without any only exists."""
+def understood_by_tool(arguments: list[str], path: Path, typed: bool, monkeypatch, module: str = "") -> None:
+    """Run a tool, as a script or as a module, up to the point where it has parsed its arguments.
+
+    One that is mentioned without any only exists.
+    """
     source = path.read_text("utf-8")
-    assert re.search(r"argparse|import click|crazypad", source), f"{path} has no --help"
+    assert re.search(r"argparse|import click|folder_and_part", source), f"{path} has no --help"
     if not any(arguments) and not typed:
         return
 
@@ -133,8 +136,13 @@ def understood_by_tool(arguments: list[str], path: Path, typed: bool, monkeypatc
         monkeypatch.setattr(argparse.ArgumentParser, name, parsing(getattr(argparse.ArgumentParser, name)))
     monkeypatch.setattr(click.Command, "main", main)
     monkeypatch.setattr(sys, "argv", [str(path), *arguments])
+    monkeypatch.syspath_prepend(ROOT if module else path.parent)  # as Python does
+    monkeypatch.delitem(sys.modules, module, raising=False)  # which another test has imported
     with pytest.raises(Understood):
-        runpy.run_path(str(path), run_name="__main__")
+        if module:
+            runpy.run_module(module, run_name="__main__")
+        else:
+            runpy.run_path(str(path), run_name="__main__")
 
 
 def understood_by_python(command: Command, page: Path, monkeypatch) -> None:
@@ -150,7 +158,7 @@ def understood_by_python(command: Command, page: Path, monkeypatch) -> None:
         if rest[0] == "airtouch":
             understood(Command(("airtouch", *rest[1:]), command.typed), page, monkeypatch)
         else:
-            understood_by_tool(rest[1:], path, command.typed, monkeypatch)
+            understood_by_tool(rest[1:], path, command.typed, monkeypatch, rest[0])
     elif first.startswith("tools/"):
         understood_by_tool(rest, ROOT / first, command.typed, monkeypatch)
     elif first != "-m":

@@ -36,9 +36,7 @@ def test_a_file_that_a_run_left_is_seen(tmp_path):
     assert strangers(tmp_path) == {"crash-1-0"}
 
 
-#: folders of tests that mirror none: that of tools/instruction_counts and tools/firmware_emulation, and the fuzz
-#: targets of all C
-OWN = {"emulation", "fuzz"}
+OWN = {"fuzz"}  #: folders of tests that mirror none: the fuzz targets of all C
 
 
 def test_a_folder_of_tests_is_named_as_the_folder_that_it_tests():
@@ -52,15 +50,17 @@ def test_no_folder_of_tests_holds_more_than_a_reader_overlooks():
     assert {str(f.relative_to(ROOT)): n for f in folders if (n := len(list(f.glob("test_*.py")))) > 15} == {}
 
 
-#: packages of tools, whose files the list does not name one by one
-PACKAGES = ("instruction_counts", "firmware_emulation", "log_fuzzing", "crazypad")
-
-
-def test_every_tool_is_in_the_list_of_tools():
+def test_every_script_and_every_package_is_in_the_list_of_tools():
     tools = ROOT / "tools"
-    there = {p.name for p in tools.rglob("*.py") if p.parent.name not in PACKAGES} | set(PACKAGES)
+    packages = {p.parent for p in tools.rglob("__init__.py") if not (p.parents[1] / "__init__.py").exists()}
+    there = {p.name for p in packages} | {p.name for p in tools.rglob("*.py") if not packages & set(p.parents)}
     listed = set(re.findall(r"`(?:\w+/)?([\w.-]+)`", (tools / "README.md").read_text("utf-8")))
     assert there - listed == set()
+
+
+def test_the_top_of_tools_holds_what_make_runs_and_what_is_called_by_path():
+    run = set(re.findall(r"tools/(\w+\.py)", (ROOT / "Makefile").read_text("utf-8")))
+    assert {path.name for path in (ROOT / "tools").glob("*.py")} == run | {"gap_real.py"}
 
 
 def test_no_folder_of_tools_holds_more_than_a_reader_overlooks():

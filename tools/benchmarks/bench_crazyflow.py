@@ -38,7 +38,8 @@ def rates(integrator: str, seconds: float, rounds: int) -> list[tuple[float, flo
     return out[1:]
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Time both integrators and print the rates."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--rounds", type=int, default=3)
@@ -46,3 +47,7 @@ if __name__ == "__main__":
     print(json.dumps({name: [round(statistics.median(column))
                              for column in zip(*rates(name, options.seconds, options.rounds), strict=True)]
                       for name in ("euler", "rk4")}))
+
+
+if __name__ == "__main__":
+    main()

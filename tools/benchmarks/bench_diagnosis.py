@@ -4,7 +4,7 @@
 
 Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles: with the first
 flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else should run
-beside it.
+beside it. host/docs/gap-real.md has the times.
 """
 
 import argparse

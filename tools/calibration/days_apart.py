@@ -5,7 +5,7 @@
 The classifier is that of `airtouch twin`. Prints a Markdown table: each day with --fewest flights or more against each
 other one, and, for comparison, two random halves of all flights, which differ in nothing; AUROC of each phase by
 flight, with its 95 % interval. A twin that is fitted to flights of several days cannot be closer to each of them than
-they are to each other.
+they are to each other. The table is in host/docs/twin-findings.md.
 """
 
 import argparse

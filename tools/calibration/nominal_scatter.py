@@ -5,7 +5,7 @@
 Every nominal flight is held twice against up to five others of its vehicle, on which the vehicle is calibrated: of its
 own group (drone, day and condition) and of other groups of the same drone. Strengths of both count, rates of the first
 alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
-With --keep, flights that the file holds already are not worked on again.
+With --keep, flights that the file holds already are not worked on again. host/docs/gap-floor.md explains the table.
 
     python tools/calibration/nominal_scatter.py [FLIGHTS] --passing    # 5 min
 
@@ -33,6 +33,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
 from airtouch.gap.nominal import calibrate
@@ -273,4 +274,5 @@ def write(path: Path, text: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("nominal_scatter"):
+        main()

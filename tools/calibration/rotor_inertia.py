@@ -9,6 +9,7 @@ to the measured yaw acceleration is the ratio of their cross-spectra with the co
 speeds does not count; a delay of the gyro is fitted too. Printed for each flight: I / Jz, I for the vehicle's Jz,
 yaw torque over thrust, delay, each with its 90 % interval (bootstrap over blocks of 4 s), and what share of the yaw
 acceleration from 1 to 12 Hz that follows the command is explained with I and without.
+host/docs/twin-method.md has the figures.
 """
 
 import argparse

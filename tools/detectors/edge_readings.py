@@ -9,6 +9,7 @@ For recorded flights, and with --twin for the same courses flown by that twin:
   mean motor command, and of the command that the firmware's height states and loops give for the logged range and
   vertical acceleration alone (optical flow left out). Where the last two agree, estimator and controller are right,
   and what differs between drone and twin is what they are fed.
+The figures are in host/docs/twin-findings.md.
 """
 
 import argparse
@@ -20,6 +21,7 @@ import numpy as np
 from airtouch import vehicle
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.parameters import SAMPLE_RATE_HZ
+from airtouch.simulation import scenario
 from airtouch.simulation.firmware import range_module, settings
 from airtouch.simulation.flight import Diverged, fly
 from airtouch.twin import files
@@ -124,7 +126,6 @@ def high_edges(passes: Passes, kind: str) -> dict[str, np.ndarray]:
 
 def simulated_passes(folder: Path, courses: Sequence[Course]) -> Iterable[tuple[Course, np.ndarray]]:
     """The twin's flights in this folder that cross one platform, as many as courses at most."""
-    from airtouch.simulation import scenario
     scene, craft = scenario.load(folder / files.SCENARIO), vehicle.load(str(folder / files.VEHICLE))
     for number in range(len(courses)):
         log = fly(scene, craft, 0, number)

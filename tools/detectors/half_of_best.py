@@ -1,7 +1,10 @@
-"""How much `best` hangs on which half of the samples it computes at: `python tools/detectors/half_of_best.py [FOLDER]`.
+"""How much `best` hangs on which half of the samples it computes at.
+
+    python tools/detectors/half_of_best.py [FOLDER]
 
 `best` computes at every second sample. A log that begins one sample later makes it compute at the others, which
-parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean flights.
+parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean
+flights; host/docs/results.md has the counts.
 """
 
 import argparse
@@ -13,6 +16,7 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.detector import best
+from airtouch.errors import in_one_line
 from airtouch.logs.flight_log import ACC_WORLD, FlightLog
 
 FOLDS = ("0", "1", "2")  #: of the manifest, on which numbers may be chosen
@@ -36,8 +40,14 @@ def same(one: list, other: list, shift: int = 0) -> bool:
         abs(a.sample - b.sample - shift) <= CLOSE for a, b in zip(one, other, strict=True))
 
 
-def main(folder: Path) -> None:
+def main() -> None:
     """Read, detect twice, and print how often the edges are the same."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+    folder = parser.parse_args().folder
+    if not (folder / "manifest.csv").is_file():
+        parser.error(f"{folder} has no manifest.csv: give the folder of the authors' flights, or set AIRTOUCH_FLIGHTS")
     with open(folder / "manifest.csv") as file:
         chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
     halves, headings = [], []
@@ -53,7 +63,5 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
-    main(parser.parse_args().folder)
+    with in_one_line("half_of_best"):
+        main()

@@ -10,6 +10,7 @@ Prints tables of the flights over one platform, by class of height:
 3. standard deviation of the channels in hover and in the last second before the entry: the air in which edges lie;
 4. with --twin: standard deviation above 3 Hz over the platform divided by that before it, recorded, and with the
    twin's responses (`airtouch.twin.overlay`) added to the recorded air.
+The tables are in host/docs/twin-findings.md.
 """
 
 import argparse

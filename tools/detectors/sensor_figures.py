@@ -1,8 +1,8 @@
 """What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
 of.
 
-    python tools/choose_decoder.py out/folds --json out/all.json
-    python tools/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
+    python tools/detectors/choose_decoder.py out/folds --json out/all.json
+    python tools/detectors/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
     airtouch evaluate ../shared/flights/airtouch-november --speed 0.3 --json out/november.json
     python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
         rates=out/rates.json=folds acceleration=out/november.json="another month"
@@ -16,7 +16,7 @@ import json
 from pathlib import Path
 
 from airtouch.detector.shared import sensors
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
 
 FILE = Path(__file__).parents[2] / "host" / "airtouch" / "models" / "best_sensors.json"  #: where the figures go
@@ -31,8 +31,8 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
         if table.get("in_training"):
             raise AirTouchError(f"{path}: the model was trained on these flights; score others")
         return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise AirTouchError(f"{path}: not the JSON of tools/choose_decoder.py or `airtouch evaluate`: "
+    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+        raise AirTouchError(f"{path}: not the JSON of tools/detectors/choose_decoder.py or `airtouch evaluate`: "
                             f"{error}") from None
 
 
@@ -43,6 +43,8 @@ def main() -> None:
                         help="all, and each sensor that may be missing")
     parser.add_argument("--out", type=Path, default=FILE)
     options = parser.parse_args()
+    if odd := [pair for pair in options.pairs if pair.count("=") != 2]:
+        parser.error(f"{odd[0]} is not NAME=JSON=WHERE")
     content = {name: figures(Path(path), where) for name, path, where in (pair.split("=") for pair in options.pairs)}
     if set(content) != {"all", *sensors.SENSORS}:
         raise SystemExit(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
@@ -51,4 +53,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("sensor_figures"):
+        main()

@@ -6,7 +6,7 @@
 The twin's edges are laid over the flights' free air as `airtouch adapt` does, but its platforms are 0.3 to 1 times as
 long as the recorded ones: a detector of recorded passes alone misses shorter ones of another month. Acceleration is
 left out of all flights; recorded and simulated flights have half of the crops each. --hold-out: not trained on the
-flights of this fold of the manifest, for a cross-validation.
+flights of this fold of the manifest, for a cross-validation, whose figures are in host/docs/results.md.
 """
 
 import argparse

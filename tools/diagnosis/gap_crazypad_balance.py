@@ -1,6 +1,6 @@
 """What the balance of the motors in hover can tell on CrazyPAD at all: of the rotor, and of the family.
 
-    python tools/diagnosis/gap_crazypad_balance.py [FOLDER] [--part build|all]
+    python tools/diagnosis/gap_crazypad_balance.py [FOLDER] [--part build|all]    # 20 s
 
 One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, by their labels. The residual
 is how a vehicle differs after maintenance: another set of propellers, for the most part. `Priors.maintenance` is this
@@ -9,13 +9,13 @@ scatter in the building conditions. Then
   conditions; it only chooses which rotors. Severity is then measured along the right rotors' change.
 - the diagnosis itself on drawn flights whose changes and scatter are those of its priors: no test on the same six
   numbers is right more often in the mean of the families. Cut rotors are drawn from the conditions of at least 1.5 mm.
+The figures are in host/docs/gap-crazypad.md.
 """
 
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
@@ -24,13 +24,13 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
-from airtouch.gap.balance.hover_hypotheses import Hypothesis, commanded_change, hypotheses
-from airtouch.gap.balance.hover_pattern import LEAST_POWER, HoverPattern, hover_pattern
+from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
+from airtouch.gap.balance.hover_pattern import LEAST_POWER, HoverPattern
 from airtouch.gap.balance.priors import PRIORS, STEADY
-from airtouch.gap.flights.flight import ready
-from airtouch.logs import read
-from crazypad import figures, labels
+from recordings.crazypad import figures, labels
+from recordings.crazypad.patterns import hover_patterns, likeliest
 
 DRAWS = 4000  #: of the scatter, for the expected share of right rotors; no source: round number, good to 0.01
 FLIGHTS = 400  #: drawn of each family; no source: round number, good to 0.03
@@ -86,10 +86,7 @@ class Balances:
     bases: by drone; difference (flights, 6): over all normal flights of the drone; pairs: conditions with cut blades.
     """
 
-    def __init__(self, folder: Path, part: str) -> None:
-        rows = labels.manifest(folder, part)
-        self.vehicle = vehicles.load(labels.VEHICLE)
-        patterns = [hover_pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle) for r in rows]
+    def __init__(self, rows: Sequence[dict[str, str]], patterns: list[HoverPattern]) -> None:
         drone, normal = [r["drone"] for r in rows], np.array([labels.family(r["condition"]) == "normal" for r in rows])
         self.bases = {d: hover_balance.reference([patterns[i] for i in np.flatnonzero(normal & (np.array(drone) == d))])
                       for d in sorted(set(drone))}
@@ -145,19 +142,27 @@ class RotorTest:
 def rotor_tests(b: Balances) -> list[RotorTest]:
     """Each condition with cut blades, change and scatter fitted to the others."""
     out, generator = [], np.random.default_rng(0)
-    for k, (pair, cut) in enumerate(zip(b.pairs, b.cuts, strict=True)):
+    for k, pair in enumerate(b.pairs):
         rest = np.arange(len(b.pairs)) != k
         solution, residuals = fit(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
         whiten = np.linalg.inv(np.linalg.cholesky(residuals.T @ residuals / (rest.sum() - 2))).T
-        rivals = np.array([change(c, *solution) for c in _rivals(cut)]) @ whiten
-        right = np.array([set(c) == set(cut) for c in _rivals(cut)])
-        true = change(cut, *solution) @ whiten
-        samples, own = true + generator.standard_normal((DRAWS, 4)), b.own(pair) @ whiten
-        out.append(RotorTest(pair, bool(true @ true < SMALL * len(true)),
-                             float(right[_nearest(samples, rivals)].mean()),
-                             own @ true > 0.0, right[_nearest(own, rivals)],
-                             own @ true / (true @ true) * sum(cut.values())))
+        out.append(rotor_test(pair, b.own(pair), solution, whiten, generator))
     return out
+
+
+def rotor_test(pair: Condition, balances: np.ndarray, solution: np.ndarray, whiten: np.ndarray,
+               generator: np.random.Generator) -> RotorTest:
+    """The test of one condition's balances (flights, 4).
+
+    solution: slope and yaw ratio (2,) of `fit`; whiten (4, 4): makes the scatter of balances that of unit noise.
+    """
+    cut = labels.millimetres(pair[1])
+    rivals = np.array([change(c, *solution) for c in _rivals(cut)]) @ whiten
+    right = np.array([set(c) == set(cut) for c in _rivals(cut)])
+    true = change(cut, *solution) @ whiten
+    samples, own = true + generator.standard_normal((DRAWS, 4)), balances @ whiten
+    return RotorTest(pair, bool(true @ true < SMALL * len(true)), float(right[_nearest(samples, rivals)].mean()),
+                     own @ true > 0.0, right[_nearest(own, rivals)], own @ true / (true @ true) * sum(cut.values()))
 
 
 def show_rotor(tests: list[RotorTest]) -> None:
@@ -200,53 +205,53 @@ def _nearest(balances: np.ndarray, rivals: np.ndarray) -> np.ndarray:
     return ((balances[:, None] - rivals) ** 2).sum(axis=2).argmin(axis=1)
 
 
-def show_family(b: Balances) -> None:
+def drawn_pattern(kind: str, changes: np.ndarray, variance: np.ndarray,
+                  generator: np.random.Generator) -> HoverPattern:
+    """A flight of a family, drawn from the priors of the diagnosis.
+
+    changes (n, 4): of the balance, one of which the flight has; variance (6,): of the drone's normal flights.
+    """
+    balance = changes[generator.integers(len(changes))]
+    scatter = PRIORS.maintenance if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
+    width = np.sqrt(variance[hover_balance.BALANCE] + np.array(scatter) ** 2)
+    balance = balance + width * generator.standard_t(PRIORS.freedom, 4)
+    power_change = PRIORS.damaged if kind == "rotor damage" else STEADY
+    power = [generator.normal(m, np.hypot(s, np.sqrt(v)))
+             for (m, s), v in zip(power_change, variance[hover_balance.POWER], strict=True)]
+    return HoverPattern(balance, np.array(power), np.full(2, LEAST_POWER))
+
+
+def show_family(b: Balances, vehicle: vehicles.Vehicle) -> None:
     """Print how often the diagnosis is right on drawn flights of each family that are drawn from its priors."""
-    generator, candidates = np.random.default_rng(0), hypotheses(b.vehicle)
+    generator, candidates = np.random.default_rng(0), hypotheses(vehicle)
+    families = [{"none": "normal", **figures.FAMILY_OF}.get(h.name, h.name) for h in candidates]
     solution, _ = fit(b.means, b.cuts)
-    cuts = np.array([change(c, *solution) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if labels.large(text)])
-    kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
-             "added weight": [h.change for h in candidates if h.name == "mass"],
-             "slung load": [h.change for h in candidates if h.name == "slung_load"]}
+    cuts = [change(c, *solution) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if labels.large(text)]
+    changes_of = {"normal": np.zeros((1, 4)), "rotor damage": np.array(cuts),
+                  "added weight": next(h.change for h in candidates if h.name == "mass"),
+                  "slung load": next(h.change for h in candidates if h.name == "slung_load")}
     print(f"\nthe diagnosis on {FLIGHTS} flights of each family, drawn from its priors")
     for drone, base in b.bases.items():
         reference = hover_balance.Reference(np.zeros(6), base.variance, np.zeros(2))
-        balance_variance, power_variance = base.variance[hover_balance.BALANCE], base.variance[hover_balance.POWER]
         right = {}
-        for kind, (changes,) in kinds.items():
-            names = []
-            for _ in range(FLIGHTS):
-                balance = changes[generator.integers(len(changes))]
-                scatter = PRIORS.maintenance if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
-                width = np.sqrt(balance_variance + np.array(scatter) ** 2)
-                balance = balance + width * generator.standard_t(PRIORS.freedom, 4)
-                power_change = PRIORS.damaged if kind == "rotor damage" else STEADY
-                power = [generator.normal(m, np.hypot(s, np.sqrt(v)))
-                         for (m, s), v in zip(power_change, power_variance, strict=True)]
-                pattern = HoverPattern(balance, np.array(power), np.full(2, LEAST_POWER))
-                names.append(_family(hover_balance.evidence(pattern, reference, candidates)[0], candidates))
-            right[kind] = np.mean([n == kind for n in names])
+        for kind, changes in changes_of.items():
+            patterns = (drawn_pattern(kind, changes, base.variance, generator) for _ in range(FLIGHTS))
+            right[kind] = np.mean([likeliest(hover_balance.evidence(p, reference, candidates)[0], families) == kind
+                                   for p in patterns])
         print(f"{drone}: family, balanced {np.mean(list(right.values())):.2f}; "
               + ", ".join(f"{k} {v:.2f}" for k, v in right.items()))
-
-
-def _family(logs: np.ndarray, candidates: list[Hypothesis]) -> str:
-    """The likeliest family of a log evidence for each hypothesis."""
-    chance: dict[str, float] = {}
-    for h, p in zip(candidates, np.exp(logs - logs.max()), strict=True):
-        name = {"none": "normal", **figures.FAMILY_OF}.get(h.name, h.name)
-        chance[name] = chance.get(name, 0.0) + float(p)
-    return max(chance, key=chance.__getitem__)
 
 
 def main() -> None:
     """Print scatter, rotors and families."""
     options = labels.folder_and_part(__doc__)
-    balances = Balances(options.folder, options.part)
+    rows, vehicle = labels.manifest(options.folder, options.part), vehicles.load(labels.VEHICLE)
+    balances = Balances(rows, hover_patterns(options.folder, rows, vehicle))
     show_scatter(balances)
     show_rotor(rotor_tests(balances))
-    show_family(balances)
+    show_family(balances, vehicle)
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_crazypad_balance"):
+        main()

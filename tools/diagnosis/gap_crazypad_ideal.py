@@ -1,6 +1,6 @@
 """What tests with more knowledge than the diagnosis reach on CrazyPAD: how far its goals can be reached at all.
 
-    python tools/diagnosis/gap_crazypad_ideal.py [FOLDER] [--part build|all]
+    python tools/diagnosis/gap_crazypad_ideal.py [FOLDER] [--part build|all]    # 5 min
 
 Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
 unsteadiness, heave and corrections of `hover_pattern`, the voltage, commanded thrust of each rotor, and spectra of
@@ -8,7 +8,7 @@ commands and accelerations in seven bands. Four learners (a discriminant on the 
 the nearest flight) have the labels of (1) all other conditions of both drones, (2) all other flights, those of the
 same condition too, (3) the other drone. The diagnosis has none. That several are tried and the best may be read
 favours these tests. Intervals resample conditions within families. What the balance alone can tell:
-`gap_crazypad_balance.py`.
+`gap_crazypad_balance.py`. The figures are in host/docs/gap-crazypad.md.
 """
 
 import os
@@ -27,12 +27,12 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
-from crazypad import figures as pad
-from crazypad import labels
+from recordings.crazypad import figures, labels
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
@@ -100,23 +100,26 @@ def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
     rows = labels.manifest(folder, part)
     vehicle = vehicles.load(labels.VEHICLE)
-    raw = np.array([describe(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
-    drone = np.array([r["drone"] for r in rows])
-    normal = np.array([labels.family(r["condition"]) == "normal" for r in rows])
-    own = np.arange(len(rows))
-    base = [raw[normal & (drone == drone[i]) & (own != i)].mean(axis=0) for i in own]
-    return Table(rows, raw - np.array(base))
+    return relative(rows, np.array([describe(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]))
 
 
-#: name -> classifier of labels; discriminants take each label as equally likely
+def relative(rows: list[dict[str, str]], numbers: np.ndarray) -> Table:
+    """The table of numbers (flights, k) less their mean over the drone's other normal flights."""
+    return Table(rows, numbers - np.array([numbers[labels.baseline(rows, i)].mean(axis=0) for i in range(len(rows))]))
+
+
+def discriminant(classes: np.ndarray) -> LinearDiscriminantAnalysis:
+    """A linear discriminant that takes each class as equally likely."""
+    count = len(set(classes))
+    return LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(count, 1.0 / count))
+
+
+#: name -> classifier, made for the classes (flights,) that it learns
 LEARNERS: dict[str, Callable] = {
-    "discriminant on the balance": lambda labels: LinearDiscriminantAnalysis(
-        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
-    "discriminant on all numbers": lambda labels: LinearDiscriminantAnalysis(
-        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
-    "forest on all numbers": lambda labels: RandomForestClassifier(
+    "discriminant on the balance": discriminant, "discriminant on all numbers": discriminant,
+    "forest on all numbers": lambda _: RandomForestClassifier(
         TREES, class_weight="balanced_subsample", random_state=0),
-    "nearest flight, all numbers": lambda labels: KNeighborsClassifier(1)}
+    "nearest flight, all numbers": lambda _: KNeighborsClassifier(1)}
 #: name -> regression of the millimetres cut
 MEASURES: dict[str, Callable] = {
     "discriminant on the balance": lambda: Ridge(1.0), "discriminant on all numbers": lambda: Ridge(RIDGE),
@@ -141,11 +144,11 @@ def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[
         cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
         for i, family, rotors, mm in zip(np.flatnonzero(fold), predicted["family"], predicted["rotors"], cut,
                                          strict=True):
-            out[i] = {**table.rows[i], **_case(family, rotors, mm)}
+            out[i] = {**table.rows[i], **as_case(family, rotors, mm)}
     return out
 
 
-def _case(family: str, rotors: str, mm: float) -> dict:
+def as_case(family: str, rotors: str, mm: float) -> dict:
     """A learner's answer in the form of a diagnosis; millimetres stand for the loss of thrust."""
     if family == "normal":
         return {"verdict": "none", "effects": []}
@@ -163,15 +166,14 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
     for learner in LEARNERS:
         cases = cross_validate(table, folds, learner)
         cells = []
-        for figure in (pad.balanced_accuracy, _damage_right, pad.exact_rotors, pad.severity):
-            low, high = pad.interval(cases, figure)
-            cells.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
+        for figure in (figures.balanced_accuracy, _damage_right, figures.exact_rotors, figures.severity):
+            cells.append(figures.with_interval(cases, figure))
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
 
 
 def _damage_right(cases: list[dict]) -> float:
     """Share of flights with rotor damage that are called so."""
-    right = [pad.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
+    right = [figures.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
     return float(np.mean(right)) if right else float("nan")
 
 
@@ -200,4 +202,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_crazypad_ideal"):
+        main()

@@ -1,34 +1,28 @@
-"""The lift that a diagnosis gives a vehicle close to the floor, beside what was measured on neural-swarm's flights.
+"""How well one flight shows its lift near the floor: a regression that knows the curve measured on neural-swarm's.
 
-    python tools/diagnosis/gap_lift.py [FLIGHTS]    # how well one flight shows it: a regression that knows the curve
+    python tools/diagnosis/gap_lift.py [FLIGHTS]    # 7 s
 
-The regression takes the vertical force that the commanded thrust does not explain (thrust after a motor's lag of 60 ms,
-at the voltage logged) as a constant and a multiple of the measured curve. 1 is the measured lift.
+Prints, for each day and vehicle, in how many of neural-swarm's flights the regression is within a quarter of the
+measured lift; the figures are in host/docs/gap-real.md. The regression takes the vertical force that the commanded
+thrust does not explain (thrust after a motor's lag of 60 ms, at the voltage logged) as a constant and a multiple of the
+measured curve. 1 is the measured lift.
 """
 
 import argparse
 import csv
-import os
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.logs import read
-from airtouch.simulation import effects, replay
-from airtouch.simulation import signals as at
-from airtouch.simulation.effects import Active
-from airtouch.simulation.flight import prepare
+from recordings.folder import add_folder, check_folder
+from recordings.swarm_lift import CLOSE
 
-#: height above standing, m; share of the weight that the ground carries there (flights' medians, the data's SOURCE.md)
-HEIGHTS_M, MEASURED = (0.02, 0.04), {"ns-34g": (0.097, 0.057), "ns-67g": (0.102, 0.065)}
-#: height of the rotors when it stands, as the diagnosis takes it from z_m, m; the large one's marker sits 5 mm higher
-STANDING_M = {"ns-34g": 0.0325, "ns-67g": 0.036}
-CLOSE = 0.25  #: relative difference from the measured lift that counts as right; a goal of host/docs/gap-real.md
-#: the same at more heights, as the data's SOURCE.md gives them; nothing from 15 cm on, level below 1 cm
+#: m above standing at which the lift was measured (the data's SOURCE.md); nothing from 15 cm on, level below 1 cm
 CURVE_M = np.array([0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.073, 0.09, 0.115, 0.15])
 #: vehicle -> fraction of the weight that the ground carries at CURVE_M
 CURVE = {"ns-34g": np.array([13.8, 9.7, 7.3, 5.7, 3.5, 1.8, 0.6, 0.1, -0.1, 0.0]) / 100.0,
@@ -38,33 +32,6 @@ STANDING_Z_M = {"cf50": 0.0495, "cf51": 0.0525, "cf52": 0.0555, "cf101": 0.055, 
 LAG_S = 0.06  #: s, first-order lag of the motors, as `reference.motion_channels`
 SMOOTH = 20  #: samples, standard deviation of the voltage's smoothing; no source: round number
 LOWEST_M = -0.005  #: m above standing, below which z_m is taken for wrong; no source: round number
-
-
-def lift(vehicle: Path, name: str, parameters: dict[str, float]) -> np.ndarray:
-    """Share (2,) of the weight that `ground_effect` carries in hover at HEIGHTS_M: g / (1 + g) of a thrust gain g."""
-    craft = vehicles.load(vehicle)
-    row = prepare(craft, ())[0][0]
-    signals = np.zeros((len(HEIGHTS_M), at.COUNT))
-    signals[:, at.STEP], signals[:, at.MASS], signals[:, at.GRAVITY] = 0.01, craft.mass_kg, craft.gravity_mps2
-    signals[:, at.ROTATION], signals[:, at.ROTATION + 4], signals[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
-    signals[:, at.ROTOR_X:at.ROTOR_X + 4], signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_x"], row["rotor_y"]
-    signals[:, at.ROTOR_RADIUS], signals[:, at.ROTOR_SPACING] = row["rotor_radius"], row["rotor_spacing"]
-    signals[:, at.THRUST:at.THRUST + 4] = 0.25 * craft.mass_kg * craft.gravity_mps2
-    signals[:, at.LOWER_FACTOR:at.LOWER_FACTOR + 4] = 1.0
-    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = (np.array(HEIGHTS_M) + STANDING_M[name])[:, None]
-    steady = Active(effects.get("ground_effect"), {**parameters, "turbulence": 0.0})
-    gain = replay.wrench_of(steady, signals)[:, 2] / (craft.mass_kg * craft.gravity_mps2)
-    return gain / (1.0 + gain)
-
-
-def close(case: dict, folder: Path) -> bool:
-    """Whether a diagnosed flight's ground effect is within CLOSE of the measured lift at both heights."""
-    effect = next((e for e in case["effects"] if e["name"] == "ground_effect"), None)
-    if effect is None:
-        return False
-    name = case["condition"]
-    carried = lift(folder / f"{name}.toml", name, {k: q["value"] for k, q in effect["parameters"].items()})
-    return bool((np.abs(carried / MEASURED[name] - 1.0) < CLOSE).all())
 
 
 def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float, curve: np.ndarray) -> float:
@@ -85,9 +52,9 @@ def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float,
 def main() -> None:
     """Print the ratio of fitted to published lift of the ground in recorded flights, by day and vehicle."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
+    add_folder(parser, name="flights")
     folder = parser.parse_args().flights / "neuralswarm"
+    check_folder(parser, folder)
     ratios: dict[str, list[float]] = {}
     for row in csv.DictReader((folder / "manifest.csv").open()):
         if row["truth"] == "ground_effect":
@@ -101,4 +68,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_lift"):
+        main()

@@ -1,6 +1,8 @@
 """Does closing the gap close the error? Found effects added one by one, a detector trained on each.
 
-    AIRTOUCH_FLIGHTS=../shared/flights .venv/bin/python tools/diagnosis/gap_training.py --out out/gap-training
+    python tools/diagnosis/gap_training.py --out out/gap-training    # 40 min on a busy machine
+
+On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is in host/docs/gap-real.md.
 
 1. Diagnosis. The folds of the authors' clean flights are divided in two groups (--groups). Those of a group are
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);
@@ -21,7 +23,6 @@ import argparse
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -33,15 +34,15 @@ from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
-from airtouch.detector.evaluation.score import FlightScore, WindowCounts
-from airtouch.detector.evaluation.summary import summarise
-from airtouch.errors import AirTouchError
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.summary import one_a_flight, summarise
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from gap_authors import VEHICLE
-from gap_passes import apart_db, pieces
+from recordings.authors import VEHICLE
+from recordings.passes import apart_db, pieces
 
 MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis judges on 210 s at most
 #: names and parameters of effects
@@ -131,14 +132,6 @@ def train(text: str, seed: int, options: argparse.Namespace) -> Any:
     return best.load(path)
 
 
-def together(runs: Sequence[Sequence[FlightScore]]) -> list[FlightScore]:
-    """Scores of several trainings on the same flights as one a flight, so that a flight is drawn whole."""
-    return [replace(same[0], edges=sum((s.edges for s in same), ()), false=sum((s.false for s in same), ()),
-                    detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),
-                    windows=WindowCounts(*np.sum([s.windows for s in same], axis=0).tolist()),
-                    bins=np.sum([s.bins for s in same], axis=0)) for same in zip(*runs, strict=True)]
-
-
 def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Namespace) -> str:
     """Cells of one row: scenario texts, one a group of flights tested with it, all seeds."""
     runs, differences = [], []
@@ -150,7 +143,7 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
             differences.append(apart_db(training_flights(text, options.flights, seed, options.out),
                                         list(flights.values())))
         runs.append(run)
-    figures = summarise(together(runs))
+    figures = summarise(one_a_flight(score for run in runs for score in run))
     each = [summarise(r, replicates=2)["mean_abs_error_m"] for r in runs]
     seeds = ", ".join("-" if x is None else f"{x:.3f}" for x in each)
 
@@ -163,6 +156,29 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
     off = "{:.1f}, {:.1f}".format(*np.average(differences, axis=0, weights=[len(t) for t in tested] * options.seeds))
     return " | ".join((cell("mean_abs_error_m", 1, 3), seeds, cell("missed", 100, 1),
                        cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0), off))
+
+
+def print_table(chains: Sequence[Sequence[tuple[str, Effects]]], group_names: Sequence[str], groups: Sequence[Flights],
+                options: argparse.Namespace) -> None:
+    """Print a row for each effect added, then one for the scenario's own.
+
+    chains: of each group, as `chain` gives it; a group's effects are tested on the next group's flights.
+    """
+    tested = [groups[(i + 1) % len(groups)] for i in range(len(groups))]
+    edges = sum(len(logs.true_edges(log)) for group in groups for log in group.values())
+    print(f"{sum(map(len, groups))} recorded flights, {edges} edges; {options.seeds} trainings a row, "
+          f"{options.steps} steps on {options.flights} flights\n\n| added to the simulator, found in folds "
+          f"{' / '.join(group_names)} | error, m | each training | missed, % | false/min | "
+          "balanced, % | spectra off, dB: before, over |\n|---|---|---|---|---|---|---|", flush=True)
+    for i in range(max(map(len, chains))):
+        names = [c[i][0] if i < len(c) else "-" for c in chains]
+        texts = [scene_text(c[min(i, len(c) - 1)][1]) for c in chains]
+        try:
+            cells = row(texts, tested, options)
+        except AirTouchError as error:
+            cells = f"not flown: {error} | | | | |"
+        print(f"| {names[0] if len(set(names)) == 1 else ' / '.join(names)} | {cells} |", flush=True)
+    print(f"| the scenario's own, set by hand | {row([simulated.SCENARIO] * len(tested), tested, options)} |")
 
 
 def main() -> None:
@@ -187,24 +203,10 @@ def main() -> None:
             store.unlink(missing_ok=True)
         chains.append(chain(diagnoses(group, store)))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
-    if options.diagnose:
-        return
-    tested = [groups[(i + 1) % len(groups)] for i in range(len(groups))]
-    edges = sum(len(logs.true_edges(log)) for group in groups for log in group.values())
-    print(f"{sum(map(len, groups))} recorded flights, {edges} edges; {options.seeds} trainings a row, "
-          f"{options.steps} steps on {options.flights} flights\n\n| added to the simulator, found in folds "
-          f"{' / '.join(group_names)} | error, m | each training | missed, % | false/min | "
-          "balanced, % | spectra off, dB: before, over |\n|---|---|---|---|---|---|---|", flush=True)
-    for i in range(max(map(len, chains))):
-        names = [c[i][0] if i < len(c) else "-" for c in chains]
-        texts = [scene_text(c[min(i, len(c) - 1)][1]) for c in chains]
-        try:
-            cells = row(texts, tested, options)
-        except AirTouchError as error:
-            cells = f"not flown: {error} | | | | |"
-        print(f"| {names[0] if len(set(names)) == 1 else ' / '.join(names)} | {cells} |", flush=True)
-    print(f"| the scenario's own, set by hand | {row([simulated.SCENARIO] * len(tested), tested, options)} |")
+    if not options.diagnose:
+        print_table(chains, group_names, groups, options)
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_training"):
+        main()

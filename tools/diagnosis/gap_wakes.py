@@ -1,6 +1,6 @@
 """How many of neural-swarm's flights under another vehicle a test sees that knows when it was under it.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]    # 15 s
 
 The seconds come from the other vehicles' own logs, where the data hold a cut of the same time: another vehicle within
 0.15 m sideways and 0.1 to 0.6 m above, as the data's labels say. In these seconds against the rest of the flight: the
@@ -18,7 +18,7 @@ vehicle had been overhead in the seconds of each downwash flight of its kind: ho
     python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test that is not told the seconds, 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
-the two apart.
+the two apart. The figures of all three are in host/docs/gap-real.md.
 """
 
 import argparse
@@ -33,9 +33,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-import recorded_cases
-import swarm_cuts
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.naming.passing_effect import passing_evidence
@@ -45,11 +44,13 @@ from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing import gates, overhead
 from airtouch.gap.passing.bursts import UNSTEADY_YAW
 from airtouch.gap.passing.one_sided import DOWNWARD
-from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.sealed.intervals import auroc, share_text
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
 from airtouch.logs import read
+from recordings import cases, swarm_cuts
+from recordings.folder import add_folder, check_folder
 
 LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number
 LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number
@@ -137,7 +138,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
             seconds_of.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
     kind = {t.row["file"]: (t.row["vehicle"], t.row["manoeuvre"]) for t in tracks}
     alarms, trials = [], 0
-    for case in recorded_cases.nominal(flights, "build"):
+    for case in cases.nominal(flights, "build"):
         name = Path(case.flight).name
         if name not in kind:
             continue
@@ -151,17 +152,16 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
             if wake is not None and passing_evidence(data, wake.key, wake.gain, wake.strength) >= PASSING_GAIN:
                 alarms.append(name)
         print(f"{name}: {alarms.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
-    share = wilson(len(alarms), trials)
-    print(f"a wake in told seconds of nominal flights: {len(alarms)} of {trials} [{share['low']:.1%}, "
-          f"{share['high']:.1%}], in {len(set(alarms))} flights")
+    print(f"a wake in told seconds of nominal flights: {share_text(len(alarms), trials, 1)}, "
+          f"in {len(set(alarms))} flights")
 
 
 def show_without_seconds(flights: Path) -> None:
     """Print how well each measure of a wake tells wakes from nominal flights, by vehicle."""
     studies: dict[tuple[str, ...], Study] = {}
     of_truth: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
-    nominal = [c for c in recorded_cases.nominal(flights, "build") if "neuralswarm" in Path(c.flight).parts]
-    for case in [*recorded_cases.swarm(flights, "build"), *nominal]:
+    nominal = [c for c in cases.nominal(flights, "build") if "neuralswarm" in Path(c.flight).parts]
+    for case in [*cases.swarm(flights, "build"), *nominal]:
         if case.truth == "ground_effect":
             continue
         vehicle = vehicles.load(case.vehicle)
@@ -176,21 +176,17 @@ def show_without_seconds(flights: Path) -> None:
         for measure in (OVERHEAD, UNSTEADY_YAW, DOWNWARD):
             wakes, calm = (np.array([sizes[measure] for sizes in of_truth[vehicle_name, truth]])
                            for truth in ("downwash", "none"))
-            low, high = _interval(wakes, calm)
-            print(f"| {vehicle_name} | {measure} | {auroc(wakes, calm):.2f} [{low:.2f}, {high:.2f}] | "
+            area, (low, high) = auroc(wakes.tolist(), calm.tolist()), _interval(wakes, calm)
+            print(f"| {vehicle_name} | {measure} | {area:.2f} [{low:.2f}, {high:.2f}] | "
                   f"{(wakes > calm.max()).sum()} of {len(wakes)}, of {len(calm)} |")
-
-
-def auroc(wakes: np.ndarray, calm: np.ndarray) -> float:
-    """Chance that a measure of a wake (n,) is larger than one of a nominal flight (m,) (Mann and Whitney 1947)."""
-    return float((wakes[:, None] > calm).mean() + 0.5 * (wakes[:, None] == calm).mean())
 
 
 def _interval(wakes: np.ndarray, calm: np.ndarray) -> tuple[float, float]:
     """95 % interval of the AUROC by a bootstrap over flights."""
     rng = np.random.default_rng(0)
-    draws = [auroc(rng.choice(wakes, len(wakes)), rng.choice(calm, len(calm))) for _ in range(DRAWS)]
-    low, high = np.quantile(draws, (0.025, 0.975))
+    draws = [auroc(rng.choice(wakes, len(wakes)).tolist(), rng.choice(calm, len(calm)).tolist())
+             for _ in range(DRAWS)]
+    low, high = np.quantile(np.array(draws, float), (0.025, 0.975))
     return float(low), float(high)
 
 
@@ -222,27 +218,26 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
         print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {cells} | {'yes' if hit else 'no'} | "
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
-        share = wilson(sum(hits), len(hits))
-        print(f"{vehicle}: seen {sum(hits)} of {len(hits)} [{share['low']:.0%}, {share['high']:.0%}]")
+        print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
     print(f"{unknown} more, whose other vehicle's path the data do not hold")
 
 
 def main() -> None:
     """Print how many wakes the test sees, or the false alarms of the diagnosis."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
+    add_folder(parser, name="flights")
     parser.add_argument("--part", choices=("build", "all"), default="build")
-    parser.add_argument("--answers", type=Path)
-    parser.add_argument("--false-alarms", action="store_true")
-    parser.add_argument("--without-seconds", action="store_true")
+    parser.add_argument("--answers", type=Path, help="what `gap_real.py --keep` wrote")
+    parser.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
+    parser.add_argument("--without-seconds", action="store_true", help="a test that is not told the seconds")
     options = parser.parse_args()
+    check_folder(parser, options.flights / "neuralswarm")
     if options.without_seconds:
         show_without_seconds(options.flights)
         return
     folder = options.flights / "neuralswarm"
     all_days = options.part == "all" and not options.false_alarms
-    rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in recorded_cases.BUILD_DAYS]
+    rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in cases.BUILD_DAYS]
     tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)
@@ -251,4 +246,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_wakes"):
+        main()

@@ -13,7 +13,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import stack
+from call_graph import deepest
 
 ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
 OUT = ROOT / "build" / "firmware"  #: of `make firmware`
@@ -41,12 +41,12 @@ def parse(output: str) -> Sizes:
     return Sizes(*zip(*(regions[name] for name in MEMORIES), strict=True))
 
 
-def row(what: str, sizes: Sizes, stock: Sizes | None = None, deepest: int | None = None) -> str:
+def row(what: str, sizes: Sizes, stock: Sizes | None = None, stack: int | None = None) -> str:
     """One line of the table; stock and deepest stack of the app are left out for a stock image."""
     used = " / ".join(f"{bytes_ / 1000:.1f}" for bytes_ in sizes.used)
     free = " / ".join(f"{(room - bytes_) / 1000:.1f}" for bytes_, room in zip(sizes.used, sizes.room, strict=True))
     added = " / ".join(f"{(a - b) / 1000:+.1f}" for a, b in zip(sizes.used, stock.used, strict=True)) if stock else ""
-    return f"| {what} | {used} | {added} | {free} | {'' if deepest is None else deepest} |"
+    return f"| {what} | {used} | {added} | {free} | {'' if stack is None else stack} |"
 
 
 def build_output(*command: object) -> str:
@@ -72,8 +72,13 @@ def networks() -> int:
     return sum(int(text) + int(data) for text, data, *_ in (line.split() for line in lines))
 
 
-def main(base: Path) -> None:
+def main() -> None:
     """Build and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    base = parser.parse_args().base.expanduser().resolve()
+    if not (base / "tools" / "make" / "oot.mk").is_file():
+        parser.error(f"{base} is no checkout of bitcraze/crazyflie-firmware (no tools/make/oot.mk)")
     print("| image | flash / RAM / CCM | added to stock | left | deepest stack of the app, bytes "
           "|\n|---|---|---|---|---|")
     for platform in dict.fromkeys(platform for _, platform, _ in IMAGES):
@@ -82,12 +87,10 @@ def main(base: Path) -> None:
         for config, _, further in (image for image in IMAGES if image[1] == platform):
             text = build_output("make", "firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}",
                                 f"PLATFORM={platform}", *further)
-            deepest, _, _ = stack.deepest(OUT, "appMain")
-            print(row(f"{platform}, `{config}`", parse(text), stock, deepest), flush=True)
+            stack, _, _ = deepest(OUT, "appMain")
+            print(row(f"{platform}, `{config}`", parse(text), stock, stack), flush=True)
     print(f"\n{networks() / 1000:.1f} kB of the flash are the two networks.")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
-    main(parser.parse_args().base.expanduser().resolve())
+    main()

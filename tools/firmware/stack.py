@@ -5,55 +5,17 @@
 Sums frames along the deepest chain of calls. Calls through pointers are not seen; libraries and recursions are not
 counted: their names are printed, add what they need. What follows a failed assertion is left out: the drone has
 stopped by then. CONFIG_APP_STACKSIZE (firmware/app/app-config) counts words of four bytes.
+host/docs/flash.md has the figures.
 """
 
 import argparse
-import re
-from functools import cache
 from pathlib import Path
 
-#: line of a call graph: function, bytes of its frame
-NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?(\d+) bytes \((\w+)')
-#: line of a call graph: caller and callee
-EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+from call_graph import deepest
 
 
-def deepest(folder: Path, entry: str) -> tuple[int, list[str], set[str]]:
-    """Bytes, the chain of functions, and the functions without a known frame that any chain ends in."""
-    frames: dict[str, int] = {}
-    calls: dict[str, set[str]] = {}
-    for path in folder.rglob("*.ci"):
-        text = path.read_text(errors="replace")
-        frames.update((name, int(size)) for name, size, _ in NODE.findall(text))
-        for source, target in EDGE.findall(text):
-            calls.setdefault(source, set()).add(target)
-    unknown: set[str] = set()
-    above: list[str] = []
-
-    @cache
-    def depth(name: str) -> tuple[int, tuple[str, ...]]:
-        """Bytes of the deepest chain from a function on, and its functions."""
-        if name == "assertFail":
-            return 0, (name,)
-        if name not in frames:
-            unknown.add(name)
-            return 0, (name,)
-        if name in above:
-            unknown.add(f"{name} (calls itself)")
-            return 0, (name,)
-        above.append(name)
-        below = max((depth(target) for target in calls.get(name, ())), default=(0, ()))
-        above.pop()
-        return frames[name] + below[0], (name, *below[1])
-
-    start = next((name for name in frames if name == entry or name.endswith(f":{entry}")), None)
-    if start is None:
-        raise SystemExit(f"{folder}: no {entry} in any .ci file; build with -fcallgraph-info=su")
-    size, chain = depth(start)
-    return size, [name.rsplit(":", 1)[-1] for name in chain], unknown
-
-
-if __name__ == "__main__":
+def main() -> None:
+    """Print the deepest chain of calls, and what is not counted in it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=Path, help="folder that `make firmware` built in")
     parser.add_argument("function", help="at which the chain begins")
@@ -61,3 +23,7 @@ if __name__ == "__main__":
     total, path, outside = deepest(options.build, options.function)
     print(f"{total} bytes: {' > '.join(path)}")
     print(f"not counted: {', '.join(sorted(outside))}")
+
+
+if __name__ == "__main__":
+    main()

@@ -24,10 +24,11 @@ from airtouch.logs.files import check_free, make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
-from tools.firmware_emulation import build, gap8, height
-from tools.firmware_emulation.board import PER_US
-from tools.firmware_emulation.compare import report
-from tools.firmware_emulation.replay import VEHICLES, Replay, replay, rows
+
+from . import build, gap8, height
+from .board import PER_US
+from .compare import report
+from .replay import VEHICLES, Replay, replay, rows
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
 #: what is said where the checkout is not given

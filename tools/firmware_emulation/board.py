@@ -16,7 +16,8 @@ from typing import Self
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from tools.instruction_counts.elf import Elf
+
+from ..instruction_counts.elf import Elf
 
 SHIFT = 3  #: an instruction takes 2^3 ns: 125 million a second, as 168 MHz at 1.34 cycles each
 PER_US = 1000 >> SHIFT  #: instructions a microsecond of the firmware's clock

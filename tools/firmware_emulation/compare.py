@@ -11,10 +11,11 @@ from airtouch.simulation import scenario
 from airtouch.simulation.flight_plan.world import top_at
 from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.vehicle import Vehicle
-from tools.firmware_emulation import side_by_side
-from tools.firmware_emulation.flight import BOOT_S, TRUE_X, EmulatedFlight, T, fly
-from tools.firmware_emulation.plant import STEP_S
-from tools.firmware_emulation.replay import VEHICLES
+
+from . import side_by_side
+from .flight import BOOT_S, TRUE_X, EmulatedFlight, T, fly
+from .plant import STEP_S
+from .replay import VEHICLES
 
 DRAWS = 3  #: seeds of the own loop whose flights are held against each other
 AIRBORNE_S = 2.5  #: of there-and-back: the take-off has ended

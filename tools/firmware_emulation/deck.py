@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.kernels.app_core import Gap8Core
-from tools.firmware_emulation.board import Board
+
+from .board import Board
 
 START, CLEAR = 0xFF, b"\xff\x00"  #: a frame's first byte; "clear to send"
 STM32, GAP8, APP = 1, 4, 5  #: CPX's targets and function

@@ -18,9 +18,10 @@ from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.vehicle import Vehicle
-from tools.firmware_emulation import plant as at
-from tools.firmware_emulation.board import FLY, Board
-from tools.firmware_emulation.plant import Plant
+
+from . import plant as at
+from .board import FLY, Board
+from .plant import Plant
 
 BOOT_S = 4.0  #: on the floor before the mission begins: self-tests, calibration, and the estimator at rest
 REST = 0.2  #: the IMU's noise there over that in flight; the firmware takes no bias from noise of 10 LSB and more

@@ -15,9 +15,10 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import DETECTORS, EDGES, HEALTH, LINK, AppCore
 from airtouch.logs.flight_log import FlightLog
 from airtouch.sitl.app import LOGS
-from tools.firmware_emulation.board import REPLAY, Board
-from tools.firmware_emulation.deck import Deck, Faults
-from tools.firmware_emulation.replay import FED, VEHICLE, Replay, compare, desktop_values, rows, sample, stack
+
+from .board import REPLAY, Board
+from .deck import Deck, Faults
+from .replay import FED, VEHICLE, Replay, compare, desktop_values, rows, sample, stack
 
 #: parameter of the detector whose network is on the GAP8
 DETECTOR = DETECTORS.index("best-gap8")

@@ -14,8 +14,9 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.simulation import scenario
 from airtouch.simulation.scenario import Scenario
-from tools.firmware_emulation.compare import SCENARIO, crossings, cruise, height_range, vehicle, words
-from tools.firmware_emulation.flight import TRUE_X, X, fly
+
+from .compare import SCENARIO, crossings, cruise, height_range, vehicle, words
+from .flight import TRUE_X, X, fly
 
 #: of there-and-back: height; how far it flies to land on the platform
 CRUISE_M, LAND_AT_M = 0.8, 1.5

@@ -12,7 +12,8 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import EDGES, AppCore
 from airtouch.logs.flight_log import ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.sitl.app import LOGS, PARAMS
-from tools.firmware_emulation.board import REPLAY, Board
+
+from .board import REPLAY, Board
 
 VEHICLE = "crazyflie-2.1-flow"  #: that `make firmware` builds cf2 for
 VEHICLES = {"cf2": VEHICLE, "cf21bl": "crazyflie-2.1-brushless"}  #: platform -> vehicle

@@ -14,8 +14,9 @@ from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
-from tools.firmware_emulation import flight
-from tools.firmware_emulation.flight import BOOT_S, REST, EmulatedFlight
+
+from . import flight
+from .flight import BOOT_S, REST, EmulatedFlight
 
 ROWS_S = 100  #: rows a second
 #: channel -> first column in EmulatedFlight.table, and in the simulator's log

@@ -12,24 +12,24 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]  # of the checkout
-FUZZ = ROOT / "tests" / "fuzz"  # the targets' sources
-BUILD = ROOT / "build" / "fuzz"  # objects, programs, corpora, findings
-# of the C that flies; the harnesses have address alone
+ROOT = Path(__file__).parents[2]  #: of the checkout
+FUZZ = ROOT / "tests" / "fuzz"  #: the targets' sources
+BUILD = ROOT / "build" / "fuzz"  #: objects, programs, corpora, findings
+#: of the C that flies; the harnesses have address alone
 SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
-# of every source
+#: of every source
 FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
-# folders of headers
+#: folders of headers
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link",
             "firmware/app/core", "gap8/kernels", "gap8/model", "gap8/app/src"]
-XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
+XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  #: the GAP8's path of the int8 kernels
 #: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
 VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
-# In long runs, the shipped network's kernels with address alone: half of the time of the targets that run it at every
-# step. `gap8` runs the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
+#: In long runs, the shipped network's kernels with address alone: half of the time of the targets that run it at every
+#: step. `gap8` runs the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
 ADDRESS = ("-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero",)
-SHIPPED = ("app", "stream_detector")  # these targets
-LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
+SHIPPED = ("app", "stream_detector")  #: these targets
+LONG = ("-O2",)  #: of runs in which the inputs cost more than the compiler: a third less for those of a network
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Engine:
 
     name: str
     compiler: str
-    product: tuple[str, ...]  # the sources that fly: their edges are counted, the harness's are not
+    product: tuple[str, ...]  #: the sources that fly: their edges are counted, the harness's are not
     link: tuple[str, ...]
 
 

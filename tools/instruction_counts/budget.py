@@ -1,13 +1,12 @@
-"""What each kernel may cost on each core: tests/emulation/budget.toml, and what of it is exceeded."""
+"""What each kernel may cost on each core: budget.toml, and what of it is exceeded."""
 
 import tomllib
 from dataclasses import fields
 from pathlib import Path
 
-from tools.instruction_counts.build import ROOT
-from tools.instruction_counts.flight_code import Cost
+from .flight_code import Cost
 
-PATH = ROOT / "tests" / "emulation" / "budget.toml"  #: file of the limits
+PATH = Path(__file__).with_name("budget.toml")  #: file of the limits
 
 
 def load(core: str, path: Path = PATH) -> dict[str, Cost]:

@@ -18,8 +18,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from tools.instruction_counts.cores import CORES, Core
-from tools.instruction_counts.elf import Elf
+
+from .cores import CORES, Core
+from .elf import Elf
 
 ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
 CACHE = ROOT / "build" / "emulator"  #: where programs lie, each in a folder named by its digest

@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from tools.instruction_counts.build import CACHE, build, compilers
-from tools.instruction_counts.flight_code import FlightCode, compile_flight_code, made_flight
-from tools.instruction_counts.machine import Machine
+
+from .build import CACHE, build, compilers
+from .flight_code import FlightCode, compile_flight_code, made_flight
+from .machine import Machine
 
 VERSION = "1.10.3"  #: of the package cmsisdsp
 CHANNELS, POINTS = 9, 256  #: transforms of a step, and their length
@@ -86,7 +87,7 @@ def fft_instructions(source: Path, compiler: str, optimise: str) -> int:
 
 def main() -> None:
     """Print instructions of CMSIS-DSP's transforms beside those of one step of the pipeline."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sdist", type=Path, help="the archive, instead of a download")
     source = unpack(parser.parse_args().sdist)
     flight = made_flight()

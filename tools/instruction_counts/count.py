@@ -3,7 +3,7 @@
     python -m tools.instruction_counts.count                        the table, beside its budget
     python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there)
     python -m tools.instruction_counts.count --optimise=-Os         as the Crazyflie firmware compiles by default
-    python -m tools.instruction_counts.count --toml                 limits for tests/emulation/budget.toml, 3 % above
+    python -m tools.instruction_counts.count --toml                 limits for budget.toml beside this file, 3 % above
 
 Run from the checkout's root. The mean is over the steps that give an output, the worst over all.
 """
@@ -20,9 +20,10 @@ from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.networks.int8_network import quantise
-from tools.instruction_counts import budget
-from tools.instruction_counts.build import compilers
-from tools.instruction_counts.flight_code import KERNELS, Cost, FlightCode, compile_flight_code, made_flight, samples
+
+from . import budget
+from .build import compilers
+from .flight_code import KERNELS, Cost, FlightCode, compile_flight_code, made_flight, samples
 
 #: programs that are also counted over recorded flights
 WHOLE = ("edge_pipeline", "stream_detector")
@@ -100,7 +101,7 @@ def _flights(code: FlightCode, folder: Path) -> None:
 
 def main() -> None:
     """Count the instructions and memory of every kernel on one core."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--core", default="cortex-m4", choices=["cortex-m4", "rv32imc"])
     parser.add_argument("--optimise", default="-O2")
     parser.add_argument("--compiler", choices=["zig", "gcc"])

@@ -11,9 +11,10 @@ from airtouch.reference.edge_decoder import LOGITS
 from airtouch.reference.edge_pipeline import EdgePipelineConfig
 from airtouch.reference.motion_channels import NAMES
 from airtouch.vehicle import Vehicle, load
-from tools.instruction_counts.build import ROOT, Program, build
-from tools.instruction_counts.elf import Elf
-from tools.instruction_counts.machine import Machine
+
+from .build import ROOT, Program, build
+from .elf import Elf
+from .machine import Machine
 
 #: folders of the C
 FIRMWARE, GAP8, MODEL = ROOT / "firmware" / "kernels", ROOT / "gap8" / "kernels", ROOT / "gap8" / "model"

@@ -16,8 +16,9 @@ from unicorn import riscv_const as riscv
 from unicorn import unicorn_const as uc_const
 
 from airtouch.errors import AirTouchError
-from tools.instruction_counts.counter import InstructionCounter
-from tools.instruction_counts.elf import ARM, Elf
+
+from .counter import InstructionCounter
+from .elf import ARM, Elf
 
 PAGE = 4096                 #: bytes of a page of the emulator's memory
 STACK_TOP = 0x3000_0000     #: a region of its own, so that running over its end is a fault

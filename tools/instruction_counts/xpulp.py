@@ -21,7 +21,7 @@ from typing import Any
 from unicorn import riscv_const as riscv
 from unicorn import unicorn_const as uc_const
 
-from tools.instruction_counts.machine import RETURN, STACK_TOP, EmulationError, Machine
+from .machine import RETURN, STACK_TOP, EmulationError, Machine
 
 BARRIER = RETURN + 16    #: a function that does nothing; what a team is given as its barrier
 BARRIER_CYCLES = 20      #: two instructions and the event unit, rounded up

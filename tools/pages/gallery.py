@@ -25,6 +25,7 @@ from airtouch.detector.evaluation import edge_map
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.detector.evaluation.score_report import hit_curve
+from airtouch.errors import in_one_line
 from airtouch.logs.files import write_bytes
 from airtouch.report.figures import error_distribution, flight
 from airtouch.report.map_figure import draw_edge_map
@@ -74,7 +75,7 @@ def zig_zag_map() -> bytes:
     model = best.load(None)
     edges = best.run(log, model).edges
     edge_points = edge_map.edge_map(log, edges, lag_s=best.lag_s(model),
-                             sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
+                                    sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
     return draw_edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges felt")
 
 
@@ -117,4 +118,5 @@ def smaller(picture: bytes) -> bytes:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with in_one_line("gallery"):
+        sys.exit(main())

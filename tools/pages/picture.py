@@ -1,7 +1,10 @@
 """The documentation's pictures: one held-out flight through the `best` detector, and its reliability plot.
 
-After `airtouch crossval --detector best --json out/best.json`, `python tools/pages/picture.py` draws a flight of fold 0
-with the model that never saw it (host/docs/img/flight.png) and the reliability over all folds (reliability.png).
+    airtouch crossval --detector best --json out/best.json
+    python tools/pages/picture.py
+
+Draws a flight of fold 0 with the model that never saw it (host/docs/img/flight.png) and the reliability over all folds
+(reliability.png).
 """
 
 import argparse
@@ -15,11 +18,13 @@ from airtouch import logs
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
+from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import reliability_of
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import NAMES
 from airtouch.report.figures import reliability
 from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
@@ -38,7 +43,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
     folder = need_flights()
-    file = next(f for f in dataset.collect([folder]) if f.path.name == options.flight)
+    file = next((f for f in dataset.collect([folder]) if f.path.name == options.flight), None)
+    if file is None:
+        raise AirTouchError(f"{folder} has no {options.flight}: give another one with --flight")
     path = min(options.models.glob(f"best_fold{file.condition.fold}_*.npz"), default=None)
     if path is None or not options.json.is_file():
         raise AirTouchError(f"{options.models if path is None else options.json} is not there: airtouch crossval "
@@ -48,7 +55,7 @@ def main() -> None:
     write_bytes(reliability({"best": reliability_of(scores)}), options.out / "reliability.png", force=True)
 
 
-def draw(log, model, name: str) -> bytes:
+def draw(log: FlightLog, model: BestModel, name: str) -> bytes:
     """PNG: what the drone feels, P(over a platform) with edges, and the down range that it never saw."""
     trace, truth = best.run(log, model), logs.true_edges(log)
     x = channels_of(log)[0]

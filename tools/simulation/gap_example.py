@@ -1,6 +1,6 @@
 """Make the flights of `airtouch gap demo`: four nominal ones, and one with an effect that its file does not name.
 
-    python tools/simulation/gap_example.py [FOLDER]
+    python tools/simulation/gap_example.py [FOLDER]    # seconds; the package's own example by default
 """
 
 import argparse
@@ -9,6 +9,7 @@ from pathlib import Path
 import tomli_w
 
 from airtouch import logs
+from airtouch.errors import in_one_line
 from airtouch.gap import example
 from airtouch.simulation import batch
 
@@ -19,8 +20,11 @@ EFFECT = {"weak_motor": {"rotor": 2, "thrust_loss": 0.12}}
 DROPPED = ("rpm_", "range_", "acc_world")  #: columns that the diagnosis can do without
 
 
-def main(folder: Path) -> None:
+def main() -> None:
     """Write the flights and the answer."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=example.FOLDER, help="of the package's example")
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     nominal = batch.flights(SCENARIO, 4, seed=NOMINAL_SEED, workers=1)
     real = batch.flights(SCENARIO, 1, effects=list(EFFECT.items()), seed=REAL_SEED, workers=1)
@@ -36,6 +40,5 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path, default=example.FOLDER, help="of the package's example")
-    main(parser.parse_args().folder)
+    with in_one_line("gap_example"):
+        main()

@@ -5,7 +5,7 @@
 In every scene so many flights without an effect, and one with each effect of EFFECTS, are held against four others of
 the scene. Prints for each scene how many of the former are `none` and of the latter have the effect as first answer,
 with intervals of 95 % (Wilson). Seed 0 gave the scatter of flights with a trim of their own
-(tools/calibration/nominal_scatter.py).
+(tools/calibration/nominal_scatter.py). The table is in host/docs/gap-blind.md.
 """
 
 import argparse
@@ -19,8 +19,9 @@ from itertools import islice
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
-from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.sealed.make import VEHICLE, stripped
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
@@ -64,8 +65,7 @@ def _cases(scene: str, flights: int, seed: int) -> Iterator[tuple[str, FlightLog
 def share(rows: list[tuple[str, str, float]]) -> str:
     """How many first answers are right, and the interval of their share."""
     hits = sum(interchangeable(truth, first) for truth, first, _ in rows)
-    interval = wilson(hits, len(rows))
-    return f"{hits} of {len(rows)} [{interval['low']:.0%}, {interval['high']:.0%}]"
+    return share_text(hits, len(rows))
 
 
 def main() -> None:
@@ -88,4 +88,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_scenes"):
+        main()

@@ -3,15 +3,19 @@
     python tools/simulation/replay_error.py    # a minute: eight simulated flights against five nominal ones
 
 Weak motors of 5 to 16 % and masses of 5 to 20 % are switched on in the scenario `diagnosis`, one a flight, and fitted.
+host/docs/looks.md has the figures.
 """
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
+from airtouch.gap.result import Diagnosis
 from airtouch.gap.sealed.make import SCENARIO, VEHICLE, stripped, study_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
@@ -22,6 +26,18 @@ NOMINAL = 5  #: flights
 CASES = [*(("weak_motor", {"rotor": r, "thrust_loss": x}, "thrust_loss")
            for r, x in ((1, 0.05), (2, 0.08), (3, 0.12), (4, 0.16), (1, 0.12))),
          *(("mass", {"fraction": x}, "fraction") for x in (0.05, 0.1, 0.2))]
+
+
+def fitted_value(diagnosis: Diagnosis, name: str, parameter: str) -> float | None:
+    """The value that a diagnosis gives a parameter of an effect; None where it does not name the effect."""
+    named = next((e for e in diagnosis.effects if e.name == name), None)
+    return None if named is None else named.parameters[parameter].value
+
+
+def summary(errors: Sequence[float], flights: int) -> str:
+    """The largest and the rms of relative errors, as text; flights: how many were flown for them."""
+    return (f"{len(errors)} of {flights} flights: at most {np.abs(errors).max():.2%} off, "
+            f"rms {np.sqrt(np.mean(np.square(errors))):.2%}")
 
 
 def main() -> None:
@@ -38,17 +54,16 @@ def main() -> None:
             print(f"{name} {values}: {log}")
             continue
         diagnosis = diagnose_with_study(study, list(ready_flights([stripped(log)], vehicle, [])))
-        named = next((e for e in diagnosis.effects if e.name == name), None)
-        if named is None:
+        fitted = fitted_value(diagnosis, name, parameter)
+        if fitted is None:
             print(f"{name} {values}: {diagnosis.verdict}")
             continue
-        fitted = named.parameters[parameter].value
         errors.append(fitted / values[parameter] - 1.0)
         print(f"{name} {parameter} {values[parameter]:g}: {fitted:.5f}, {errors[-1]:+.2%}", flush=True)
     if errors:
-        print(f"{len(errors)} of {len(CASES)} flights: at most {np.abs(errors).max():.2%} off, "
-              f"rms {np.sqrt(np.mean(np.square(errors))):.2%}")
+        print(summary(errors, len(CASES)))
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("replay_error"):
+        main()

@@ -1,10 +1,10 @@
 """Trained in simulation only, tested on recorded flights: with all effects of a scenario, and with each off.
 
-    .venv/bin/python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
+    python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
         [--detector best] [--without none --without ground_effect ...]
 
 A row that is in --out already, for the same flights, settings and simulator sources, is not done again.
-Prints the table of host/docs/simulate.md.
+Prints the table of host/docs/simulation-checks.md.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.summary import summarise
+from airtouch.errors import in_one_line
 from airtouch.logs.files import write_bytes
 from airtouch.simulation import scenario
 
@@ -116,4 +117,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("simulated_training"):
+        main()

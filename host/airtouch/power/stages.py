@@ -20,7 +20,7 @@ NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Component
          "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
          "network": "Physical Knowledge-aided Network"}
 #: folder of the instruction counts; only in a checkout
-BUDGETS = Path(__file__).resolve().parents[3] / "tests" / "emulation"
+BUDGETS = Path(__file__).resolve().parents[3] / "tools" / "instruction_counts"
 
 
 def table(stages: dict[str, Power]) -> str:
@@ -94,7 +94,7 @@ def gap8_mw(network: dict) -> Estimate:
         cycles = GAP8_CORES * float(network["cycles_8"]) if "window_instructions" in network else count
     except (KeyError, TypeError, ValueError):
         raise AirTouchError("the GAP8's budget has no instructions and cycles of a network; count again with "
-                            "python tools/firmware/gap8_figures.py --counts") from None
+                            "python -m tools.instruction_counts.gap8_figures --counts") from None
     low, high = sorted(1e3 * n * SAMPLE_RATE_HZ * GAP8_J for n in (min(cycles, count), count))
     return Estimate(low, high, count)
 
@@ -124,7 +124,8 @@ def estimate_table(estimates: dict[str, Estimate]) -> str:
         lines.append(f"{NAMES.get(name, name):44} {shown:>14} {e.instructions:>20.0f} "
                      f"{'' if paper is None else f'{paper:.0f}':>20}")
     return "\n".join([
-        *lines, "ESTIMATE: instructions counted in the emulator (tests/emulation/*budget.toml, 3 % above the counts)",
+        *lines,
+        "ESTIMATE: instructions counted in the emulator (tools/instruction_counts/*budget.toml, 3 % above the counts)",
         f"times 1 to 2 cycles x 20 to 40 mA at 168 MHz x {BATTERY_V:g} V (STM32), {1e12 * GAP8_J:.0f} pJ (GAP8). "
         "Sources and limits: host/docs/power.md"])
 

@@ -23,7 +23,7 @@ from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
 from firmware.make import ROOT, make
-from tools.firmware import stack
+from tools.firmware.call_graph import deepest
 from tools.instruction_counts import build
 from tools.instruction_counts.cores import CORTEX_M4
 from tools.instruction_counts.elf import Elf
@@ -182,7 +182,7 @@ def test_the_image_links_with_the_firmware(config, platform):
     image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
     assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
     assert firmwares_default(image, "wantedParams") == defaults()
-    size, _, _ = stack.deepest(ROOT / "build" / "firmware", "appMain")
+    size, _, _ = deepest(ROOT / "build" / "firmware", "appMain")
     assert size <= STACK_BUDGET
 
 
@@ -236,8 +236,8 @@ def test_the_deepest_stack_is_summed_along_calls(tmp_path):
                                    + edge.format("appMain", "a.c:short") + edge.format("appMain", "deep"))
     (tmp_path / "b.ci").write_text(node.format("deeper", 600) + edge.format("deep", "deeper")
                                    + edge.format("deeper", "memcpy") + edge.format("deeper", "deep"))
-    size, chain, unknown = stack.deepest(tmp_path, "appMain")
+    size, chain, unknown = deepest(tmp_path, "appMain")
     assert (size, chain[:3]) == (730, ["appMain", "deep", "deeper"])
     assert unknown == {"memcpy", "deep (calls itself)"}
     with pytest.raises(SystemExit, match="no nobody in any .ci file"):
-        stack.deepest(tmp_path, "nobody")
+        deepest(tmp_path, "nobody")

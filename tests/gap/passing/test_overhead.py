@@ -8,8 +8,6 @@ import pytest
 from click.testing import CliRunner
 
 import airtouch.gap.diagnosis as module
-import gap_real
-import recorded_cases
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
@@ -21,6 +19,8 @@ from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import LOOP, VEHICLE, fly
+from tools import gap_real
+from tools.diagnosis.recordings import cases as recorded_cases
 
 SECONDS = ((7.0, 7.4), (9.2, 9.7), (13.0, 13.3))
 

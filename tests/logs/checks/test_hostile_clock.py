@@ -9,8 +9,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.checks import clock
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
-from fuzzing.log_fuzzing.hostile import table, usd
-from fuzzing.log_fuzzing.sound import motion, si_columns
+from tools.fuzzing.log_fuzzing.hostile import table, usd
+from tools.fuzzing.log_fuzzing.sound import motion, si_columns
 
 
 def flying(n=200, **changed):

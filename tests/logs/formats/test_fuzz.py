@@ -2,10 +2,10 @@
 
 import pytest
 
-import fuzz_logs
 from airtouch import logs
 from airtouch.logs.files import parse
-from fuzzing.log_fuzzing import sound, walk
+from tools import fuzz_logs
+from tools.fuzzing.log_fuzzing import sound, walk
 
 COUNT = 80  #: inputs of each format; `tools/fuzz_logs.py` runs more
 
@@ -42,8 +42,9 @@ def test_a_failure_is_counted_with_the_number_that_repeats_it(tmp_path, monkeypa
     def broken(data, source):
         raise IndexError("no such place")
 
-    monkeypatch.setattr(walk, "parse", broken)
-    monkeypatch.setattr(fuzz_logs.walk, "walk", lambda *a, w=walk.walk: "log" if a[1] == "usd-2" else w(*a))
+    walk = fuzz_logs.walk.walk
+    monkeypatch.setattr(fuzz_logs.walk, "parse", broken)
+    monkeypatch.setattr(fuzz_logs.walk, "walk", lambda *a, w=walk: "log" if a[1] == "usd-2" else w(*a))
     count = fuzz_logs.fuzz("usd-2", 1, 5, 3, tmp_path)
     ((failure, numbers),) = count.failures.items()
     assert "IndexError" in failure and numbers == [5, 6, 7] and count.failed == 3

@@ -17,8 +17,8 @@ from airtouch.errors import AirTouchError, printable
 from airtouch.logs import public
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
-from fuzzing.log_fuzzing.hostile import HOSTILE, table
-from fuzzing.log_fuzzing.sound import META, canonical, motion, pack_log, parquet, si_columns
+from tools.fuzzing.log_fuzzing.hostile import HOSTILE, table
+from tools.fuzzing.log_fuzzing.sound import META, canonical, motion, pack_log, parquet, si_columns
 
 
 def flying(n=200, **changed):

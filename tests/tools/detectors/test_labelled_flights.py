@@ -12,6 +12,7 @@ from airtouch.errors import AirTouchError
 from airtouch.twin import adapt
 from made_flight import SMALL, made_flight
 from tools.detectors import labelled_flights
+from tools.detectors.labelled import training
 
 
 @pytest.fixture
@@ -121,15 +122,6 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
             "--out", tmp_path / "out")
 
 
-def test_draws_of_a_flight_add_up():
-    edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
-    score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
-    both = labelled_flights.merge([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
-    assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
-        ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
-    assert both[0].windows == (2, 4, 6, 8)
-
-
 def test_missed_edges_are_counted_by_height():
     hit_edge, missed_edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
     low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)
@@ -147,7 +139,7 @@ def test_false_edges_are_counted_by_place():
 
 def test_smaller_draws_lie_within_larger_ones():
     pool = [made_flight(0, 500) for _ in range(9)]
-    small, large = (labelled_flights.draw_flights(pool, k, draw=3) for k in (2, 5))
+    small, large = (training.draw_flights(pool, k, draw=3) for k in (2, 5))
     assert all(any(a is b for b in large) for a in small)
     with pytest.raises(AirTouchError, match="ask for fewer"):
-        labelled_flights.draw_flights(pool, 10, 0)
+        training.draw_flights(pool, 10, 0)

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import gap_lift
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import GROUND
+from tools.diagnosis import gap_lift
 
 VEHICLE = replace(vehicles.load("crazyflie-2.1"), nominal_voltage_v=4.0)
 STANDING_M, CURVE = 0.05, gap_lift.CURVE["ns-34g"]

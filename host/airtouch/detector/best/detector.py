@@ -27,7 +27,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 
-#: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
+#: Chosen over the five folds with models of three seeds, by tools/detectors/choose_decoder.py (host/docs/looks.md).
 DECODER = DecoderConfig(over_share=0.3, entry_score=2.3, exit_score=1.1, late_entry=3.0, late_exit=-4.0,
                         smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20)
 #: Decoder settings for a log that lacks a sensor, whose logits are less sure; chosen like DECODER, with `--silence`.

@@ -1,6 +1,6 @@
 """Scores of many flights as one table, each figure with its interval."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.detector.evaluation.bootstrap import Sums, bootstrap
 from airtouch.detector.evaluation.calibration import expected_calibration_error
 from airtouch.detector.evaluation.data.dataset import Condition
-from airtouch.detector.evaluation.score import HIT_RADII_M, FlightScore
+from airtouch.detector.evaluation.score import HIT_RADII_M, FlightScore, WindowCounts
 
 #: Height classes also reported together: 75 to 85 mm, where the lift is too weak to carry the edge.
 HIGH = ("h82", "h85")
@@ -41,6 +41,18 @@ def summarise(scores: Sequence[FlightScore], *, replicates: int = 2000, seed: in
         "airborne_minutes": float(sum(s.airborne_s for s in scores)) / 60.0,
         "intervals": {**{name: _pair(value) for name, value in intervals.items()}, "hit": hit_intervals},
     }
+
+
+def one_a_flight(scores: Iterable[FlightScore]) -> list[FlightScore]:
+    """One score a flight, the sum of its scores by several models, so that intervals draw a flight whole."""
+    of_flight: dict[str, list[FlightScore]] = {}
+    for score in scores:
+        of_flight.setdefault(score.file, []).append(score)
+    return [replace(same[0], edges=tuple(e for s in same for e in s.edges),
+                    false=tuple(sample for s in same for sample in s.false or ()),
+                    detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),
+                    windows=WindowCounts(*(sum(counts) for counts in zip(*(s.windows for s in same), strict=True))),
+                    bins=np.sum([s.bins for s in same], axis=0)) for same in of_flight.values()]
 
 
 def breakdown(scores: Sequence[FlightScore], key: Callable[[FlightScore], str | None]) -> dict[str, dict]:

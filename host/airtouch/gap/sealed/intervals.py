@@ -40,6 +40,12 @@ def wilson(hits: int, n: int, z: float = 1.959964) -> Figure:
             "hits": int(hits), "n": int(n)}
 
 
+def share_text(hits: int, n: int, digits: int = 0) -> str:
+    """Hits of n with the 95 % interval of their share, as text; digits: decimals of the percentages."""
+    share = wilson(hits, n)
+    return f"{hits} of {n} [{share['low']:.{digits}%}, {share['high']:.{digits}%}]"
+
+
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
     """Chance that a positive scores higher than a negative, ties counted half; None where either has none."""
     if not len(positive) or not len(negative):

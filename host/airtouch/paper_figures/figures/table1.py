@@ -42,8 +42,8 @@ def measured_power(log: Path) -> Figure:
 def estimated_power() -> Figure:
     """Table 1 estimated from instruction counts. Raises Missing without the counts."""
     if not stages.BUDGETS.is_dir():
-        raise Missing("the counted instructions are in a checkout alone (tests/emulation); clone the repository, or "
-                      "measure and give --power-log")
+        raise Missing("the counted instructions are in a checkout alone (tools/instruction_counts); clone the "
+                      "repository, or measure and give --power-log")
     estimates = stages.estimate(*(stages.counts(stages.BUDGETS / f"{n}.toml") for n in ("budget", "gap8_budget")))
     rows = [{"what": stages.NAMES.get(name, name), "mw": (e.low_mw + e.high_mw) / 2, "low_mw": e.low_mw,
              "high_mw": e.high_mw, "instructions_a_step": e.instructions,

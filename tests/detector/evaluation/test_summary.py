@@ -1,0 +1,40 @@
+"""Scores of several models on the same flights, as one a flight."""
+
+import numpy as np
+import pytest
+
+from airtouch.detector.evaluation.data.dataset import Condition
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
+from airtouch.detector.evaluation.summary import one_a_flight, summarise
+
+
+def test_draws_of_a_flight_add_up():
+    edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
+    score = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
+    both = one_a_flight([score, score, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
+    assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
+        ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
+    assert both[0].windows == (2, 4, 6, 8)
+
+
+def _scores(seed):
+    rng = np.random.default_rng(seed)
+    edges = [tuple(EdgeScore("entry", 100, 90, "entry", 0.1, float(e)) if e > 0 else EdgeScore("entry", 100)
+                   for e in rng.normal(0.05, 0.05, 4)) for _ in range(12)]
+    return [FlightScore(f"{i}", Condition(), e, tuple(range(rng.integers(0, 3))), 5, 30.0, (3, 4, 5, 9))
+            for i, e in enumerate(edges)]
+
+
+def test_two_equal_trainings_say_no_more_than_one():
+    """Flights are drawn whole: the same scores twice leave figures and intervals as they are."""
+    once = _scores(1)
+    twice = one_a_flight([*once, *once])
+    for name in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy"):
+        assert summarise(twice)[name] == pytest.approx(summarise(once)[name])
+        assert summarise(twice)["intervals"][name] == pytest.approx(summarise(once)["intervals"][name])
+
+
+def test_trainings_are_averaged_by_edge():
+    first, second = _scores(1), _scores(2)
+    distances = [abs(e.error_m) for s in (*first, *second) for e in s.edges if e.error_m is not None]
+    assert summarise(one_a_flight([*first, *second]))["mean_abs_error_m"] == pytest.approx(np.mean(distances))

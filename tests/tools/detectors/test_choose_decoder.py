@@ -1,0 +1,74 @@
+"""The choice of the decoder's settings, on made detections whose delays, misses and false edges are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.detector.best.recipe import ROW_STRIDE
+from airtouch.detector.evaluation.score import TOLERANCE_S
+from airtouch.logs.edges import Edge
+from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.reference.edge_decoder import DecoderConfig
+from tools.detectors import choose_decoder as tool
+
+STEPS = 1000
+#: delays, s, and false edges in one flight of two edges
+PROMPT, LATE, BLIND = (np.array([0.1, 0.1]), 0), (np.array([0.1, 0.5]), 0), (np.array([]), 3)
+
+
+def flight(edges=(200, 600), fold=0, speed=0.3, minutes=0.5):
+    """A flight with true edges at these samples."""
+    return tool.HeldOutFlight(SimpleNamespace(path=None, condition=None), fold, speed,
+                              [Edge(sample, "entry", 0.0, 0.0) for sample in edges], np.ones(STEPS, bool),
+                              np.zeros(STEPS), np.zeros((STEPS, 3)), np.ones(STEPS, bool), minutes)
+
+
+@pytest.fixture
+def detected_at(monkeypatch):
+    """detected_at(samples): the decoder sees an edge at these samples, whatever its settings."""
+    def at(*samples):
+        edges = np.zeros(STEPS, np.uint8)
+        edges[[s // ROW_STRIDE for s in samples]] = 1
+        monkeypatch.setattr(tool.kernels, "edge_decoder", lambda *_: edges)
+    return at
+
+
+def test_delays_are_those_of_matched_edges_and_the_rest_is_false(detected_at):
+    far = 600 + 2 * round(TOLERANCE_S / SAMPLE_PERIOD_S)
+    detected_at(190, 220, far)  # the nearer one of two is the edge of sample 200, the other false
+    ((delays, false),) = tool.outcomes([flight()], DecoderConfig())
+    assert delays == pytest.approx([-0.1]) and false == 2
+
+
+def test_figures_in_closed_form():
+    """Errors of 0.1 and 0.3 s at 0.3 m/s and 0.2 s at 1 m/s after a lag of 0.2 s; one of four edges missed."""
+    flights = [flight(), flight(speed=1.0, minutes=1.5)]
+    outcomes = [(np.array([0.3, -0.1]), 1), (np.array([0.4]), 0)]
+    figures = tool.figures(flights, outcomes, 0.2)
+    assert figures == pytest.approx({"error_m": (0.03 + 0.09 + 0.2) / 3, "missed": 0.25, "false_per_minute": 0.5,
+                                     "rms_s": np.sqrt((0.01 + 0.09 + 0.04) / 3)})
+    assert tool.lag_of(outcomes) == pytest.approx(0.3) and tool.lag_of([BLIND]) == 0.0
+
+
+def test_the_cost_is_in_metres():
+    """Nothing found costs MISS_M and each false edge a minute FALSE_M; the same delay of all edges costs nothing."""
+    assert tool.cost([flight()], [BLIND]) == pytest.approx(tool.MISS_M + tool.FALSE_M * 3 / 0.5)
+    assert tool.cost([flight()], [PROMPT]) == pytest.approx(0.0)
+    assert tool.cost([flight()], [LATE]) == pytest.approx(0.3 * 0.2)  # 0.2 s each beside their median of 0.3 s
+
+
+def test_a_fold_is_scored_with_settings_that_its_own_flights_did_not_choose():
+    """Settings 0 are right on fold 0 alone and settings 1 on fold 1 alone: each fold gets the other's."""
+    flights = [flight(fold=0), flight(fold=1)]
+    results = [[PROMPT, BLIND], [BLIND, LATE]]
+    assert tool.choices(flights, results) == {0: (1, pytest.approx(0.3)), 1: (0, pytest.approx(0.1))}
+    assert tool.cheapest(flights, [*results, [PROMPT, PROMPT]]) == 2
+
+
+def test_settings_are_drawn_from_their_ranges_and_hold_as_told():
+    settings = tool.candidates(200, np.random.default_rng(1), 7)
+    assert len(set(settings)) == 200 and {s.hold_steps for s in settings} == {7}
+    late = np.array([(s.late_entry, s.late_exit) for s in settings])
+    assert -0.5 <= late[:, 0].min() < 0.0 < 4.0 < late[:, 0].max() <= 4.5
+    assert -4.5 <= late[:, 1].min() < -4.0 and -0.5 < late[:, 1].max() <= 0.0

@@ -1,0 +1,38 @@
+"""The test of wakes that is told when a vehicle was under another."""
+
+import numpy as np
+import pytest
+
+from tools.diagnosis import gap_wakes
+
+
+def window(cf="cf50", start_s=0.0, place=(0.0, 0.0, 0.5), n=1000, force=0.0):
+    generator = np.random.default_rng(int(start_s) + n)
+    row = {"cf": cf, "start_s": str(start_s), "flight": f"day/{cf}_01"}
+    noise = generator.normal(scale=0.02, size=(3, n))
+    return gap_wakes.Track(row, np.tile(place, (n, 1)), noise[0] + force, noise[1], noise[2], np.ones(n, bool))
+
+
+def test_another_vehicle_is_above_where_both_cuts_hold_the_time():
+    low, high = window(), window("cf51", 4.0, (0.1, 0.0, 0.9), 300)
+    assert np.flatnonzero(gap_wakes.under(low, high)).tolist() == list(range(400, 700))
+    assert not gap_wakes.under(high, low).any()
+    assert not gap_wakes.under(low, window("cf51", 0.0, (0.2, 0.0, 0.9))).any()
+    assert not gap_wakes.under(low, window("cf51", 0.0, (0.0, 0.0, 1.2))).any()
+
+
+def test_only_vehicles_of_the_same_flight_count():
+    low, high = window(), window("cf51", 0.0, (0.0, 0.0, 0.9))
+    assert gap_wakes.overhead_at(low, [low, high]).all()
+    high.row["flight"] = "day/cf51_02"
+    assert not gap_wakes.overhead_at(low, [low, high]).any()
+
+
+def test_a_push_in_these_seconds_is_beyond_chance_and_none_is_not():
+    acts = np.zeros(1000, bool)
+    acts[300:400] = True
+    by_chance = gap_wakes.chance(acts, [window(n=1000 + i) for i in range(6)])
+    push = window(n=1000, force=np.where(acts, -0.05, 0.0))
+    assert gap_wakes.measures(push, acts)[0] == pytest.approx(0.05, abs=0.01)
+    assert gap_wakes.measures(push, acts)[0] > np.quantile(by_chance[:, 0], 0.997)
+    assert gap_wakes.measures(window(n=1200), np.resize(acts, 1200))[0] < np.quantile(by_chance[:, 0], 0.997)

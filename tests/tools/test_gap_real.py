@@ -1,0 +1,47 @@
+"""The diagnosis on a few recorded flights of each kind, and that the check of them can fail."""
+
+import re
+
+from tools import gap_real
+from tools.diagnosis.recordings import cases
+
+
+def test_a_few_recorded_flights_of_each_kind(flights, capsys):
+    assert gap_real.main([str(flights), "--quick", "--jobs", "1"]) == 0
+    table = capsys.readouterr().out
+    assert all(row in table for row in ("swarm, ns", "crazypad", "peers"))
+
+
+def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, capsys):
+    def blind(case):
+        return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": case.flight.split("/")[-1],
+                "effects": [], "verdict": "none"}
+
+    monkeypatch.setattr(gap_real, "diagnose_case", blind)
+    monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+    assert gap_real.main([str(flights), "--quick"]) == 1
+    assert "wrong, more than" in capsys.readouterr().err
+
+
+def test_nominal_flights_are_held_against_others_of_their_group(flights):
+    build, view = (list(cases.nominal(flights, part)) for part in ("build", "view"))
+    assert len(build) >= 60 and len(view) >= 30
+    assert not {c.flight for c in build} & {c.flight for c in view}
+    for case in build + view:
+        assert case.truth == "none" and case.flight not in case.baseline
+        assert 2 <= len(case.baseline) <= cases.OTHERS
+    days = {day for c in build if "neuralswarm" in c.flight for day in re.findall(r"_cf\d+d(\d\d)_", c.flight)}
+    assert days == {"19", "20"}
+
+
+class Alone:
+    """A pool of this process alone."""
+
+    def __init__(self, _jobs, _context):
+        self.map = map
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None

@@ -1,0 +1,210 @@
+"""Choose the `best` detector's decoder settings from cross-validated models.
+
+    airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
+    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...
+
+Each flight is decoded from the logits of the model that never saw it, once for each folder; with --silence SENSOR from
+the log without that sensor. Prints the settings that are best over all folds, and an honest figure for choosing them:
+each fold scored with the settings best on the others. host/docs/results.md has that figure of the shipped settings.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+from airtouch import kernels, logs
+from airtouch.cli.shared import scores as show_scores
+from airtouch.cli.shared.flights import need_flights
+from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.best.recipe import ROW_STRIDE
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
+from airtouch.detector.shared import sensors
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError, in_one_line
+from airtouch.logs.edges import Edge
+from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.reference.edge_decoder import DecoderConfig
+
+MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: round number, 1 s at 0.3 m/s
+FALSE_M = 0.02  #: m of mean error, cost of one false edge a minute; no source: round number
+
+
+@dataclass(frozen=True)
+class HeldOutFlight:
+    """A flight as the model of its fold sees it, which was not trained on it.
+
+    speed: m/s; true: its edges; flying (n,): samples in the air; over (n,): probability of being over a platform;
+    logits (steps, 3) and airborne (steps,): what the decoder reads; minutes: in the air.
+    """
+
+    file: dataset.FlightFile
+    fold: int
+    speed: float
+    true: list[Edge]
+    flying: np.ndarray
+    over: np.ndarray
+    logits: np.ndarray
+    airborne: np.ndarray
+    minutes: float
+
+    @property
+    def edges(self) -> list[int]:
+        """Samples of the true edges."""
+        return [e.sample for e in self.true]
+
+
+def held_out_flight(file: dataset.FlightFile, fold: int, model: BestModel, silent: tuple[str, ...]) -> HeldOutFlight:
+    """A flight read and run through the model of its fold, without the sensors `silent`."""
+    if file.condition.speed_mps is None:
+        raise AirTouchError(f"{file.path}: no speed, which turns seconds into metres; add a column speed_mps to the "
+                            "manifest.csv beside it")
+    log = logs.read(file.path)
+    events = best.flight_events(sensors.without(log, silent), model)
+    over = np.where(events.airborne, 1.0 / (1.0 + np.exp(-events.logits[:, 0].astype(float))), 0.0)
+    return HeldOutFlight(file, fold, file.condition.speed_mps, logs.true_edges(log), logs.airborne(log), over,
+                         events.logits[events.ready], events.airborne[events.ready],
+                         float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60)
+
+
+def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[HeldOutFlight]:
+    """Every flight with the model of its own fold in `out`, by what `airtouch crossval` wrote of that fold."""
+    files = {file.path.name: file for file in dataset.collect([folder])}
+    entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
+    if len({entry["fold"] for entry in entries}) != len(entries):
+        raise AirTouchError(f"{out}: folds of more than one cross-validation; give a folder with one")
+    if absent := {score["file"] for entry in entries for score in entry["per_flight"]} - set(files):
+        raise AirTouchError(f"{folder}: no {min(absent)}, which {out} was made of; set AIRTOUCH_FLIGHTS to its folder")
+    flights = []
+    for entry in track(entries, "logits"):
+        model = best.load(out / entry["model"])
+        flights += [held_out_flight(files[score["file"]], entry["fold"], model, silent)
+                    for score in entry["per_flight"]]
+    return flights
+
+
+def outcomes(flights: list[HeldOutFlight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
+    """For each flight the delays of the detected edges, s, and the number of false detections."""
+    out = []
+    for flight in flights:
+        at = np.flatnonzero(kernels.edge_decoder(flight.logits, flight.airborne, config)) * ROW_STRIDE
+        pairs = match(flight.edges, list(at), TOLERANCE_S / SAMPLE_PERIOD_S)
+        delays = np.array([(at[j] - flight.edges[i]) * SAMPLE_PERIOD_S for i, j in pairs])
+        out.append((delays, len(at) - len(pairs)))
+    return out
+
+
+def score(flight: HeldOutFlight, config: DecoderConfig, lag: float) -> FlightScore:
+    """The flight's score, as `airtouch evaluate` has it, with these settings and this lag."""
+    edges = kernels.edge_decoder(flight.logits, flight.airborne, config)
+    detections = [Detection(int(i) * ROW_STRIDE, best.KINDS[int(edges[i])]) for i in np.flatnonzero(edges)]
+    return score_flight(flight.file.path.name, flight.file.condition, flight.true, flight.flying,
+                        Trace(flight.over, detections), lag)
+
+
+def figures(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
+    """Mean error of the edges found, share missed, false a minute."""
+    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, outcomes_of, strict=True)])
+    edges = sum(len(f.edges) for f in flights)
+    late = np.concatenate([d - lag for d, _ in outcomes_of])
+    return {"error_m": float(errors.mean()) if len(errors) else MISS_M, "missed": 1 - len(errors) / edges,
+            "rms_s": float(np.sqrt(np.mean(np.square(late)))) if len(late) else np.nan,
+            "false_per_minute": sum(n for _, n in outcomes_of) / sum(f.minutes for f in flights)}
+
+
+def lag_of(outcomes_of: list[tuple[np.ndarray, int]]) -> float:
+    """Median delay, seconds."""
+    delays = np.concatenate([d for d, _ in outcomes_of])
+    return float(np.median(delays)) if len(delays) else 0.0
+
+
+def cost(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> float:
+    """Metres: mean error with misses at MISS_M, and FALSE_M for each false edge a minute."""
+    f = figures(flights, outcomes_of, lag_of(outcomes_of))
+    return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
+
+
+#: for each of some settings, the `outcomes` of all flights
+Results = list[list[tuple[np.ndarray, int]]]
+
+
+def cheapest(flights: list[HeldOutFlight], results: Results) -> int:
+    """Index of the settings whose outcomes cost least."""
+    return int(np.argmin([cost(flights, outcomes_of) for outcomes_of in results]))
+
+
+def choices(flights: list[HeldOutFlight], results: Results) -> dict[int, tuple[int, float]]:
+    """Fold -> (index of the settings that are best on the flights of the other folds, their lag there)."""
+    chosen = {}
+    for fold in {flight.fold for flight in flights}:
+        others = [k for k, flight in enumerate(flights) if flight.fold != fold]
+        choice = cheapest([flights[k] for k in others], [[of[k] for k in others] for of in results])
+        chosen[fold] = choice, lag_of([results[choice][k] for k in others])
+    return chosen
+
+
+def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderConfig]:
+    """Random settings, drawn without a look at any flight."""
+    out = []
+    for _ in range(count):
+        scores = {"entry_score": rng.uniform(-1, 4), "exit_score": rng.uniform(-1, 4),
+                  "late_entry": rng.uniform(-0.5, 4.5), "late_exit": rng.uniform(-4.5, 0)}
+        out.append(DecoderConfig(**{name: round(float(value), 2) for name, value in scores.items()}, arm_steps=100,
+                                 over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
+                                 smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
+                                 dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
+    return out
+
+
+def main() -> None:
+    """Search, then print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
+    parser.add_argument("--count", type=int, default=1000, help="settings tried")
+    parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
+                        help="steps after its crossing at which an edge is reported (default: as shipped)")
+    parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
+                        help="decode the flights without this sensor")
+    parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/detectors/sensor_figures.py")
+    options = parser.parse_args()
+    flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
+    if not flights:
+        raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
+    settings = candidates(options.count, np.random.default_rng(0), options.hold)
+    results = [outcomes(flights, config) for config in track(settings, "settings")]
+    print_figures("as shipped", flights, outcomes(flights, best.DECODER))
+    print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
+    winner = cheapest(flights, results)
+    print_figures("one setting, best over all folds", flights, results[winner])
+    print(json.dumps(asdict(settings[winner])))
+    nested: list[FlightScore] = []
+    for fold, (choice, lag) in choices(flights, results).items():
+        nested += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
+    result = evaluate.as_json("best", nested, [], lag_of(results[winner]), asdict(settings[winner]))
+    show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},
+                            "each fold with the settings best on the others")
+    if options.json:
+        show_scores.write_json(options.json, result, force=True)
+
+
+def print_figures(title: str, flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
+    """One line of figures."""
+    lag = lag_of(outcomes_of)
+    print(f"{title}: {_text(figures(flights, outcomes_of, lag))}, lag {lag:.2f} s")
+
+
+def _text(f: dict[str, float]) -> str:
+    """The figures of a decoder as a line."""
+    return (f"error {1000 * f['error_m']:.1f} mm ({f['rms_s']:.2f} s rms), missed {f['missed']:.1%}, "
+            f"false {f['false_per_minute']:.2f} a minute")
+
+
+if __name__ == "__main__":
+    with in_one_line("choose_decoder"):
+        main()

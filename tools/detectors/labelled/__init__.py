@@ -1,0 +1,1 @@
+"""Training with a few labelled flights: what labelled_flights.py scores."""
