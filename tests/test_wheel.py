@@ -1,6 +1,7 @@
 """The wheel: built from this tree it holds all that detecting, diagnosing and simulating read, and works away from the
 tree."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -25,9 +26,11 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     out = tmp_path_factory.mktemp("wheel")
+    settings = out / "build.cfg"  # a build folder of its own: that of the tree may hold modules that are gone
+    settings.write_text(f"[build]\nbuild_base = {out / 'build'}\n")
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", out,
                     ROOT],
-                   check=True, timeout=600)
+                   check=True, timeout=600, env={**os.environ, "DIST_EXTRA_CONFIG": str(settings)})
     (path,) = out.glob("airtouch-*.whl")
     return path
 
