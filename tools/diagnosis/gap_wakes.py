@@ -198,13 +198,13 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
         for case in map(json.loads, answers.read_text().splitlines()):
             answer_of[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
     table: dict[str, list[bool]] = {}
-    unknown = 0
+    named: dict[bool, list[bool]] = {True: [], False: []}  # by whether the data hold the path
     print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
         acts = overhead_at(t, tracks)
         seconds = (acts & t.usable).sum() * PERIOD_S
+        named[seconds >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
         if seconds < LEAST_S:
-            unknown += 1
             print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
                   f"{answer_of.get(t.row['file'], '')} |")
             continue
@@ -219,7 +219,10 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
         print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
-    print(f"{unknown} more, whose other vehicle's path the data do not hold")
+    print(f"{len(named[False])} more, whose other vehicle's path the data do not hold")
+    if answers:
+        print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold the "
+              f"path, in {share_text(sum(named[False]), len(named[False]))} where they do not")
 
 
 def main() -> None:
