@@ -15,7 +15,7 @@ build: days 19 and 20.
 Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
 vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test that is not told the seconds, 5 min
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test that is not told the seconds, 3 to 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
 the two apart. The figures of all three are in host/docs/gap-real.md.
@@ -198,14 +198,14 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
         for case in map(json.loads, answers.read_text().splitlines()):
             answer_of[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
     table: dict[str, list[bool]] = {}
-    named: dict[bool, list[bool]] = {True: [], False: []}  # by whether the data hold the path
+    named: dict[bool, list[bool]] = {True: [], False: []}  # by whether the data hold LEAST_S of the path
     print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
         acts = overhead_at(t, tracks)
         seconds = (acts & t.usable).sum() * PERIOD_S
         named[seconds >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
         if seconds < LEAST_S:
-            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
+            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | less than {LEAST_S:g} s held | "
                   f"{answer_of.get(t.row['file'], '')} |")
             continue
         like = [n for n in nominal if (n.row["vehicle"], n.row["manoeuvre"]) == (t.row["vehicle"], t.row["manoeuvre"])]
@@ -219,10 +219,10 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
         print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
-    print(f"{len(named[False])} more, whose other vehicle's path the data do not hold")
+    print(f"{len(named[False])} more, for which the data hold less than {LEAST_S:g} s of a path overhead")
     if answers:
-        print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold the "
-              f"path, in {share_text(sum(named[False]), len(named[False]))} where they do not")
+        print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold "
+              f"at least {LEAST_S:g} s of the path, in {share_text(sum(named[False]), len(named[False]))} where less")
 
 
 def main() -> None:
