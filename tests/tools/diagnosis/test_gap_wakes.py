@@ -36,3 +36,18 @@ def test_a_push_in_these_seconds_is_beyond_chance_and_none_is_not():
     assert gap_wakes.measures(push, acts)[0] == pytest.approx(0.05, abs=0.01)
     assert gap_wakes.measures(push, acts)[0] > np.quantile(by_chance[:, 0], 0.997)
     assert gap_wakes.measures(window(n=1200), np.resize(acts, 1200))[0] < np.quantile(by_chance[:, 0], 0.997)
+
+
+def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(capsys):
+    here = {"file": "low.csv", "vehicle": "34 g", "manoeuvre": "hover", "s_under": "2.0"}
+    low, nominal = window(), window("cf52", 50.0)
+    low.row.update(here, truth="downwash")
+    nominal.row.update(here, file="calm.csv", truth="none")
+    for samples, words in ((40, "less than 0.5 s held"), (60, "| yes |")):
+        high = window("cf51", 4.0, (0.0, 0.0, 0.9), samples)
+        high.row.update(here, file="high.csv", truth="partner")
+        low.force[:] = np.where(gap_wakes.under(low, high), -0.2, low.force)
+        gap_wakes.show_seen([low, high, nominal], None)
+        out = capsys.readouterr().out
+        assert words in next(line for line in out.splitlines() if "low.csv" in line)
+        assert f"{int(samples == 40)} more, for which the data hold less than 0.5 s" in out
