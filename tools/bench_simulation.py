@@ -1,4 +1,4 @@
-"""Simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
+"""Prints simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
     python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
 

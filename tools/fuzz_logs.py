@@ -1,4 +1,4 @@
-"""Fuzz the log readers: mutated files of every format through read, check, segments, resample and the command.
+"""Fuzzes the log readers: mutated files of every format through read, check, segments, resample and the command.
 
     make fuzz-logs [RUNS=100000] [ARGS="--seed 2 --first 100000"]       # or: python tools/fuzz_logs.py --count 100000
     python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711

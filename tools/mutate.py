@@ -19,6 +19,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from airtouch.cli.shared.flights import data_folder
 from airtouch.gap.sealed.intervals import wilson
 
 ROOT = Path(__file__).parents[1]  #: of the checkout
@@ -79,9 +80,8 @@ def stage(name: str, force: bool) -> Path:
 
 def run_mutmut(place: Path, *mutants: str) -> None:
     """Run the named mutants, or all; those that are done are not run again."""
-    flights = os.environ.get("AIRTOUCH_FLIGHTS", str(ROOT.parent / "shared" / "flights"))
     subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
-                   env=os.environ | {"AIRTOUCH_FLIGHTS": flights})
+                   env=os.environ | {"AIRTOUCH_FLIGHTS": str(data_folder().resolve())})
 
 
 def results(place: Path) -> dict[str, int | None]:

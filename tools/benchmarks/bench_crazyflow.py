@@ -1,4 +1,4 @@
-"""Simulated seconds a wall second of crazyflow (JAX) on the CPU: 64 worlds under state control at 500 Hz.
+"""Prints simulated seconds a wall second of crazyflow (JAX) on the CPU: 64 worlds under state control at 500 Hz.
 
     python tools/benchmarks/bench_crazyflow.py [--seconds 10] [--rounds 3]
 

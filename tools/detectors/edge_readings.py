@@ -1,4 +1,4 @@
-"""What the down range reads at platform edges, and what the firmware's height control makes of it.
+"""Prints what the down range reads at platform edges, and what the firmware's height control makes of it.
 
     python tools/detectors/edge_readings.py FOLDER --fold 0 --fold 1 --fold 2 [--twin FOLDER]
 

@@ -1,4 +1,4 @@
-"""By what a detector notices a high platform, and what simulated edges lack of it.
+"""Prints by which channels `best` detects high platforms, and how simulated edges differ from recorded ones.
 
     python tools/detectors/high_edges.py FOLDER... --fold 0 --fold 1 --fold 2 --model MODEL.npz... [--twin FOLDER]
 

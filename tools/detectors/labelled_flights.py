@@ -1,4 +1,4 @@
-"""What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
+"""Prints what a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
     python tools/detectors/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled
         [--twin FOLDER | --beside FOLDER] [--unlabelled]

@@ -1,5 +1,4 @@
-"""What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
-of.
+"""Writes what `best` loses where a log lacks a sensor to `host/airtouch/models/best_sensors.json`, for its notes.
 
     python tools/detectors/choose_decoder.py out/folds --json out/all.json
     python tools/detectors/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates

@@ -1,4 +1,4 @@
-"""Train the detector that serves logs without acceleration: recorded flights, simulated edges over shorter platforms.
+"""Trains the detector for logs without acceleration: recorded flights, and simulated edges over shorter platforms.
 
     python tools/detectors/train_without_acceleration.py ../shared/flights/airtouch --twin twin012 --out without.npz
         [--free-air FOLDER] [--hold-out FOLD] [--least 0.3] [--seed 0] [--force]

@@ -1,4 +1,4 @@
-"""Trained in simulation only, tested on recorded flights: with all effects of a scenario, and with each off.
+"""Trains on simulated flights only, tests on recorded ones: with all effects of a scenario, and with each off.
 
     python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
         [--detector best] [--without none --without ground_effect ...]
