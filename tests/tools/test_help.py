@@ -41,7 +41,7 @@ for path in sys.argv[1:]:
 """
 
 
-def test_every_script_has_a_help_text():
+def test_every_script_and_every_option_has_a_help_text():
     run = subprocess.run([sys.executable, "-c", RUN, *SCRIPTS, *MODULES], capture_output=True, text=True,
                          cwd=TOOLS.parent)
     answers = dict(line.split(" ", 1) for line in run.stdout.splitlines())

@@ -162,8 +162,9 @@ def main() -> None:
     """Recorded flights, then the twin's."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--fold", type=int, action="append", default=[])
-    parser.add_argument("--twin", type=Path)
+    parser.add_argument("--fold", type=int, action="append", default=[],
+                        help="only flights of this fold; may be repeated")
+    parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()
     recorded = flights.read([options.folder], folds=options.fold)
     print_tables("recorded", list(zip(recorded.courses, recorded.channels, strict=True)))

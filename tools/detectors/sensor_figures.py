@@ -40,7 +40,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", nargs="+", metavar="NAME=JSON=WHERE",
                         help="all, and each sensor that may be missing")
-    parser.add_argument("--out", type=Path, default=FILE)
+    parser.add_argument("--out", type=Path, default=FILE, help="(default: the package's own)")
     options = parser.parse_args()
     if odd := [pair for pair in options.pairs if pair.count("=") != 2]:
         parser.error(f"{odd[0]} is not NAME=JSON=WHERE")

@@ -188,20 +188,35 @@ def auroc_interval(wakes: np.ndarray, calm: np.ndarray) -> np.ndarray:
                      replicates=DRAWS, level=0.95)
 
 
+def answers_of(path: Path | None) -> dict[str, str]:
+    """A flight's file -> the first effect, or the verdict, in what `gap_real.py --keep` wrote; empty without a file."""
+    return {case["flight"]: case["effects"][0]["name"] if case["effects"] else case["verdict"]
+            for case in json_lines.read(path)}
+
+
+def seconds_under(one: Track, tracks: list[Track]) -> tuple[np.ndarray, float]:
+    """Samples (n,) at which another vehicle is above, as far as the data hold its path, and the usable seconds of
+    them."""
+    acts = overhead_at(one, tracks)
+    return acts, float((acts & one.usable).sum() * PERIOD_S)
+
+
+def named_by_path(tracks: list[Track], answer_of: dict[str, str]) -> dict[bool, list[bool]]:
+    """Whether the data hold the other vehicle's path over LEAST_S -> whether each such flight's answer is a wake."""
+    named: dict[bool, list[bool]] = {True: [], False: []}
+    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
+        named[seconds_under(t, tracks)[1] >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
+    return named
+
+
 def show_seen(tracks: list[Track], answers: Path | None) -> None:
     """Print a line for each flight under another vehicle, and for each vehicle how many the test sees."""
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
-    answer_of = {}
-    if answers:
-        for case in json_lines.read(answers):
-            answer_of[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
+    answer_of = answers_of(answers)
     table: dict[str, list[bool]] = {}
-    named: dict[bool, list[bool]] = {True: [], False: []}  # by whether the data hold the path
     print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = overhead_at(t, tracks)
-        seconds = (acts & t.usable).sum() * PERIOD_S
-        named[seconds >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
+        acts, seconds = seconds_under(t, tracks)
         if seconds < LEAST_S:
             print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
                   f"{answer_of.get(t.row['file'], '')} |")
@@ -217,6 +232,7 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
         print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
+    named = named_by_path(tracks, answer_of)
     print(f"{len(named[False])} more, whose other vehicle's path the data do not hold")
     if answers:
         print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold the "

@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("--detector", action="append", choices=("best", "paper"), help="default both")
     parser.add_argument("--without", action="append", metavar="EFFECT",
                         help="only these rows; none is all effects on")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of flights and training (default %(default)s)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     folder = find_flights()
