@@ -15,9 +15,12 @@ def read(path: Path | None) -> list[dict[str, Any]]:
     objects = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         try:
-            objects.append(dict(json.loads(line)))
-        except (ValueError, TypeError):
-            raise AirTouchError(f"{path}: line {number} is no JSON object; remove that line") from None
+            one = json.loads(line)
+        except ValueError:
+            one = None
+        if not isinstance(one, dict):
+            raise AirTouchError(f"{path}: line {number} is no JSON object; remove that line")
+        objects.append(one)
     return objects
 
 
