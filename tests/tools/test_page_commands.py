@@ -222,7 +222,7 @@ def check(command: Command, page: Path, monkeypatch) -> None:
     pytest.fail(f"{page.relative_to(ROOT)}: {command}: {reason}")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_commands_of_a_page_are_understood(page, monkeypatch):
     for command in commands(page):
         check(command, page, monkeypatch)
