@@ -97,7 +97,7 @@ def test_a_command_that_differs_is_counted():
 
 
 class Desk:
-    """A board on a desk: its motors stand still. `said` is what it was told."""
+    """A board on a desk: its motors stand still. `said` is what it received."""
 
     said: list[bytes] = []
     console = "Self test passed!"
