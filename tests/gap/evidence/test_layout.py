@@ -57,13 +57,14 @@ def test_blocks_in_the_air_are_numbered_through_all_flights(layout):
     first = [{AIR: np.array([0, 128, 256]), REST: np.array([5, 17])}, {AIR: np.array([64, 192])}]
     air = layout.air_blocks(first)
     number = {(0, 0): 0, (0, 2): 1, (1, 0): 2, (1, 1): 3}
-    assert air.of.tolist() == by_hand(layout, lambda i, r, block, b, c: -1 if r == REST else number[i, block])
+    expected = by_hand(layout, lambda i, r, block, b, c: -1 if r == REST else number[i, block])
+    assert air.block_of_value.tolist() == expected
     assert air.begin.tolist() == [0, 256, 64, 192] and air.flight.tolist() == [0, 0, 1, 1]
 
 
 def test_nothing_is_laid_out_as_nothing():
     nothing = Layout((), {r: np.ones((n, COUNT), bool) for r, n in BINS.items()})
-    assert len(nothing.gather([])) == len(nothing.channels()) == len(nothing.air_blocks([]).of) == 0
+    assert len(nothing.gather([])) == len(nothing.channels()) == len(nothing.air_blocks([]).block_of_value) == 0
 
 
 @pytest.mark.parametrize(("view", "band", "channel", "band_hz"), [

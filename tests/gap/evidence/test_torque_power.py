@@ -27,14 +27,14 @@ def problem(study):
 
 
 def test_another_loop_changes_the_power_of_the_torque_alone(problem):
-    added, of_torque = problem.torque_power([LATE]), problem.flat.of_torque
-    assert np.abs(added[of_torque]).max() > 0.0 and not added[~of_torque].any()
+    added, is_torque = problem.torque_power([LATE]), problem.flat.is_torque
+    assert np.abs(added[is_torque]).max() > 0.0 and not added[~is_torque].any()
     assert (problem.elements.power[:len(added)] + added > 0.0).all(), "a loop can take away no more than there is"
 
 
 def test_what_leaves_the_loop_adds_no_power(problem):
     assert not problem.torque_power([]).any() and not problem.torque_power([HEAVY]).any()
-    np.testing.assert_array_equal(problem.torque_power([LATE, HEAVY])[~problem.flat.of_torque], 0.0)
+    np.testing.assert_array_equal(problem.torque_power([LATE, HEAVY])[~problem.flat.is_torque], 0.0)
 
 
 def test_without_a_loop_nothing_is_known_of_it():
