@@ -17,7 +17,9 @@ from hovers import FLOOR, VEHICLE, hover, swaying
 
 BINS = len(frequencies(AIR))
 ONES = np.ones((BINS, 3))
-COMMANDED, OUTSIDE, WEIGHT = 0.5, 0.25, 2.0  #: of the made laws: q~, what is left of an outside torque, weight of stepped
+COMMANDED = 0.5  #: q~ of the made laws
+OUTSIDE = 0.25  #: what their loop leaves of a torque from outside
+WEIGHT = 2.0  #: of the law of stepped blocks
 (WEAK,), (INERTIA,), (FLAPPING,), (LATE,) = map(activate, (
     {"weak_motor": {"rotor": 1, "thrust_loss": 0.2}}, {"inertia": {"fraction": 0.3}},
     {"blade_flapping": {"tilt": 0.1, "hub": 0.05}}, {"sensor_latency": {"delay": 0.003}}))

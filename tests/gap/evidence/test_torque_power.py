@@ -32,6 +32,27 @@ def test_another_loop_changes_the_power_of_the_torque_alone(problem):
     assert (problem.elements.power[:len(added)] + added > 0.0).all(), "a loop can take away no more than there is"
 
 
+@pytest.mark.parametrize(("part", "grown", "added"), [(0.5, 3.0, 1.0), (1.0, 2.0, 1.0), (2.0, 3.0, 2.0), (0.5, 0.2, -0.4)])
+def test_that_part_of_the_floor_grows_which_the_loop_makes(part, grown, added):
+    """Of noise of the loop that is `part` of the floor and grows so many times, part (grown - 1) is added.
+
+    No more than the floor can be noise of the loop, whatever its model says. The gap itself stays as it is.
+    """
+    data = Data(FLOOR, [hover(1, length_s=12.0)])
+    flat = problem_of(data, whole_of(data)).flat
+    floor = FLOOR.floor.power[AIR][:, TORQUE]
+    one = np.ones((2, *floor.shape))
+    change = Change(one[0, :, :1], one, one, 0.0 * one[0], one[0, :, :1], np.stack([part * floor, grown * part * floor]))
+    loop = SimpleNamespace(torque_change=lambda active, f: change if active else None)
+    with_loop = Data(replace(FLOOR, loop=loop), data.flights)
+    per_bin = np.zeros((len(floor), COUNT))
+    per_bin[FIRST_BIN:, TORQUE] = added
+    at_rest = np.zeros(flat.layout.keep[REST].shape)
+    expected = flat.noise * flat.layout.per_bin({AIR: per_bin, REST: at_rest})
+    np.testing.assert_allclose(torque_power(with_loop, flat, [LATE]), expected, atol=1e-12 * flat.noise.max())
+    assert (expected != 0.0).any() == flat.is_torque.any() or not flat.layout.keep[AIR][FIRST_BIN:, TORQUE].any()
+
+
 def test_what_leaves_the_loop_adds_no_power(problem):
     assert not problem.torque_power([]).any() and not problem.torque_power([HEAVY]).any()
     np.testing.assert_array_equal(problem.torque_power([LATE, HEAVY])[~problem.flat.is_torque], 0.0)
