@@ -12,7 +12,7 @@ from gap_flights import fly
 
 LAG, MASS = terms("motor_lag")[0], terms("mass")[0]
 MEAN = [LAG, MASS]
-AT = np.array([*np.full(len(LAG.free), 0.4), 0.3])
+AT = np.array([*np.full(len(LAG.free), 1.0), 0.3])
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,6 @@ def test_slopes_of_the_loop_are_its_differences(problem, slopes):
         assert np.abs(expected).max() > 0.0
         assert np.abs(kept[0] - expected).max() < 0.1 * np.abs(expected).max()
     assert slopes.nonlinear[0] and not slopes.nonlinear[-1]
-    assert not slopes.torque_powers[-1].any(), "a mass leaves the loop of roll and pitch as it is"
 
 
 def test_slopes_of_the_loop_are_taken_anew_wherever_the_fit_stands(slopes):
@@ -69,7 +68,7 @@ def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, wide):
     gradient, information = slopes.power_equations(AT, values, added, wide)
     for i in range(len(AT)):
         expected = central(level, i)
-        assert gradient[i] == pytest.approx(expected, rel=0.05, abs=0.02 * np.sqrt(information[0, 0]))
+        assert gradient[i] == pytest.approx(expected, rel=0.03)
     assert abs(central(level, 0)) > 1.0
     np.testing.assert_allclose(information, information.T, rtol=1e-9)
     assert np.linalg.eigvalsh(information).min() > -1e-9 * information.max()
