@@ -28,14 +28,15 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
 
 @pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])
 def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
-    """Against the best of a thousand strengths by the whole likelihood; beside other power; less noise than the floor."""
+    """Against the best of a thousand strengths by the whole likelihood; one is less than the floor has."""
     data = Data(FLOOR, [hover(1, louder=louder, length_s=12.0)])
     problem = problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
     values, other = problem.elements.base, beside * problem.elements.power
     found = strongest(problem, noise, values, other)
     strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
-    levels = [problem.likelihood(values, other + problem.random_power([noise.fitted(np.full(1, x))])) for x in strengths]
+    terms = [noise.fitted(np.full(1, x)) for x in strengths]
+    levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
     best = strengths[int(np.argmax(levels))]
     assert noise.scaled(found.values)[0] == pytest.approx(best, rel=0.01)
     level = problem.likelihood(values, other + problem.random_power([found]))

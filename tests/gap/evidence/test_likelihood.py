@@ -44,7 +44,7 @@ def law():
 
 def test_the_likelihood_of_all_values_is_the_sum_of_that_of_each(law):
     likelihood, values = law
-    each = likelihood.each(values, 0.3)
+    each = likelihood.per_value(values, 0.3)
     assert likelihood(values, 0.3) == pytest.approx(each.sum()) and not each[~likelihood.known].any()
 
 
@@ -60,7 +60,7 @@ def test_its_slope_by_the_power_is_that_of_small_changes(law):
     likelihood, values = law
     added, small = np.full(200, 0.2), 1e-5
     slope, curvature = likelihood.power_slopes(values, added, 150)
-    step = [likelihood.each(values, added + sign * small) for sign in (1.0, -1.0)]
+    step = [likelihood.per_value(values, added + sign * small) for sign in (1.0, -1.0)]
     np.testing.assert_allclose(slope, ((step[0] - step[1]) / (2.0 * small))[:150], atol=1e-6)
     assert len(slope) == len(curvature) == 150 and (curvature[likelihood.known[:150]] > 0.0).all()
 
@@ -70,7 +70,7 @@ def expected_curvature(likelihood, density, power):
     small = 1e-3 * power
 
     def weighted(over):
-        levels = [likelihood.each(np.sqrt([over * power]) + 0j, np.array([x]))[0] for x in (-small, 0.0, small)]
+        levels = [likelihood.per_value(np.sqrt([over * power]) + 0j, np.array([x]))[0] for x in (-small, 0.0, small)]
         return density(over) * (2.0 * levels[1] - levels[0] - levels[2]) / small ** 2
 
     return quad(weighted, 0.0, np.inf, limit=200)[0]

@@ -123,7 +123,7 @@ def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     def each_likelihood(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
         """Log likelihood (n,) of each value under effects."""
         _, values, power = left_over(data, part, hypothesis, wide)
-        return flat.likelihood.each(values, power - flat.elements.power)
+        return flat.likelihood.per_value(values, power - flat.elements.power)
 
     without = each_likelihood((), bool(random_of(terms)))
     return np.bincount(flat.cells, each_likelihood(terms, False) - without, CELLS)

@@ -117,16 +117,16 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
     return _Step(now, covariance, damping, False)
 
 
-def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
-    """Scaled parameters (k,) at which a fit begins: the known ones, else (NaN) close to neutral.
+def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -> np.ndarray:
+    """Scaled parameters (k,) at which a fit begins: those of `start`, close to neutral where it is NaN.
 
-    Effects of the loop of which nothing is known begin where their likelihood is highest on a coarse grid.
+    Effects of the loop without a start begin where their likelihood is highest on a coarse grid.
     """
     size = sum(len(t.free) for t in mean)
-    known = np.full(size, np.nan) if known is None else known
-    x = np.where(np.isnan(known), CLOSE, known)
+    start = np.full(size, np.nan) if start is None else start
+    x = np.where(np.isnan(start), CLOSE, start)
     for t, place in mean_places(mean):
-        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(known[place]).all():
+        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(start[place]).all():
             x = _best_on_grid(problem, mean, x, range(place.start, place.stop))
     return x
 

@@ -39,11 +39,11 @@ class Likelihood:
         """Log likelihood of values (n,)."""
         return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self.exponent, self.known)
 
-    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+    def per_value(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        each = _each(squared(values), self.power + added, self.tail, self.exponent)
-        each[~self.known] = 0.0
-        return each
+        levels = _levels(squared(values), self.power + added, self.tail, self.exponent)
+        levels[~self.known] = 0.0
+        return levels
 
     def along(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
         """Log likelihood as a function of x where others + x * unit is added; only what changes is computed anew.
@@ -85,7 +85,7 @@ class Likelihood:
         return self.freedom + 1.0
 
 
-def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+def _levels(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     """Log likelihood (n,) of values of a squared size; in place of the power."""
     tails = size / power
     tails /= tail

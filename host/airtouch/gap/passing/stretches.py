@@ -100,9 +100,9 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.elements.power)[:problem.flat.replay_count]
+    levels = problem.likelihood.per_value(values, power - problem.elements.power)[:problem.flat.replay_count]
     in_air = problem.flat.air.block_of_value >= 0
-    return np.bincount(problem.flat.air.block_of_value[in_air], each[in_air])
+    return np.bincount(problem.flat.air.block_of_value[in_air], levels[in_air])
 
 
 def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:
