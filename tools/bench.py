@@ -1,4 +1,4 @@
-"""Benchmarks against the peers, each in the same run: `make bench`.
+"""Prints benchmarks against the peers, each in the same run: `make bench`.
 
 Every pair is timed in turn (A B A B ...), after one warm-up; the ratio is the median of the pairs'.
 """

@@ -1,4 +1,4 @@
-"""Simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
+"""Prints simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
     python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
 
@@ -108,8 +108,9 @@ def figures_of(own: list[dict[str, Any]], other: list[dict[str, Any]], rotorpy: 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=64)
-    parser.add_argument("--workers", type=int, default=batch.available_cores())
+    parser.add_argument("--flights", type=int, default=64, help="of each round (default %(default)s)")
+    parser.add_argument("--workers", type=int, default=batch.available_cores(),
+                        help="processes (default: one a core)")
     parser.add_argument("--json", help="write the figures here")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()

@@ -171,7 +171,8 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=1_000_000, help="inputs of each target (1000000)")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of the mutations; the clock by default")
     parser.add_argument("--resume", action="store_true", help="what earlier runs of the same programs did counts")
-    parser.add_argument("--engine", choices=["libfuzzer", "standalone"], default="")
+    parser.add_argument("--engine", choices=["libfuzzer", "standalone"], default="",
+                        help="(default: the best that this machine has)")
     parser.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
     parser.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
     parser.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")

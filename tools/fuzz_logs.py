@@ -1,4 +1,4 @@
-"""Fuzz the log readers: mutated files of every format through read, check, segments, resample and the command.
+"""Fuzzes the log readers: mutated files of every format through read, check, segments, resample and the command.
 
     make fuzz-logs [RUNS=100000] [ARGS="--seed 2 --first 100000"]       # or: python tools/fuzz_logs.py --count 100000
     python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711
@@ -154,7 +154,7 @@ def shapes(length: int, folder: Path) -> int:
 def main() -> int:
     """Fuzz the formats, or run one input or the hostile files; 1 where anything failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1, help="of the mutations (default %(default)s)")
     parser.add_argument("--count", type=int, default=1000, help="inputs of each format (default 1000)")
     parser.add_argument("--first", type=int, default=0, help="number of the first input (default 0)")
     parser.add_argument("--format", choices=sound.FORMATS, action="append", help="only this format; may be repeated")

@@ -1,4 +1,4 @@
-"""The diagnosis on recorded flights and on other people's simulators, each row of the table in host/docs/gap-real.md.
+"""Diagnoses recorded and other people's simulated flights, each row of the table in host/docs/gap-real.md.
 
     python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep x.jsonl]
     python tools/gap_real.py --quick    # a few flights of each row; fails where the diagnosis is broken
@@ -15,7 +15,6 @@ only where --rows names it.
 """
 
 import argparse
-import json
 import multiprocessing
 import os
 import sys
@@ -26,13 +25,15 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
-from airtouch.logs import read
+from airtouch.logs import json_lines, read
+from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners
-from diagnosis.recordings.folder import add_folder, check_folder
+from diagnosis.recordings.folder import add_folder
 from diagnosis.recordings.table import answer, print_table
 
 #: (row, truth) -> flights of --quick
@@ -78,17 +79,13 @@ def quick(cases: list[Case]) -> list[Case]:
 
 def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     """Cases with their diagnoses, by `jobs` processes; those in the file `store` are read, others appended to it."""
-    answer_of = {}
-    if store and store.exists():
-        answer_of = {(c["row"], c["flight"]): c for c in map(json.loads, store.read_text().splitlines())}
+    answer_of = {(c["row"], c["flight"]): c for c in json_lines.read(store)}
     todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in answer_of),
                   key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
         for i, case in enumerate(pool.map(diagnose_case, todo)):
             answer_of[case["row"], case["flight"]] = case
-            if store:
-                with store.open("a") as out:
-                    out.write(json.dumps(case) + "\n")
+            json_lines.append(store, [case])
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
     return [answer_of[c.row, Path(c.flight).name] for c in cases]
 
@@ -97,9 +94,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Diagnose the cases that the options name, and print the table; 1 where --quick has too many wrong ones."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
-    parser.add_argument("--part", choices=("build", "view", "all"), default="build")
-    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=DEFAULT_ROWS)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--part", choices=("build", "view", "all"), default="build",
+                        help="flights on which settings may be chosen, the others, or both (default %(default)s)")
+    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=DEFAULT_ROWS,
+                        help="rows of the table (default: all but nominal)")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
     parser.add_argument("--partner", action="store_true",
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
@@ -107,7 +106,8 @@ def main(arguments: list[str] | None = None) -> int:
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
     for data_set in {data_set for row in args.rows for data_set in DATA_SETS[row]}:
-        check_folder(parser, args.flights / data_set)
+        check_data_set(args.flights / data_set)
+    check_free(args.keep, force=True)
     if args.quick:  # of the parts for building, and two peers
         cases = quick([c for row in DEFAULT_ROWS
                        for c in ROWS[row](args.flights, "view" if row == "peers" else "build")])

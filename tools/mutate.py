@@ -19,6 +19,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from airtouch.cli.shared.flights import data_folder
 from airtouch.gap.sealed.intervals import wilson
 
 ROOT = Path(__file__).parents[1]  #: of the checkout
@@ -79,9 +80,8 @@ def stage(name: str, force: bool) -> Path:
 
 def run_mutmut(place: Path, *mutants: str) -> None:
     """Run the named mutants, or all; those that are done are not run again."""
-    flights = os.environ.get("AIRTOUCH_FLIGHTS", str(ROOT.parent / "shared" / "flights"))
     subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
-                   env=os.environ | {"AIRTOUCH_FLIGHTS": flights})
+                   env=os.environ | {"AIRTOUCH_FLIGHTS": str(data_folder().resolve())})
 
 
 def results(place: Path) -> dict[str, int | None]:
@@ -129,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
     parser.add_argument("--sample", type=int, help="mutants of each group")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of the sample (default %(default)s)")
     parser.add_argument("--show", action="store_true", help="print those that no test noticed, and run nothing")
     parser.add_argument("--force", action="store_true", help="begin anew")
     args = parser.parse_args(arguments)

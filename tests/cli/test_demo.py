@@ -77,3 +77,21 @@ def test_where_flights_are_looked_for(tmp_path, monkeypatch):
     monkeypatch.setenv("AIRTOUCH_FLIGHTS", str(tmp_path / "none"))
     with pytest.raises(AirTouchError, match="no such folder"):
         flights.find_flights()
+
+
+def test_the_folder_of_a_data_set_and_what_it_lacks(tmp_path, monkeypatch):
+    monkeypatch.setenv("AIRTOUCH_FLIGHTS", str(tmp_path))
+    folder = flights.data_folder("pad")
+    assert folder == tmp_path / "pad" and flights.data_folder() == tmp_path
+    with pytest.raises(AirTouchError, match="pad has no manifest.csv: give the folder"):
+        flights.check_data_set(folder)
+    folder.mkdir()
+    (folder / "manifest.csv").touch()
+    flights.check_data_set(folder)
+    with pytest.raises(AirTouchError, match=r"no baselines\.csv"):
+        flights.check_data_set(folder, "baselines.csv")
+    monkeypatch.delenv("AIRTOUCH_FLIGHTS")
+    (tmp_path / "shared" / "flights").mkdir(parents=True)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert flights.data_folder("pad") == tmp_path / "shared" / "flights" / "pad"

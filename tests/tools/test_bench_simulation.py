@@ -1,4 +1,4 @@
-"""The figures of `bench_simulation.py`, from made rounds."""
+"""The figures of `bench_simulation.py`, from synthetic rounds."""
 
 import pytest
 

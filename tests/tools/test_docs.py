@@ -86,11 +86,21 @@ def test_the_first_page_and_the_site_list_every_page_in_the_same_order():
     assert sorted(["index.md", *listed]) == sorted(p.name for p in DOCS.glob("*.md"))
 
 
-def test_lines_are_no_longer_than_they_may():
-    for name in ("tutorial", "python", "glossary", "dask"):
-        long = [line for line in (DOCS / f"{name}.md").read_text("utf-8").splitlines() if len(line) > 170
-                and not line.startswith("|")]
-        assert not long, (name, long)
+def prose(page):
+    """The lines of a page outside blocks and tables."""
+    text = re.sub(r"^ *```.*?^ *```", "", page.read_text("utf-8"), flags=re.S | re.M)
+    return [line for line in text.splitlines() if not line.startswith("|")]
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda p: p.name)
+def test_lines_are_no_longer_than_they_may(page):
+    assert [line for line in prose(page) if len(line) > 120] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_no_item_of_a_list_begins_at_the_end_of_a_line(page):
+    """As in `its table. 3.`; a sentence may end in a figure."""
+    assert [line for line in prose(page) if re.search(r"[.:;] \d+\.$", line)] == []
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)

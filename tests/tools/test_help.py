@@ -1,4 +1,4 @@
-"""Every script and every module of tools that is run starts, finds what it imports, and says what it does."""
+"""Every script and every module of tools that is run starts, and says what it does and what each option means."""
 
 import subprocess
 import sys
@@ -13,24 +13,35 @@ MODULES = sorted(".".join(p.relative_to(TOOLS.parent).with_suffix("").parts).rem
                  for p in TOOLS.rglob("*.py") if RUN_AS in p.read_text("utf-8") and (p.parent / "__init__.py").exists())
 #: runs scripts one after another in one process, as each of them imports much of the same
 RUN = """
-import io, runpy, sys
+import argparse, click, io, runpy, sys
 from contextlib import redirect_stdout
 from pathlib import Path
+bare = []
+def noting(text, parameters):
+    def text_of(self, *rest):
+        bare.extend(p.opts[-1] if hasattr(p, "opts") else p.option_strings[-1] for p in getattr(self, parameters)
+                    if (getattr(p, "option_strings", 0) or isinstance(p, click.Option)) and not p.help)
+        return text(self, *rest)
+    return text_of
+argparse.ArgumentParser.format_help = noting(argparse.ArgumentParser.format_help, "_actions")
+click.Command.get_help = noting(click.Command.get_help, "params")
 for path in sys.argv[1:]:
+    bare.clear()
     sys.argv, here, said = [path, "--help"], list(sys.path), io.StringIO()
     sys.path[0] = str(Path(path).parent) if path.endswith(".py") else ""  # as Python does
     try:
         with redirect_stdout(said):
             (runpy.run_path if path.endswith(".py") else runpy.run_module)(path, run_name="__main__")
     except SystemExit as stop:
-        print(path, 0 if stop.code in (0, None) and said.getvalue().lower().startswith("usage:") else 1)
+        fine = stop.code in (0, None) and said.getvalue().lower().startswith("usage:")
+        print(path, " ".join(["no help for", *bare]) if bare else 0 if fine else 1)
     except Exception as error:
         print(path, repr(error))
     sys.path[:] = here
 """
 
 
-def test_every_script_has_a_help_text():
+def test_every_script_and_every_option_has_a_help_text():
     run = subprocess.run([sys.executable, "-c", RUN, *SCRIPTS, *MODULES], capture_output=True, text=True,
                          cwd=TOOLS.parent)
     answers = dict(line.split(" ", 1) for line in run.stdout.splitlines())

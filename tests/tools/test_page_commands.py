@@ -24,7 +24,7 @@ from airtouch.errors import AirTouchError
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "host/docs"
-PAGES = sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md"), *DOCS.glob("notebooks/*.ipynb")])
+PAGES = sorted([*ROOT.glob("*.md"), ROOT / "tools/README.md", *DOCS.glob("*.md"), *DOCS.glob("notebooks/*.ipynb")])
 #: whose backticked commands are shown by `--help`, in remedies and in the headers of generated files
 SOURCES = sorted(path for top in ("host/airtouch", "tools", "firmware", "gap8/app", "gap8/kernels")
                  for path in (ROOT / top).rglob("*") if path.suffix in (".py", ".sh", ".c", ".h", ".toml"))
@@ -222,7 +222,7 @@ def check(command: Command, page: Path, monkeypatch) -> None:
     pytest.fail(f"{page.relative_to(ROOT)}: {command}: {reason}")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_commands_of_a_page_are_understood(page, monkeypatch):
     for command in commands(page):
         check(command, page, monkeypatch)
@@ -253,7 +253,7 @@ def test_commands_are_found_in_the_pages():
     ("make emulate CRAZYFLIE_BASE=x ARGS=--heigth", "heigth"),
     ("pip install 'airtouch[plot]'", "plot"),
     ("pytest tests/report/test_writ.py", "test_writ")])
-def test_a_command_that_is_not_understood_is_told(text, reason, monkeypatch, tmp_path):
+def test_a_command_that_is_not_understood_fails(text, reason, monkeypatch, tmp_path):
     page = ROOT / "README.md"
     with pytest.raises((pytest.fail.Exception, AssertionError), match=reason):
         for command in split(text, True):

@@ -1,4 +1,4 @@
-"""Simulated seconds a wall second of crazyflow (JAX) on the CPU: 64 worlds under state control at 500 Hz.
+"""Prints simulated seconds a wall second of crazyflow (JAX) on the CPU: 64 worlds under state control at 500 Hz.
 
     python tools/benchmarks/bench_crazyflow.py [--seconds 10] [--rounds 3]
 
@@ -41,8 +41,8 @@ def rates(integrator: str, seconds: float, rounds: int) -> list[tuple[float, flo
 def main() -> None:
     """Time both integrators and print the rates."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=10.0, help="simulated, of each round (default %(default)s)")
+    parser.add_argument("--rounds", type=int, default=3, help="timed after the one that compiles (default %(default)s)")
     options = parser.parse_args()
     print(json.dumps({name: [round(statistics.median(column))
                              for column in zip(*rates(name, options.seconds, options.rounds), strict=True)]

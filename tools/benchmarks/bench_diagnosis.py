@@ -1,10 +1,10 @@
-"""Seconds of `airtouch gap diagnose` of the packaged flight of 25 s, four baseline flights, JSON and report.
+"""Prints the seconds that `airtouch gap diagnose` takes for a packaged flight of 25 s and four baseline flights.
 
     python tools/benchmarks/bench_diagnosis.py [--runs 5]
 
-Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles: with the first
-flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else should run
-beside it. host/docs/gap-real.md has the times.
+JSON and report are written too. Each run is a process of its own, on all processors and on one in turn, after one
+warm-up that compiles: with the first flight against a baseline, and with a further one, for which the baseline's
+scatter is kept. Nothing else should run beside it. host/docs/gap-real.md has the times.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import time
 from importlib import resources
 from pathlib import Path
 
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.nominal.kept_scatter import VARIABLE
 
 
@@ -28,15 +29,17 @@ def seconds(processors: set[int], out: Path, cache: str) -> float:
                "--baseline", *baseline, "--json", str(out / "it.json"),
                "--report", str(out / "it.html"), "--force"]
     start = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True, env={**os.environ, VARIABLE: cache},
-                   preexec_fn=lambda: os.sched_setaffinity(0, processors))
+    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, VARIABLE: cache},
+                         preexec_fn=lambda: os.sched_setaffinity(0, processors))
+    if run.returncode:
+        raise AirTouchError(f"the diagnosis failed: {(run.stderr.strip().splitlines() or ['without a message'])[-1]}")
     return time.perf_counter() - start
 
 
 def main() -> None:
     """Time it and print medians."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=5, help="of each kind (default %(default)s)")
     runs = parser.parse_args().runs
     if runs < 1:
         parser.error("--runs must be at least 1")
@@ -57,4 +60,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("bench_diagnosis"):
+        main()

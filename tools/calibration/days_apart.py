@@ -1,4 +1,4 @@
-"""How far a classifier tells one day's flights from another day's of the same drone: the yardstick for a twin.
+"""Prints how well a classifier tells one day's flights from another day's of the same drone: the yardstick of a twin.
 
     python tools/calibration/days_apart.py ../shared/flights/airtouch [--fewest 7]
 

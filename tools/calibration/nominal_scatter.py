@@ -1,21 +1,20 @@
-"""How strong every effect seems to be in recorded flights that have none: makes gap/signatures/nominal_scatter.toml.
+"""Measures how strong every effect seems to be in nominal flights, for gap/signatures/nominal_scatter.toml.
 
     python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]
 
-Every nominal flight is held twice against up to five others of its vehicle, on which the vehicle is calibrated: of its
-own group (drone, day and condition) and of other groups of the same drone. Strengths of both count, rates of the first
-alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
-With --keep, flights that the file holds already are not worked on again. host/docs/gap-floor.md explains the table.
+Every nominal flight is compared twice with up to five others of its vehicle, on which the vehicle is calibrated: with
+flights of its own group (drone, day and condition), and with flights of other groups of the same drone. Strengths of
+both comparisons count, rates of the first alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20;
+simulated flights of this project. host/docs/gap-floor.md explains the table.
 
     python tools/calibration/nominal_scatter.py [FLIGHTS] --passing    # 5 min
 
-measures nothing but passing effects, in the same flights of the same groups, and puts that into the table that is
-shipped.
+measures nothing but passing effects, in the same flights of the same groups. It writes the table that is shipped with
+these figures in place of the old ones. Both write --out; to ship a table, give it the path of the shipped one.
 """
 
 import argparse
 import csv
-import json
 import multiprocessing
 import os
 import re
@@ -33,6 +32,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set, data_folder
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
@@ -42,7 +42,8 @@ from airtouch.gap.sealed import make as sealed
 from airtouch.gap.signatures import scatter_estimates
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, table
 from airtouch.gap.signatures.scatter_estimates import class_scatter
-from airtouch.logs import read
+from airtouch.logs import json_lines, read
+from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as simulated
 from airtouch.vehicle import Vehicle
@@ -69,7 +70,7 @@ class Group(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Flights of a group to be held against others: of other groups of the same drone; None for those of their own."""
+    """Flights of a group to be compared with others: of other groups of the same drone; None for their own group."""
 
     group: Group
     others: list[Log] | None = None
@@ -154,7 +155,7 @@ def passing_alone(data: Data) -> ApparentStrengths:
 
 
 def _passing_of(group: Group) -> list[ApparentStrengths]:
-    """Passing effects in every flight of a group, held against the others."""
+    """Passing effects in every flight of a group, compared with the others."""
     return [apparent for _, apparent in held_out(group.logs, group.vehicle, look=passing_alone)]
 
 
@@ -205,18 +206,14 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
 
 def compare_all(groups: list[Group], keep: Path | None, jobs: int) -> dict[str, dict]:
     """Name of a comparison -> its row, of all groups; rows in the file `keep` are taken from there, new ones added."""
-    row_of = {}
-    if keep and keep.exists():
-        row_of = {r["file"]: r for r in map(json.loads, keep.read_text().splitlines())}
+    row_of = {r["file"]: r for r in json_lines.read(keep)}
     tasks = [task for group in groups for task in (Task(group), Task(group, _rest(groups, group)))
              if any(name + task.note not in row_of for name, _ in group.logs)
              and (task.others is None or len(task.others) > 1)]
     with pool_of(jobs) as pool:
         for task, rows in zip(tasks, pool.map(_compare, tasks), strict=True):
             row_of |= {row["file"]: row for row in rows}
-            if keep:
-                with keep.open("a") as out:
-                    out.writelines(json.dumps(row) + "\n" for row in rows)
+            json_lines.append(keep, rows)
             print(f"{task.group.of}, {task.group.name}{task.note}: {len(rows)} flights",
                   file=sys.stderr, flush=True)
     return row_of
@@ -249,13 +246,18 @@ def _apparent(row: dict) -> ApparentStrengths:
 def main() -> None:
     """Measure the nominal scatter of every class and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
-    parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"))
-    parser.add_argument("--keep", type=Path)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--passing", action="store_true")
+    parser.add_argument("flights", nargs="?", type=Path, default=data_folder(),
+                        help="of the data sets (default: AIRTOUCH_FLIGHTS or ../shared/flights)")
+    parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"),
+                        help="the table, which is replaced if it is there (default %(default)s)")
+    parser.add_argument("--keep", type=Path, help="JSON lines; comparisons that it holds are not made again")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
+    parser.add_argument("--passing", action="store_true", help="measure passing effects alone")
     args = parser.parse_args()
+    check_data_set(args.flights / "airtouch")
+    check_data_set(args.flights / "neuralswarm", "baselines.csv")
+    for path in (args.out, args.keep):
+        check_free(path, force=True)
     large_enough = [g for g in nominal_groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
         with pool_of(args.jobs) as pool:

@@ -1,4 +1,4 @@
-"""Moment of inertia of a rotor, from flights with rotor speeds: how much yaw a change of the rotors' speed gives.
+"""Prints the moment of inertia of a rotor, from how much a change of the rotors' speeds turns the vehicle in yaw.
 
     python tools/calibration/rotor_inertia.py ../shared/flights/imrclab/brushed_jana04.csv.gz [--vehicle crazyflie-2.1]
 
@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from airtouch import logs, vehicle
+from airtouch.detector.evaluation.bootstrap import resampled
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import PWM, FlightLog
@@ -77,9 +78,7 @@ def report(log: FlightLog, craft: Vehicle) -> str:
     """The line of one flight."""
     f, blocks, speed = spectra(log, craft.arm_pwm)
     (gain, ratio, delay), share = fit(f, blocks)
-    rng = np.random.default_rng(0)
-    samples = np.array([fit(f, blocks[rng.integers(len(blocks), size=len(blocks))])[0] for _ in range(DRAWS)])
-    low, high = np.percentile(samples, [5, 95], axis=0)
+    low, high = resampled(lambda pick: fit(f, blocks[pick])[0], len(blocks), replicates=DRAWS, level=0.9)
     jz = craft.inertia_kg_m2[2]
     lever = jz * speed / (2.0 * craft.mass_kg * craft.gravity_mps2 / 4.0)  # of torque over thrust to the steady gain
     return (f"{Path(log.source).name}: I/Jz {ratio:.2e} ({low[1]:.2e} to {high[1]:.2e}), I {ratio * jz:.1e} kg m² for "

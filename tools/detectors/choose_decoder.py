@@ -1,4 +1,4 @@
-"""Choose the `best` detector's decoder settings from cross-validated models.
+"""Chooses the `best` detector's decoder settings from cross-validated models.
 
     airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
     python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...

@@ -1,20 +1,20 @@
-"""How much `best` hangs on which half of the samples it computes at.
+"""Prints in how many flights `best` finds the same edges when it computes at the other half of the samples.
 
     python tools/detectors/half_of_best.py [FOLDER]
 
-`best` computes at every second sample. A log that begins one sample later makes it compute at the others, which
-parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean
-flights; host/docs/results.md has the counts.
+`best` computes at every second sample; in a log without its first sample it computes at the others. The app counts
+samples from the moment that its battery was plugged in, so it may compute at either half. Also printed: the same count
+where a flight's heading is turned by 90 degrees. Folds 0 to 2, clean flights; host/docs/results.md has the counts.
 """
 
 import argparse
 import csv
-import os
 from pathlib import Path
 
 import numpy as np
 
 from airtouch import logs
+from airtouch.cli.shared.flights import check_data_set, data_folder
 from airtouch.detector import best
 from airtouch.errors import in_one_line
 from airtouch.logs.flight_log import ACC_WORLD, FlightLog
@@ -44,10 +44,9 @@ def main() -> None:
     """Read, detect twice, and print how often the edges are the same."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+                        default=data_folder("airtouch"))
     folder = parser.parse_args().folder
-    if not (folder / "manifest.csv").is_file():
-        parser.error(f"{folder} has no manifest.csv: give the folder of the authors' flights, or set AIRTOUCH_FLIGHTS")
+    check_data_set(folder)
     with open(folder / "manifest.csv") as file:
         chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
     halves, headings = [], []

@@ -1,4 +1,4 @@
-"""What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
+"""Prints what a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
     python tools/detectors/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled
         [--twin FOLDER | --beside FOLDER] [--unlabelled]
@@ -102,8 +102,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("out/labelled"),
                         help="what is in it already is not done again")
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
-    parser.add_argument("--draws", type=int, default=5)
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--draws", type=int, default=5, help="of labelled flights, for each row (default %(default)s)")
+    parser.add_argument("--seeds", type=int, default=2, help="trainings of each draw (default %(default)s)")
     parser.add_argument("--steps", type=int, default=best.FINE_TUNING["steps"], help="of going on (default 300)")
     parser.add_argument("--alone-steps", type=int, default=1000, help="of training on the K alone; 0: no such rows")
     parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")

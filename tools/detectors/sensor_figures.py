@@ -1,5 +1,4 @@
-"""What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
-of.
+"""Writes what `best` loses where a log lacks a sensor to `host/airtouch/models/best_sensors.json`, for its notes.
 
     python tools/detectors/choose_decoder.py out/folds --json out/all.json
     python tools/detectors/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
@@ -41,7 +40,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", nargs="+", metavar="NAME=JSON=WHERE",
                         help="all, and each sensor that may be missing")
-    parser.add_argument("--out", type=Path, default=FILE)
+    parser.add_argument("--out", type=Path, default=FILE, help="(default: the package's own)")
     options = parser.parse_args()
     if odd := [pair for pair in options.pairs if pair.count("=") != 2]:
         parser.error(f"{odd[0]} is not NAME=JSON=WHERE")

@@ -1,4 +1,4 @@
-"""Train the detector that serves logs without acceleration: recorded flights, simulated edges over shorter platforms.
+"""Trains the detector for logs without acceleration: recorded flights, and simulated edges over shorter platforms.
 
     python tools/detectors/train_without_acceleration.py ../shared/flights/airtouch --twin twin012 --out without.npz
         [--free-air FOLDER] [--hold-out FOLD] [--least 0.3] [--seed 0] [--force]
@@ -51,11 +51,11 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--twin", type=Path, required=True, help="folder of `airtouch twin`")
     parser.add_argument("--free-air", type=Path, action="append", default=[], help="folder of flights without edges")
-    parser.add_argument("--hold-out", type=int, metavar="FOLD")
+    parser.add_argument("--hold-out", type=int, metavar="FOLD", help="train on no flight of this fold")
     parser.add_argument("--least", type=float, default=0.3, help="of a platform's length (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--force", action="store_true")
+    parser.add_argument("--seed", type=int, default=0, help="of the training (default %(default)s)")
+    parser.add_argument("--out", type=Path, required=True, help="the model")
+    parser.add_argument("--force", action="store_true", help="replace --out if it is there")
     options = parser.parse_args()
     check_free(options.out, options.force)
     listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]

@@ -1,4 +1,4 @@
-"""The authors' flights against the simulator: the three questions of host/docs/gap-real.md, one report each.
+"""Diagnoses the authors' flights against the simulator: three questions of host/docs/gap-real.md, one report each.
 
     python tools/diagnosis/gap_authors.py [FLIGHTS/airtouch] [OUT]    # 1 to 2 min a question
 
@@ -10,8 +10,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from airtouch.cli.shared.flights import check_data_set
+from airtouch.errors import AirTouchError, in_one_line
 from recordings.authors import VEHICLE, questions
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 
 
 def main() -> None:
@@ -20,15 +22,18 @@ def main() -> None:
     add_folder(parser, "airtouch")
     parser.add_argument("out", nargs="?", type=Path, default=Path("out/gap-authors"), help="(out/gap-authors)")
     options = parser.parse_args()
-    check_folder(parser, options.folder)
+    check_data_set(options.folder)
     options.out.mkdir(parents=True, exist_ok=True)
     for name, (flights, baseline) in questions(options.folder).items():
         print(f"## {name}: {len(flights)} flights, {len(baseline)} nominal", flush=True)
-        subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle",
+        run = subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle",
                         VEHICLE, *(["--baseline", *baseline] if baseline else []),
                         "--json", str(options.out / f"{name}.json"),
-                        "--report", str(options.out / f"{name}.html"), "--force"], check=True)
+                        "--report", str(options.out / f"{name}.html"), "--force"])
+        if run.returncode:
+            raise AirTouchError(f"{name}: the diagnosis failed, as the line above says")
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("gap_authors"):
+        main()

@@ -1,4 +1,4 @@
-"""CrazyPAD: every flight diagnosed alone, calibrated on the other normal flights of its drone.
+"""Diagnoses every flight of CrazyPAD alone, calibrated on the other normal flights of its drone.
 
     python tools/diagnosis/gap_crazypad.py [FOLDER] [--json cases.jsonl] [--leave-one-out]    # 20 s
     python tools/diagnosis/gap_crazypad.py [FOLDER] --corrections
@@ -12,25 +12,26 @@ the estimated velocity (`hover_balance.ANSWER`), on the building part: all but e
 
 import argparse
 import itertools
-import json
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import HoverPattern
 from airtouch.gap.balance.priors import PRIORS, STEADY, Priors
 from airtouch.gap.diagnosis import diagnose
-from airtouch.logs import read
+from airtouch.logs import json_lines, read
+from airtouch.logs.files import check_free
 from recordings.crazypad.corrections import show_corrections
 from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_answers
 from recordings.crazypad.labels import VEHICLE, baseline, family, manifest
 from recordings.crazypad.patterns import hover_patterns, likeliest
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
 #: priors to choose from, round numbers below and above those of `PRIORS`
@@ -44,9 +45,7 @@ ROTOR_WEIGHT = 0.3  #: of the share of rotors named exactly beside the balanced 
 def cases(folder: Path, store: Path | None) -> list[dict]:
     """Each flight's diagnosis, in the manifest's order; those that the file `store` holds are taken from there."""
     rows = manifest(folder, "all")
-    case_of = {}
-    if store and store.exists():
-        case_of = {c["file"]: c for c in map(json.loads, store.read_text().splitlines())}
+    case_of = {c["file"]: c for c in json_lines.read(store)}
     logs = {k: read(folder / r["file"]) for k, r in enumerate(rows) if family(r["condition"]) == "normal"}
     vehicle = vehicles.load(VEHICLE)
     for i, row in enumerate(rows):
@@ -56,9 +55,7 @@ def cases(folder: Path, store: Path | None) -> list[dict]:
                     "verdict": answer["verdict"], "effects": answer["effects"],
                     "ranking": {r["name"]: r["probability"] for r in answer["ranking"]}}
             case_of[row["file"]] = case
-            if store:
-                with store.open("a") as file:
-                    file.write(json.dumps(case) + "\n")
+            json_lines.append(store, [case])
         print(f"\r{i + 1}/{len(rows)}", end="", file=sys.stderr)
     print(file=sys.stderr)
     return [case_of[row["file"]] for row in rows]
@@ -110,10 +107,11 @@ def main() -> None:
     parser.add_argument("--leave-one-out", action="store_true", help="also with priors chosen by the others")
     parser.add_argument("--corrections", action="store_true", help="only fit the answer to corrections of the estimate")
     options = parser.parse_args()
-    check_folder(parser, options.folder)
+    check_data_set(options.folder)
     if options.corrections:
         show_corrections(options.folder)
         return
+    check_free(options.json, force=True)
     start = time.time()
     print_answers(cases(options.folder, options.json))
     if options.leave_one_out:

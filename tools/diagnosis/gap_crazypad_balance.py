@@ -1,4 +1,4 @@
-"""What the balance of the motors in hover can tell on CrazyPAD at all: of the rotor, and of the family.
+"""Prints how well the balance of the motors in hover can name the damaged rotor and the family on CrazyPAD at most.
 
     python tools/diagnosis/gap_crazypad_balance.py [FOLDER] [--part build|all]    # 20 s
 
@@ -24,6 +24,7 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from airtouch import vehicle as vehicles
+from airtouch.detector.evaluation.bootstrap import resampled
 from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
@@ -106,7 +107,7 @@ def show_scatter(b: Balances) -> None:
     (slope, yaw), residuals = fit(b.means, b.cuts)
     each = [b.own(p) - b.own(p).mean(axis=0) for p in sorted(set(b.of))]
     within = np.sqrt((np.concatenate(each) ** 2).sum(axis=0) / sum(len(e) - 1 for e in each))
-    print(f"{len(b.pairs)} conditions with cut blades: {100 * slope:.1f} % more told to a rotor for each mm, "
+    print(f"{len(b.pairs)} conditions with cut blades: {100 * slope:.1f} % more command to a rotor for each mm, "
           f"yaw {yaw:.2f} of what follows from it")
     nominal = np.array([b.bases[drone].variance[hover_balance.BALANCE] for drone, _ in b.pairs])
     for text, values in (("between flights of a condition", within),
@@ -168,8 +169,8 @@ def rotor_test(pair: Condition, balances: np.ndarray, solution: np.ndarray, whit
 def show_rotor(tests: list[RotorTest]) -> None:
     """Print what the balance says of which rotor was cut, to a test that knows the rest."""
     print("\n| cut | flights | the cut changes less than two sets of propellers differ | changed to the predicted "
-          "side | exact rotors, told their number and the mm | expected of these | severity, told the rotors |\n"
-          "|---|---|---|---|---|---|---|")
+          "side | exact rotors, labels of their number and the mm | expected of these | severity, labels of the "
+          "rotors |\n|---|---|---|---|---|---|---|")
     for text, large in (("all", False), ("at least 1.5 mm off a rotor", True)):
         group = [t for t in tests if not large or labels.large(t.pair[1])]
         flights = sum(len(t.hits) for t in group)
@@ -195,8 +196,8 @@ def _severity(tests: Sequence[RotorTest]) -> float:
 
 def _with_interval(tests: Sequence[RotorTest], figure: Callable[[Sequence[RotorTest]], float]) -> str:
     """A figure with its 90 % interval, conditions resampled."""
-    samples = np.random.default_rng(0).integers(0, len(tests), (figures.RESAMPLES, len(tests)))
-    low, high = np.nanpercentile([figure([tests[i] for i in row]) for row in samples], (5, 95))
+    low, high = resampled(lambda pick: figure([tests[i] for i in pick]), len(tests), replicates=figures.RESAMPLES,
+                          level=0.9)
     return f"{figure(tests):.2f} ({low:.2f} to {high:.2f})"
 
 

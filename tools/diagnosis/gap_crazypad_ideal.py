@@ -1,4 +1,4 @@
-"""What tests with more knowledge than the diagnosis reach on CrazyPAD: how far its goals can be reached at all.
+"""Prints the figures of classifiers that have CrazyPAD's labels: how far the diagnosis can reach its goals at all.
 
     python tools/diagnosis/gap_crazypad_ideal.py [FOLDER] [--part build|all]    # 5 min
 
@@ -14,20 +14,16 @@ favours these tests. Intervals resample conditions within families. What the bal
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.signal import welch
-from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
-from sklearn.linear_model import Ridge
-from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from airtouch import vehicle as vehicles
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
@@ -108,23 +104,38 @@ def relative(rows: list[dict[str, str]], numbers: np.ndarray) -> Table:
     return Table(rows, numbers - np.array([numbers[labels.baseline(rows, i)].mean(axis=0) for i in range(len(rows))]))
 
 
-def discriminant(classes: np.ndarray) -> LinearDiscriminantAnalysis:
+def scikit(module: str) -> Any:
+    """A module of scikit-learn by its name there. Raises AirTouchError where it is not installed."""
+    try:
+        return import_module(f"sklearn.{module}")
+    except ImportError:
+        raise AirTouchError("the classifiers need scikit-learn: pip install 'airtouch[train]'") from None
+
+
+def discriminant(classes: np.ndarray) -> Any:
     """A linear discriminant that takes each class as equally likely."""
     count = len(set(classes))
-    return LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(count, 1.0 / count))
+    return scikit("discriminant_analysis").LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto",
+                                                                      priors=np.full(count, 1.0 / count))
 
 
 #: name -> classifier, made for the classes (flights,) that it learns
 LEARNERS: dict[str, Callable] = {
     "discriminant on the balance": discriminant, "discriminant on all numbers": discriminant,
-    "forest on all numbers": lambda _: RandomForestClassifier(
+    "forest on all numbers": lambda _: scikit("ensemble").RandomForestClassifier(
         TREES, class_weight="balanced_subsample", random_state=0),
-    "nearest flight, all numbers": lambda _: KNeighborsClassifier(1)}
+    "nearest flight, all numbers": lambda _: scikit("neighbors").KNeighborsClassifier(1)}
 #: name -> regression of the millimetres cut
 MEASURES: dict[str, Callable] = {
-    "discriminant on the balance": lambda: Ridge(1.0), "discriminant on all numbers": lambda: Ridge(RIDGE),
-    "forest on all numbers": lambda: RandomForestRegressor(TREES, random_state=0),
-    "nearest flight, all numbers": lambda: KNeighborsRegressor(1)}
+    "discriminant on the balance": lambda: scikit("linear_model").Ridge(1.0),
+    "discriminant on all numbers": lambda: scikit("linear_model").Ridge(RIDGE),
+    "forest on all numbers": lambda: scikit("ensemble").RandomForestRegressor(TREES, random_state=0),
+    "nearest flight, all numbers": lambda: scikit("neighbors").KNeighborsRegressor(1)}
+
+
+def standardised(model: Any) -> Any:
+    """A classifier or regression that is given standardised numbers."""
+    return scikit("pipeline").make_pipeline(scikit("preprocessing").StandardScaler(), model)
 
 
 def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
@@ -139,9 +150,9 @@ def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[
             if len(set(values[use])) == 1:
                 predicted[label] = np.full(fold.sum(), values[use][0])
                 continue
-            model = make_pipeline(StandardScaler(), LEARNERS[learner](values[use]))
+            model = standardised(LEARNERS[learner](values[use]))
             predicted[label] = model.fit(x[use], values[use]).predict(x[fold])
-        cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
+        cut = standardised(MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
         for i, family, rotors, mm in zip(np.flatnonzero(fold), predicted["family"], predicted["rotors"], cut,
                                          strict=True):
             out[i] = {**table.rows[i], **as_case(family, rotors, mm)}
@@ -179,7 +190,7 @@ def _damage_right(cases: list[dict]) -> float:
 
 def show_distinct(table: Table) -> None:
     """Print how often the nearest other flight of a drone is of the same condition."""
-    x = StandardScaler().fit_transform(table.numbers)
+    x = scikit("preprocessing").StandardScaler().fit_transform(table.numbers)
     for text, numbers in (("balance", x[:, BALANCE]), ("all numbers", x)):
         hits = []
         for i in range(len(x)):
@@ -192,13 +203,14 @@ def show_distinct(table: Table) -> None:
 def main() -> None:
     """Print the learners' figures, with less and with more labels known."""
     options = labels.folder_and_part(__doc__)
+    scikit("ensemble")  # before the flights are read
     table = table_of(options.folder, options.part)
     pairs, n = sorted(set(table.pair)), len(table.rows)
     print(f"{n} flights, {len(pairs)} conditions of a drone, {table.numbers.shape[1]} numbers")
-    show_learners(table, "(1) told all other conditions", [table.pair == p for p in pairs])
-    show_learners(table, "(2) told all other flights", [np.arange(n) == i for i in range(n)])
+    show_learners(table, "(1) labels of all other conditions", [table.pair == p for p in pairs])
+    show_learners(table, "(2) labels of all other flights", [np.arange(n) == i for i in range(n)])
     show_distinct(table)
-    show_learners(table, "(3) told the other drone", [table.drone == d for d in sorted(set(table.drone))])
+    show_learners(table, "(3) labels of the other drone", [table.drone == d for d in sorted(set(table.drone))])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The authors' flight past a fan, block by block, beside the calm flights of its day.
+"""Prints torques of the authors' flight past a fan and its blocks far above the floor, beside its day's calm flights.
 
     python tools/diagnosis/gap_fan.py [FLIGHTS/airtouch]    # 20 s
 
@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready_flights
@@ -24,7 +25,7 @@ from airtouch.gap.study import Study
 from airtouch.logs import read
 from airtouch.simulation.body import rigid_body
 from recordings.authors import VEHICLE, questions
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 
 BAND_HZ = (0.6, 12.0)  #: Hz, band whose power is compared; no source: round numbers
 FAR = 5.0  #: power over the floor's from which a block is far above it; no source: round number
@@ -58,7 +59,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "airtouch")
     folder = parser.parse_args().folder
-    check_folder(parser, folder)
+    check_data_set(folder)
     vehicle = vehicles.load(VEHICLE)
     fan, calm = (list(ready_flights([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])

@@ -1,4 +1,4 @@
-"""How well one flight shows its lift near the floor: a regression that knows the curve measured on neural-swarm's.
+"""Prints the lift near the floor in neural-swarm's flights, by a regression that knows the measured curve.
 
     python tools/diagnosis/gap_lift.py [FLIGHTS]    # 7 s
 
@@ -16,10 +16,11 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import in_one_line
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.logs import read
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 from recordings.swarm_lift import CLOSE
 
 #: m above standing at which the lift was measured (the data's SOURCE.md); nothing from 15 cm on, level below 1 cm
@@ -54,7 +55,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
     folder = parser.parse_args().flights / "neuralswarm"
-    check_folder(parser, folder)
+    check_data_set(folder)
     ratios: dict[str, list[float]] = {}
     for row in csv.DictReader((folder / "manifest.csv").open()):
         if row["truth"] == "ground_effect":

@@ -1,4 +1,4 @@
-"""The diagnosis on flights made with other people's simulators, each alone: top-1, top-3, shrink.
+"""Prints diagnoses of flights made with other people's simulators, each alone: top-1, top-3, shrink.
 
     python tools/diagnosis/gap_peers.py [FLIGHTS/peers]    # 8 to 28 s of one core for each flight
 
@@ -15,14 +15,15 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
-from airtouch.gap.sealed.intervals import wilson
+from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs import read
 from recordings import peers
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 
 GOAL = 0.8  #: fraction of the gap that the right effect should close (host/docs/gap-real.md)
 
@@ -52,16 +53,10 @@ def answer_of(diagnosis: Diagnosis, truth: str) -> Answer:
                   None if diagnosis.control is None else diagnosis.control.shrink.share.value)
 
 
-def interval(hits: int, n: int) -> str:
-    """A share with its 95 % interval, as text."""
-    share = wilson(hits, n)
-    return f"{hits} of {n} ({share['value']:.0%}, 95 % interval {share['low']:.0%} to {share['high']:.0%})"
-
-
 def summary(answers: Sequence[Answer]) -> str:
     """Lines with the counts of right answers, and with the gap closed where the first answer is right."""
     top_1, top_3 = (sum(a.within(n) for a in answers) for n in (1, 3))
-    text = f"top-1 {interval(top_1, len(answers))}; top-3 {interval(top_3, len(answers))}"
+    text = f"top-1 {share_text(top_1, len(answers))}; top-3 {share_text(top_3, len(answers))} (95 % intervals)"
     right = [a for a in answers if a.within(1) and a.shrink is not None]
     if not right:
         return text
@@ -86,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "peers")
     folder: Path = parser.parse_args().folder
-    check_folder(parser, folder)
+    check_data_set(folder)
     print("| effect | strength | verdict | named | shrink | with a wrong effect | CPU s "
           "|\n|---|---|---|---|---|---|---|")
     answers = []

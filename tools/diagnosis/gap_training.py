@@ -1,4 +1,4 @@
-"""Does closing the gap close the error? Found effects added one by one, a detector trained on each.
+"""Prints whether closing the gap closes the error: named effects added one by one, a detector trained on each.
 
     python tools/diagnosis/gap_training.py --out out/gap-training    # 40 min on a busy machine
 
@@ -37,8 +37,9 @@ from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import one_a_flight, summarise
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.extras import need
 from airtouch.gap.diagnosis import diagnose
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from recordings.authors import VEHICLE
@@ -192,7 +193,9 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="diagnose anew")
     parser.add_argument("--diagnose", action="store_true", help="only diagnose")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
+    if not options.diagnose:
+        need("train", "training")
+    make_folder(options.out)
     group_names = options.groups.split(",")
     read, _ = crossval.readable_flights(files := dataset.collect([need_flights()]))
     groups = cut({f: read[f.path] for f in files if f.path in read}, group_names)

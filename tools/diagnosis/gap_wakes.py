@@ -1,4 +1,4 @@
-"""How many of neural-swarm's flights under another vehicle a test sees that knows when it was under it.
+"""Prints in how many of neural-swarm's flights under another vehicle a test that knows the seconds sees the wake.
 
     python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]    # 15 s
 
@@ -15,14 +15,13 @@ build: days 19 and 20.
 Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
 vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test that is not told the seconds, 5 min
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test without the seconds, 3 to 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
 the two apart. The figures of all three are in host/docs/gap-real.md.
 """
 
 import argparse
-import json
 import os
 import sys
 from collections import defaultdict
@@ -34,6 +33,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import check_data_set
+from airtouch.detector.evaluation.bootstrap import resampled
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
@@ -48,9 +49,9 @@ from airtouch.gap.sealed.intervals import auroc, share_text
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
-from airtouch.logs import read
+from airtouch.logs import json_lines, read
 from recordings import cases, swarm_cuts
-from recordings.folder import add_folder, check_folder
+from recordings.folder import add_folder
 
 LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number
 LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number
@@ -152,7 +153,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
             if wake is not None and passing_evidence(data, wake.key, wake.gain, wake.strength) >= PASSING_GAIN:
                 alarms.append(name)
         print(f"{name}: {alarms.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
-    print(f"a wake in told seconds of nominal flights: {share_text(len(alarms), trials, 1)}, "
+    print(f"a wake named in nominal flights, seconds known: {share_text(len(alarms), trials, 1)}, "
           f"in {len(set(alarms))} flights")
 
 
@@ -176,36 +177,48 @@ def show_without_seconds(flights: Path) -> None:
         for measure in (OVERHEAD, UNSTEADY_YAW, DOWNWARD):
             wakes, calm = (np.array([sizes[measure] for sizes in of_truth[vehicle_name, truth]])
                            for truth in ("downwash", "none"))
-            area, (low, high) = auroc(wakes.tolist(), calm.tolist()), _interval(wakes, calm)
+            area, (low, high) = auroc(wakes.tolist(), calm.tolist()), auroc_interval(wakes, calm)
             print(f"| {vehicle_name} | {measure} | {area:.2f} [{low:.2f}, {high:.2f}] | "
                   f"{(wakes > calm.max()).sum()} of {len(wakes)}, of {len(calm)} |")
 
 
-def _interval(wakes: np.ndarray, calm: np.ndarray) -> tuple[float, float]:
-    """95 % interval of the AUROC by a bootstrap over flights."""
-    rng = np.random.default_rng(0)
-    draws = [auroc(rng.choice(wakes, len(wakes)).tolist(), rng.choice(calm, len(calm)).tolist())
-             for _ in range(DRAWS)]
-    low, high = np.quantile(np.array(draws, float), (0.025, 0.975))
-    return float(low), float(high)
+def auroc_interval(wakes: np.ndarray, calm: np.ndarray) -> np.ndarray:
+    """95 % interval (2,) of the AUROC by a bootstrap over flights."""
+    return resampled(lambda i, k: auroc(wakes[i].tolist(), calm[k].tolist()), len(wakes), len(calm),
+                     replicates=DRAWS, level=0.95)
+
+
+def answers_of(path: Path | None) -> dict[str, str]:
+    """A flight's file -> the first effect, or the verdict, in what `gap_real.py --keep` wrote; empty without a file."""
+    return {case["flight"]: case["effects"][0]["name"] if case["effects"] else case["verdict"]
+            for case in json_lines.read(path)}
+
+
+def seconds_under(one: Track, tracks: list[Track]) -> tuple[np.ndarray, float]:
+    """Samples (n,) at which another vehicle is above, as far as the data hold its path, and the usable seconds of
+    them."""
+    acts = overhead_at(one, tracks)
+    return acts, float((acts & one.usable).sum() * PERIOD_S)
+
+
+def named_by_path(tracks: list[Track], answer_of: dict[str, str]) -> dict[bool, list[bool]]:
+    """Whether the data hold the other vehicle's path over LEAST_S -> whether each such flight's answer is a wake."""
+    named: dict[bool, list[bool]] = {True: [], False: []}
+    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
+        named[seconds_under(t, tracks)[1] >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
+    return named
 
 
 def show_seen(tracks: list[Track], answers: Path | None) -> None:
     """Print a line for each flight under another vehicle, and for each vehicle how many the test sees."""
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
-    answer_of = {}
-    if answers:
-        for case in map(json.loads, answers.read_text().splitlines()):
-            answer_of[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
+    answer_of = answers_of(answers)
     table: dict[str, list[bool]] = {}
-    named: dict[bool, list[bool]] = {True: [], False: []}  # by whether the data hold the path
     print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = overhead_at(t, tracks)
-        seconds = (acts & t.usable).sum() * PERIOD_S
-        named[seconds >= LEAST_S].append(answer_of.get(t.row["file"]) == OVERHEAD)
+        acts, seconds = seconds_under(t, tracks)
         if seconds < LEAST_S:
-            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
+            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | less than {LEAST_S:g} s held | "
                   f"{answer_of.get(t.row['file'], '')} |")
             continue
         like = [n for n in nominal if (n.row["vehicle"], n.row["manoeuvre"]) == (t.row["vehicle"], t.row["manoeuvre"])]
@@ -219,22 +232,24 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
         print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
-    print(f"{len(named[False])} more, whose other vehicle's path the data do not hold")
+    named = named_by_path(tracks, answer_of)
+    print(f"{len(named[False])} more, for which the data hold less than {LEAST_S:g} s of a path overhead")
     if answers:
-        print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold the "
-              f"path, in {share_text(sum(named[False]), len(named[False]))} where they do not")
+        print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold "
+              f"at least {LEAST_S:g} s of the path, in {share_text(sum(named[False]), len(named[False]))} where less")
 
 
 def main() -> None:
     """Print how many wakes the test sees, or the false alarms of the diagnosis."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
-    parser.add_argument("--part", choices=("build", "all"), default="build")
+    parser.add_argument("--part", choices=("build", "all"), default="build",
+                        help="days 19 and 20, or all days (default %(default)s)")
     parser.add_argument("--answers", type=Path, help="what `gap_real.py --keep` wrote")
     parser.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
-    parser.add_argument("--without-seconds", action="store_true", help="a test that is not told the seconds")
+    parser.add_argument("--without-seconds", action="store_true", help="what a test without the seconds sees")
     options = parser.parse_args()
-    check_folder(parser, options.flights / "neuralswarm")
+    check_data_set(options.flights / "neuralswarm")
     if options.without_seconds:
         show_without_seconds(options.flights)
         return

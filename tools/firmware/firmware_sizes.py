@@ -1,4 +1,4 @@
-"""What the STM32 app adds to the firmware: flash, RAM and CCM of stock images and of those with AirTouch.
+"""Prints what the STM32 app adds to the firmware: flash, RAM and CCM of stock images and of those with AirTouch.
 
     python tools/firmware/firmware_sizes.py ~/crazyflie-firmware
 

@@ -1,4 +1,4 @@
-"""The deepest stack of functions in a firmware build, from GCC's -fcallgraph-info=su files.
+"""Prints the deepest stack of functions in a firmware build, from GCC's -fcallgraph-info=su files.
 
     python tools/firmware/stack.py build/firmware appMain
 

@@ -1,4 +1,4 @@
-"""The whole firmware with the app, in QEMU: `make emulate CRAZYFLIE_BASE=...`.
+"""Runs the whole firmware with the app in QEMU: `make emulate CRAZYFLIE_BASE=...`.
 
     python -m tools.firmware_emulation ~/crazyflie-firmware             # two recorded flights, by the log variables
     python -m tools.firmware_emulation ~/crazyflie-firmware flight.csv --steps 2400
@@ -8,7 +8,6 @@
 """
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ from typing import NoReturn
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.flights import data_folder
 from airtouch.errors import AirTouchError
 from airtouch.logs import read
 from airtouch.logs.files import check_free, make_folder
@@ -41,8 +41,7 @@ CHANGES: dict[int, dict[str, float]] = {
 
 def recorded_flights(count: int) -> list[FlightLog]:
     """So many recorded flights, or a simulated one where none are here."""
-    folder = Path(os.environ.get("AIRTOUCH_FLIGHTS", build.ROOT.parent / "shared" / "flights"))
-    logs = [read(path) for path in sorted(folder.glob(RECORDED))[:count]]
+    logs = [read(path) for path in sorted(data_folder().glob(RECORDED))[:count]]
     if logs:
         return logs
     log = simulated(scenario.load("paper-4cm"), vehicles.load(), seed=3)

@@ -108,7 +108,7 @@ def print_mission(one: Mission) -> None:
     for what, two in (("with the app", one.on), ("the same, whole milliseconds", one.coarse_on)):
         low, high = height_range(two)
         true = crossings(plan, one.seed, 0, two.table)
-        print(f"{what}: {low:.2f} to {high:.2f} m over the floor; edges crossed {words(true)}, felt "
+        print(f"{what}: {low:.2f} to {high:.2f} m over the floor; edges crossed {words(true)}, detected "
               f"{words([(t, kind) for t, kind, _ in two.edges])} (s)", flush=True)
 
 

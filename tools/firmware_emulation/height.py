@@ -42,7 +42,7 @@ class Case:
     speed: float = 0.3
     blind_s: tuple[tuple[float, float], ...] = ()
     lands_there: bool = False  #: on the platform, instead of flying on and back
-    edges: bool = True  #: surfaces end in edges that can be felt
+    edges: bool = True  #: surfaces end in edges that can be detected
 
 
 def stairs(begin: float, end: float, top: float, count: int) -> tuple[tuple[float, float, float], ...]:
@@ -123,7 +123,7 @@ def summary(legs: Sequence[Leg]) -> str:
     false = sum(len(leg.reported) for leg in legs) - len(late_s)
     text = (f"{sum(leg.ending == 'ok' for leg in legs)} of {len(legs)} ended well, "
             f"{min(leg.low_m for leg in legs):.2f} to {max(leg.high_m for leg in legs):.2f} m; "
-            f"felt {len(late_s)} of {crossed}")
+            f"detected {len(late_s)} of {crossed}")
     if len(late_s):
         text += (f" ({np.sum(np.abs(late_s) <= TOLERANCE_S)} within {TOLERANCE_S} s), {late_s.min():.1f} to "
                  f"{late_s.max():.1f} s late")
@@ -155,7 +155,7 @@ def _leg(elf: Path, case: Case, seed: int, on: int, platform: str, folder: Path 
         if path:
             write_bytes(json.dumps(asdict(leg)).encode(), path)
     print(f"{case.name}, seed {seed}, {SETTINGS[on]}: {leg.low_m:.2f} to {leg.high_m:.2f}, {leg.ending} at x "
-          f"{leg.end_m:.2f}, its own {leg.own_end_m:.2f}; crossed {words(leg.crossed)}, felt "
+          f"{leg.end_m:.2f}, its own {leg.own_end_m:.2f}; crossed {words(leg.crossed)}, detected "
           f"{words(leg.reported)}; worst stabilizer {leg.latency_us} us", flush=True)
     return leg
 

@@ -1,4 +1,4 @@
-"""The nine-channel step beside nine 256-point real FFTs of CMSIS-DSP, both counted in the emulator.
+"""Prints the instructions of the nine-channel step beside nine 256-point real FFTs of CMSIS-DSP, both emulated.
 
     python -m tools.instruction_counts.compare_fft [--sdist cmsisdsp-1.10.3.tar.gz]
 
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 
 from .build import CACHE, build, compilers
 from .flight_code import FlightCode, compile_flight_code, made_flight
@@ -106,4 +106,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("compare_fft"):
+        main()

@@ -1,4 +1,4 @@
-"""Instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
+"""Prints instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
 
     python -m tools.instruction_counts.count                        the table, beside its budget
     python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there)
@@ -17,6 +17,7 @@ import numpy as np
 
 from airtouch.detector import best
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
+from airtouch.errors import in_one_line
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.networks.int8_network import quantise
@@ -102,11 +103,12 @@ def _flights(code: FlightCode, folder: Path) -> None:
 def main() -> None:
     """Count the instructions and memory of every kernel on one core."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--core", default="cortex-m4", choices=["cortex-m4", "rv32imc"])
-    parser.add_argument("--optimise", default="-O2")
-    parser.add_argument("--compiler", choices=["zig", "gcc"])
-    parser.add_argument("--flights", type=Path, metavar="FOLDER")
-    parser.add_argument("--toml", action="store_true")
+    parser.add_argument("--core", default="cortex-m4", choices=["cortex-m4", "rv32imc"],
+                        help="(default %(default)s)")
+    parser.add_argument("--optimise", default="-O2", help="the compiler's option (default %(default)s)")
+    parser.add_argument("--compiler", choices=["zig", "gcc"], help="(default: the first that is here)")
+    parser.add_argument("--flights", type=Path, metavar="FOLDER", help="count over its clean flights too")
+    parser.add_argument("--toml", action="store_true", help="print limits for budget.toml instead of the table")
     options = parser.parse_args()
     code = FlightCode(compile_flight_code(options.core, optimise=options.optimise, compiler=options.compiler))
     costs = measure(code)
@@ -121,4 +123,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("count"):
+        main()

@@ -18,6 +18,7 @@ from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import paper, registry
 from airtouch.detector.best.export import golden_flight
 from airtouch.detector.evaluation import crossval, evaluate, summary
+from airtouch.detector.evaluation.bootstrap import resampled
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
@@ -132,9 +133,8 @@ def more_error(scores: list[FlightScore], exact: list[FlightScore]) -> tuple[flo
     flights = [[abs(a.error_m) - abs(b.error_m) for a, b in zip(score.edges, other[score.file].edges, strict=True)
                 if a.error_m is not None and b.error_m is not None] for score in scores]
     sums, counts = np.array([sum(f) for f in flights]), np.array([len(f) for f in flights])
-    samples = np.random.default_rng(0).integers(len(flights), size=(RESAMPLES, len(flights)))
-    means = sums[samples].sum(axis=1) / np.maximum(counts[samples].sum(axis=1), 1)
-    low, high = np.quantile(means, [0.025, 0.975])
+    low, high = resampled(lambda pick: sums[pick].sum() / max(counts[pick].sum(), 1), len(flights),
+                          replicates=RESAMPLES, level=0.95)
     return sums.sum() / max(counts.sum(), 1), low, high, int(counts.sum())
 
 

@@ -76,7 +76,7 @@ def zig_zag_map() -> bytes:
     edges = best.run(log, model).edges
     edge_points = edge_map.edge_map(log, edges, lag_s=best.lag_s(model),
                                     sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
-    return draw_edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges felt")
+    return draw_edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges detected")
 
 
 def virtual_errors(count: int = 20) -> bytes:

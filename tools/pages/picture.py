@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def draw(log: FlightLog, model: BestModel, name: str) -> bytes:
-    """PNG: what the drone feels, P(over a platform) with edges, and the down range that it never saw."""
+    """PNG: what the drone measures, P(over a platform) with edges, and the down range that it never saw."""
     trace, truth = best.run(log, model), logs.true_edges(log)
     x = channels_of(log)[0]
     t = np.arange(len(log)) * 0.01
@@ -67,14 +67,14 @@ def draw(log: FlightLog, model: BestModel, name: str) -> bytes:
         for i, channel in enumerate(CHANNELS):
             axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=GREY)
         axes[0].set_yticks([OFFSET * (len(CHANNELS) - 1 - i) for i in range(len(CHANNELS))], CHANNELS)
-        axes[0].set_title(f"{name}: what the drone feels, in units of its nominal amplitude", loc="left")
+        axes[0].set_title(f"{name}: what the drone measures, in units of its nominal amplitude", loc="left")
         axes[1].plot(t, trace.probability, color=BLUE, lw=1)
         axes[1].set(ylim=(-0.05, 1.25), yticks=(0, 1), ylabel="P(over)")
         lag = best.lag_s(model)
         for edge in trace.edges:
             at = edge.sample * 0.01 - lag
             axes[1].plot(at, 1.12, "v" if edge.kind == "entry" else "^", color=RED, ms=7)
-        axes[1].set_title(f"felt edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)",
+        axes[1].set_title(f"detected edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)",
                           loc="left")
         axes[2].plot(t, log["zrange_m"], color=GREEN, lw=1)
         axes[2].set(xlabel="time, s", ylabel="m", xlim=(first, last))

@@ -1,4 +1,4 @@
-"""The paper's Table 1, measured: power of each stage from the logs of an INA219, beside the paper's figures.
+"""Prints the paper's Table 1, measured: power of each stage from the logs of an INA219, beside the paper's figures.
 
     python tools/power/power.py measure run.csv                       # stages named in the log's own column
     python tools/power/power.py measure baseline=a.csv FC-FE=b.csv CCS-FF=c.csv filter=d.csv network=e.csv

@@ -1,4 +1,4 @@
-"""Make the flights of `airtouch gap demo`: four nominal ones, and one with an effect that its file does not name.
+"""Makes the flights of `airtouch gap demo`: four nominal ones, and one with an effect that its file does not name.
 
     python tools/simulation/gap_example.py [FOLDER]    # seconds; the package's own example by default
 """

@@ -1,6 +1,6 @@
-"""Diagnoses of simulated flights of scenes that the diagnosis was not learned from: false alarms and first answers.
+"""Prints diagnoses of simulated flights of scenes that nothing was learned from: false alarms and first answers.
 
-    python tools/simulation/gap_scenes.py [--scenes paper-low steps] [--flights 8] [--seed 100] [--jobs 2]
+    python tools/simulation/gap_scenes.py --flights 2 --seed 200    # 7 min
 
 In every scene so many flights without an effect, and one with each effect of EFFECTS, are held against four others of
 the scene. Prints for each scene how many of the former are `none` and of the latter have the effect as first answer,
@@ -71,10 +71,10 @@ def share(rows: list[tuple[str, str, float]]) -> str:
 def main() -> None:
     """Diagnose the flights of the scenes and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", default=SCENES)
-    parser.add_argument("--flights", type=int, default=8, help="without an effect, in each scene")
-    parser.add_argument("--seed", type=int, default=100)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--scenes", nargs="+", default=SCENES, help=f"scenarios (default: {', '.join(SCENES)})")
+    parser.add_argument("--flights", type=int, default=8, help="without an effect, in each scene (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=100, help="of the flights (default %(default)s)")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
     args = parser.parse_args()
     with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("spawn")) as pool:
         rows_of = dict(zip(args.scenes, pool.map(answers, [(s, args.flights, args.seed) for s in args.scenes]),

@@ -1,4 +1,4 @@
-"""By how much the replay errs on strong effects, where chance is small: `estimates.REPLAY_ERROR`.
+"""Prints by how much the replay errs on strong effects, where chance is small: `estimates.REPLAY_ERROR`.
 
     python tools/simulation/replay_error.py    # a minute: eight simulated flights against five nominal ones
 

@@ -1,4 +1,4 @@
-"""Trained in simulation only, tested on recorded flights: with all effects of a scenario, and with each off.
+"""Trains on simulated flights only, tests on recorded ones: with all effects of a scenario, and with each off.
 
     python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
         [--detector best] [--without none --without ground_effect ...]
@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("--detector", action="append", choices=("best", "paper"), help="default both")
     parser.add_argument("--without", action="append", metavar="EFFECT",
                         help="only these rows; none is all effects on")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of flights and training (default %(default)s)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     folder = find_flights()

@@ -28,7 +28,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Shrink:
-    """Gap before and after in units of the floor, and the share of it that went, with 90 % interval."""
+    """Gap before and after in units of the floor, and the share of it that went; of a jitter without an interval."""
 
     before: float
     after: float

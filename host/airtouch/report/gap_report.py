@@ -130,7 +130,7 @@ def _plots(pictures: Pictures) -> list[Plot]:
                           f"Flight {Path(signal.flight).name}. Grey: the floor; blue: take-off and landing; yellow: "
                           "over a platform.", partial(gap_figures.signals, signal)))
     if pictures.spectra:
-        text = "Mean over all blocks."
+        text = "Mean over the flights."
         if any(s.after is not None for s in pictures.spectra):
             text += (" A random effect cannot be predicted sample by sample: its green curve is what is left of the "
                      "power.")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.detector.evaluation.bootstrap import bootstrap
+from airtouch.detector.evaluation.bootstrap import bootstrap, resampled
 
 
 def mean_of(sums):
@@ -38,3 +38,16 @@ def test_flights_are_drawn_whole():
 def test_one_flight_has_no_interval():
     assert bootstrap({"x": np.ones(1), "n": np.ones(1)}, mean_of) == {"mean": None}
     assert bootstrap({"x": np.ones(3), "n": np.zeros(3)}, mean_of) == {"mean": None}
+
+
+def test_interval_of_a_statistic_of_cases_agrees_with_the_normal_one():
+    x, y = np.random.default_rng(1).normal((3.0, 1.0), 2.0, (400, 2)).T
+    low, high = resampled(lambda i, k: x[i].mean() - y[k].mean(), 400, 400, replicates=2000, level=0.9)
+    half = 1.645 * np.hypot(x.std(), y.std()) / np.sqrt(400)
+    assert (low, high) == pytest.approx((x.mean() - y.mean() - half, x.mean() - y.mean() + half), abs=0.03)
+
+
+def test_several_statistics_have_an_interval_each_and_nan_is_left_out():
+    x = np.array([[1.0, 5.0], [2.0, 5.0], [np.nan, 5.0]])
+    low, high = resampled(lambda i: x[i].mean(axis=0), 3, replicates=500, level=1.0)
+    assert low.tolist() == [1.0, 5.0] and high.tolist() == [2.0, 5.0]

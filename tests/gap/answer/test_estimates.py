@@ -10,8 +10,8 @@ from scipy.stats import binom, norm
 
 from airtouch.gap.answer.estimates import (
     LOOP_ERROR,
-    MODEL_ERROR,
     REPLAY_ERROR,
+    SPECTRUM_ERROR,
     Estimate,
     from_spectra,
     from_times,
@@ -19,7 +19,7 @@ from airtouch.gap.answer.estimates import (
     with_reading,
 )
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.evidence.clock import CORRELATION_S
+from airtouch.gap.evidence.clock import CORRELATION_S, clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters, strength_variance
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail
@@ -115,11 +115,11 @@ def test_variance_is_that_of_the_fit_of_the_halves_and_of_the_model(hovers):
     fitted = fit(data, whole_of(data), [term])
     apart = np.arange(6.0)
     of_halves = [FittedTerms((term.fitted(x),), x, np.zeros((6, 6))) for x in (0.01 * apart, 0.03 * apart)]
-    estimate = from_spectra(data, fitted.terms[0], fitted, of_halves, read=False)
+    estimate = from_spectra(data, fitted.terms[0], fitted, of_halves)
     np.testing.assert_array_equal(estimate.x, fitted.scaled)
     added = (0.01 * apart) ** 2 + (REPLAY_ERROR * mean_parameters(fitted.terms)) ** 2
     np.testing.assert_allclose(estimate.covariance, fitted.covariance + np.diag(added))
-    alone = from_spectra(data, fitted.terms[0], fitted, (), read=False)
+    alone = from_spectra(data, fitted.terms[0], fitted, ())
     np.testing.assert_allclose(alone.covariance,
                                fitted.covariance + np.diag((REPLAY_ERROR * mean_parameters(fitted.terms)) ** 2))
 
@@ -128,44 +128,61 @@ def test_variance_of_a_random_effect_is_that_of_its_strength_and_of_its_assumed_
     data = Data(FLOOR, [hover(7, louder=1.5, length_s=10.0)])
     fitted = fit(data, whole_of(data), [terms("imu_noise")[0]])
     (noise,) = fitted.terms
-    estimate = from_spectra(data, noise, fitted, (), read=False)
+    estimate = from_spectra(data, noise, fitted, ())
     own = strength_variance(data, whole_of(data), fitted.terms, noise)
-    np.testing.assert_allclose(estimate.covariance, own + (MODEL_ERROR * estimate.x) ** 2)
+    np.testing.assert_allclose(estimate.covariance, own + (SPECTRUM_ERROR * estimate.x) ** 2)
 
 
-@pytest.mark.parametrize(("name", "in_loop", "read", "error"), [
-    ("mass", False, False, REPLAY_ERROR), ("mass", False, True, REPLAY_ERROR),
-    ("imu_noise", False, False, MODEL_ERROR),
-    ("inertia", True, False, MODEL_ERROR), ("inertia", True, True, LOOP_ERROR)])
-def test_error_of_the_model_of_an_effect(name, in_loop, read, error):
+@pytest.mark.parametrize(("name", "in_loop", "error"), [
+    ("mass", False, REPLAY_ERROR), ("imu_noise", False, SPECTRUM_ERROR), ("inertia", True, LOOP_ERROR)])
+def test_error_of_the_model_of_an_effect(name, in_loop, error):
     loop = SimpleNamespace(changes_loop=lambda active: in_loop)
-    assert model_error(loop, terms(name)[0], read) == error
+    assert model_error(loop, terms(name)[0]) == error
     if not in_loop:
-        assert model_error(None, terms(name)[0], read) == error
+        assert model_error(None, terms(name)[0]) == error
 
 
 def test_error_of_a_model_is_its_own_scatter_at_least():
     mass = terms("mass")[0]
     scattered = SimpleNamespace(active=mass.active, shows_in=mass.shows_in, signature=SimpleNamespace(own_scatter=0.3))
-    assert model_error(None, scattered, read=False) == 0.3
+    assert model_error(None, scattered) == 0.3
 
 
 def of_times(name, values, samples):
     """The 90 % interval of the first free parameter of an effect of the logged times, measured in so many samples."""
     (term,) = terms(name)[:1]
     term = replace(term, values={**term.values, **values})
-    return term.quantities(*from_times(SimpleNamespace(flights=[range(samples)]), term))[term.free[0]]
+    data = SimpleNamespace(flights=[range(samples)], study=study(0.0))
+    return term.quantities(*from_times(data, term))[term.free[0]]
 
 
-def test_nine_in_ten_intervals_of_a_jitter_hold_the_truth():
-    """Arrival times that keep their error for CORRELATION_S: so many independent values have a standard deviation."""
-    rng, true_s, independent, held = np.random.default_rng(1), 0.004, 300, []
+def study(jitter_s):
+    """A study whose nominal flights have this jitter."""
+    return SimpleNamespace(floor=SimpleNamespace(clock_s=jitter_s))
+
+
+@pytest.mark.parametrize("true_s", [0.0008, 0.0012, 0.004])
+def test_nine_in_ten_intervals_of_a_jitter_hold_the_truth(true_s):
+    """Over a nominal jitter of 1 ms: arrival times keep their error for CORRELATION_S, and only their sum is seen."""
+    rng, nominal_s, independent, held = np.random.default_rng(1), 0.001, 300, []
+    (term,), each = terms("time_jitter")[:1], round(CORRELATION_S / PERIOD_S)
     for _ in range(2000):
-        measured = float(np.sqrt(np.mean(rng.normal(0.0, true_s, independent) ** 2)))
-        interval = of_times("time_jitter", {terms("time_jitter")[0].free[0]: measured},
-                            round(independent * CORRELATION_S / PERIOD_S))
+        clock_s = rng.normal(0.0, np.hypot(true_s, nominal_s), independent).repeat(each)
+        data = SimpleNamespace(flights=[Times(clock_s)], study=study(nominal_s))
+        fitted, _ = clock_gain(data, term)
+        interval = fitted.quantities(*from_times(data, fitted))[fitted.free[0]]
         held.append(interval.low < true_s < interval.high)
-    assert np.mean(held) == pytest.approx(0.9, abs=0.02)
+    assert np.mean(held) == pytest.approx(0.9, abs=0.03)
+
+
+class Times:
+    """A flight of which nothing is asked but its logged times."""
+
+    def __init__(self, clock_s):
+        self.clock_s = clock_s
+
+    def __len__(self):
+        return len(self.clock_s)
 
 
 @pytest.mark.parametrize("burst", [1.0, 2.0, 5.0])

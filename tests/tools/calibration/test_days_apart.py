@@ -1,4 +1,4 @@
-"""Days told apart: by the day of the manifest; far where the rotors shake more, near where nothing differs."""
+"""How far days are apart: by the day of the manifest; far where the rotors shake more, near where nothing differs."""
 
 import re
 import sys
@@ -37,7 +37,7 @@ def table(monkeypatch, capsys, *arguments):
 
 
 @pytest.mark.slow
-def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(tmp_path, monkeypatch, capsys):
+def test_a_day_of_shaking_rotors_is_far_and_a_day_like_the_other_is_not(tmp_path, monkeypatch, capsys):
     shaking = PLAIN | {"motor_noise": {"rms": 0.02, "time": 0.2, "fast": 0.03}}
     folder = write(tmp_path / "flights", ["1", "2", "3"] * 8, {"3": shaking})
     scores = table(monkeypatch, capsys, folder, "--fewest", 6)
@@ -48,7 +48,7 @@ def test_a_day_of_shaking_rotors_is_told_and_a_day_like_the_other_is_not(tmp_pat
     assert low < 0.6
 
 
-def test_one_day_is_told(tmp_path, monkeypatch, capsys):
+def test_one_day_is_refused(tmp_path, monkeypatch, capsys):
     folder = write(tmp_path / "flights", ["1"], {})
     with pytest.raises(SystemExit, match=r"two days with 4 flights.*1 1"):
         table(monkeypatch, capsys, folder)

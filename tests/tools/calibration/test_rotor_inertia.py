@@ -1,4 +1,4 @@
-"""The inertia of a rotor from a flight whose yaw is made by the equation of motion, and from a real flight."""
+"""The inertia of a rotor from a flight whose yaw follows the equation of motion, and from a real flight."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def log_of(inertia_ratio, noise_rpm=0.0, seconds=60.0):
     for i, sign in enumerate(signs):
         columns[f"m{i + 1}_pwm"] = 40000.0 + sign * command / 4.0
         columns[f"rpm_{i + 1}"] = 20000.0 + sign * lag / 4.0 * 60.0 / (2.0 * np.pi) + rng.normal(0.0, noise_rpm, n)
-    return FlightLog(columns, {"source": "made"})
+    return FlightLog(columns, {"source": "synthetic"})
 
 
 @pytest.mark.parametrize("noise_rpm", [0.0, 100.0])
@@ -43,13 +43,13 @@ def test_it_finds_what_the_equation_of_motion_holds(ratio, noise_rpm):
     assert speed == pytest.approx(20000.0 * 2.0 * np.pi / 60.0, rel=0.01)
 
 
-def test_a_flight_that_is_too_short_is_told():
+def test_a_flight_that_is_too_short_is_refused():
     with pytest.raises(AirTouchError, match="longer"):
         rotor_inertia.spectra(log_of(RATIO, seconds=8.0), CRAFT.arm_pwm)
 
 
 def test_a_real_crazyflies_rotors_have_inertia():
-    """A rotor's 47 mm propeller of 0.3 g as a bar has 5.5e-8 kg m²; the fit is told neither."""
+    """A rotor's 47 mm propeller of 0.3 g as a bar has 5.5e-8 kg m²; the fit knows neither."""
     path = folder() / "imrclab" / "brushed_jana04.csv.gz"
     if not path.is_file():
         pytest.skip("no recorded flights")

@@ -1,4 +1,4 @@
-"""The choice of the decoder's settings, on made detections whose delays, misses and false edges are known."""
+"""The choice of the decoder's settings, on synthetic detections whose delays, misses and false edges are known."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""The readings at platform edges and the height loop of `tools/detectors/edge_readings.py`, against made signals."""
+"""The readings at platform edges and the height loop of `tools/detectors/edge_readings.py`, on synthetic signals."""
 
 from dataclasses import replace
 

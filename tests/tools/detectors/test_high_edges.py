@@ -1,4 +1,4 @@
-"""By what a detector feels a platform: known where the network reads one channel, or the noise is made."""
+"""By which channels a detector detects a platform: known where the network reads one, or the noise is synthetic."""
 
 from types import SimpleNamespace
 

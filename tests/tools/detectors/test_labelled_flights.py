@@ -17,7 +17,7 @@ from tools.detectors.labelled import training
 
 @pytest.fixture
 def house(tmp_path, monkeypatch):
-    """A folder of four made flights on two days, and a `best` that trains in a moment."""
+    """A folder of four synthetic flights on two days, and a `best` that trains in a moment."""
     pytest.importorskip("tensorflow")
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     folder = tmp_path / "flights"

@@ -28,7 +28,7 @@ class Shortened(tuple):
 
 @pytest.fixture
 def trained(tmp_path, monkeypatch):
-    """Four made flights in two folds, of which fold 1 is held out; what `best.fit` is asked for, and the model."""
+    """Four synthetic flights in two folds, of which fold 1 is held out; what `best.fit` is asked for, and the model."""
     folder, scenes = tmp_path / "flights", []
     folder.mkdir()
     for i in range(4):

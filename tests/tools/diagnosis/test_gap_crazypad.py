@@ -1,4 +1,4 @@
-"""The choice of priors on CrazyPAD, and diagnoses by the balance alone, on made cases and patterns."""
+"""The choice of priors on CrazyPAD, and diagnoses by the balance alone, on synthetic cases and patterns."""
 
 import numpy as np
 import pytest

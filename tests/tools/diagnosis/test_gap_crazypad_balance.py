@@ -1,4 +1,4 @@
-"""What the hover balance alone tells on CrazyPAD: fits and tests on made ones whose change and scatter are known."""
+"""The hover balance alone on CrazyPAD: fits and tests of synthetic balances whose change and scatter are known."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from airtouch.gap.balance.hover_pattern import HoverPattern
 from tools.diagnosis import gap_crazypad_balance as balance
 
 
-def test_a_cut_rotor_is_told_more_in_all_four():
+def test_a_cut_rotor_is_commanded_more_in_all_four():
     assert np.sign(balance.change({3: 2.0}, 0.03, 1.0)).tolist() == [1.0, 1.0, 1.0, -1.0]
     lift, roll, pitch, yaw = balance.change({1: 2.0, 2: 2.0}, 0.03, 1.0)
     assert lift > 0.0 > roll and abs(pitch) < 1e-12 and abs(yaw) < 1e-12
@@ -29,7 +29,7 @@ CUTS = [{r: float(mm)} for r in (1, 2, 3, 4) for mm in (2, 3, 4)]
 SOLUTION = np.array([0.03, 1.2])
 
 
-def test_the_rotor_is_told_where_noise_is_small_and_guessed_where_it_is_large():
+def test_the_rotor_is_named_where_noise_is_small_and_guessed_where_it_is_large():
     """One rotor of four cut: all flights right without noise; in noise far above the change a quarter are expected."""
     cut = ("E8", "cut_M3_3.0mm")
     rng = np.random.default_rng(0)
@@ -51,7 +51,7 @@ def test_two_cut_rotors_are_right_in_either_order_of_their_cuts():
 
 
 def test_a_condition_is_tested_by_what_the_others_say():
-    """Without scatter between conditions but their own, each is told by a slope that it did not take part in."""
+    """Without scatter between conditions but their own, each is named by a slope that was fitted without it."""
     rows = [{"drone": "E8", "condition": "normal_flight"}] * 4
     rows += [{"drone": "E8", "condition": f"cut_M{r}_{mm}mm"} for cut in CUTS for r, mm in cut.items()]
     rng = np.random.default_rng(3)

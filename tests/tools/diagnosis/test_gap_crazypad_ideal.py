@@ -1,4 +1,4 @@
-"""The tests of CrazyPAD that are told more than the diagnosis."""
+"""The classifiers that have labels of CrazyPAD, on synthetic flights."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tools.diagnosis.recordings.crazypad import figures as pad
 
 
 @pytest.mark.parametrize("learner", ideal.LEARNERS)
-def test_learners_tell_what_is_apart_and_not_what_is_not(learner, monkeypatch):
+def test_learners_separate_distinct_conditions_and_not_equal_ones(learner, monkeypatch):
     monkeypatch.setattr(ideal, "TREES", 40)  # so few tell these apart; more are time
     generator = np.random.default_rng(2)
     names = ["normal_flight", "cut_propeller_M3_3mm", "add_weight_W1_near_M3", "weight_on_string_W2_near_M3"]

@@ -1,4 +1,4 @@
-"""The lift that a regression finds in a made flight, which has a known multiple of the measured one."""
+"""The lift that a regression finds in a synthetic flight, which has a known multiple of the measured one."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -32,7 +32,7 @@ def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):
 def test_effects_are_flown_as_found():
     effects = [("weak_motor", {"rotor": 2, "thrust_loss": 0.07}), ("gust", {"rms": 0.2}),
                ("weak_motor", {"rotor": 3, "thrust_loss": -0.02})]
-    scene = scenario.parse(gap_training.scene_text(effects), "made")
+    scene = scenario.parse(gap_training.scene_text(effects), "synthetic")
     on = scenario.draw_flight(scene, 0, 5).effects
     assert sorted(name for name, _ in on) == ["gust", "weak_motor", "weak_motor"]
     assert {v["rotor"]: v["thrust_loss"] for n, v in on if n == "weak_motor"} == {2: 0.07, 3: -0.02}

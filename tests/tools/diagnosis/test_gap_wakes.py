@@ -1,4 +1,6 @@
-"""The test of wakes that is told when a vehicle was under another."""
+"""The test of wakes that knows when a vehicle was under another, and what the diagnosis names, on synthetic tracks."""
+
+import json
 
 import numpy as np
 import pytest
@@ -36,3 +38,46 @@ def test_a_push_in_these_seconds_is_beyond_chance_and_none_is_not():
     assert gap_wakes.measures(push, acts)[0] == pytest.approx(0.05, abs=0.01)
     assert gap_wakes.measures(push, acts)[0] > np.quantile(by_chance[:, 0], 0.997)
     assert gap_wakes.measures(window(n=1200), np.resize(acts, 1200))[0] < np.quantile(by_chance[:, 0], 0.997)
+
+
+def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(capsys):
+    here = {"file": "low.csv", "vehicle": "34 g", "manoeuvre": "hover", "s_under": "2.0"}
+    low, nominal = window(), window("cf52", 50.0)
+    low.row.update(here, truth="downwash")
+    nominal.row.update(here, file="calm.csv", truth="none")
+    for samples, words in ((40, "less than 0.5 s held"), (60, "| yes |")):
+        high = window("cf51", 4.0, (0.0, 0.0, 0.9), samples)
+        high.row.update(here, file="high.csv", truth="partner")
+        low.force[:] = np.where(gap_wakes.under(low, high), -0.2, low.force)
+        gap_wakes.show_seen([low, high, nominal], None)
+        out = capsys.readouterr().out
+        assert words in next(line for line in out.splitlines() if "low.csv" in line)
+        assert f"{int(samples == 40)} more, for which the data hold less than 0.5 s" in out
+
+
+def test_named_wakes_are_counted_by_whether_the_path_is_held(tmp_path):
+    """One wake whose path is held for 3 s is named, one for 0.3 s and one without another cut are not and are."""
+    def wake(name, number, seconds):
+        low = window()
+        low.row.update(file=name, truth="downwash", flight=f"day/cf50_{number}")
+        high = window("cf51", 4.0, (0.1, 0.0, 0.9), round(100 * seconds))
+        high.row.update(file=f"above {name}", flight=f"day/cf51_{number}")
+        return [low, high] if seconds else [low]
+
+    tracks = [*wake("long", 1, 3.0), *wake("unnamed", 2, 3.0), *wake("short", 3, 0.3), *wake("alone", 4, 0.0)]
+    kept = tmp_path / "answers.jsonl"
+    kept.write_text("".join(json.dumps({"flight": name, "verdict": verdict, "effects": [{"name": n} for n in names]})
+                            + "\n" for name, verdict, names in (
+        ("long", "effect", ["downwash", "mass"]), ("unnamed", "effect", ["mass", "downwash"]), ("short", "none", []),
+        ("alone", "effect", ["downwash"]))))
+    answers = gap_wakes.answers_of(kept)
+    assert answers == {"long": "downwash", "unnamed": "mass", "short": "none", "alone": "downwash"}
+    assert gap_wakes.named_by_path(tracks, answers) == {True: [True, False], False: [False, True]}
+    assert gap_wakes.named_by_path(tracks, gap_wakes.answers_of(None)) == {True: [False] * 2, False: [False] * 2}
+
+
+def test_the_interval_of_an_area_holds_it():
+    """Scores apart by one standard deviation: the area is 0.76, and 100 of each give it to 0.03."""
+    rng = np.random.default_rng(0)
+    low, high = gap_wakes.auroc_interval(rng.normal(1.0, 1.0, 100), rng.normal(0.0, 1.0, 100))
+    assert low < 0.76 < high and 0.06 < high - low < 0.2

@@ -1,4 +1,4 @@
-"""The deepest chain of calls in made call graphs whose frames are known."""
+"""The deepest chain of calls in synthetic call graphs whose frames are known."""
 
 import pytest
 

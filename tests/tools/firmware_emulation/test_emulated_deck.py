@@ -37,7 +37,7 @@ def test_the_emulated_flow_sees_the_distance_to_what_is_below():
 
 
 class Wire:
-    """A board that only notes what it is told."""
+    """A board that only records what it receives."""
 
     def __init__(self):
         self.said, self.handlers = [], {}

@@ -97,7 +97,7 @@ def test_a_command_that_differs_is_counted():
 
 
 class Desk:
-    """A board on a desk: its motors stand still. `said` is what it was told."""
+    """A board on a desk: its motors stand still. `said` is what it received."""
 
     said: list[bytes] = []
     console = "Self test passed!"
@@ -156,9 +156,9 @@ def test_a_summary_counts_flights_edges_and_false_reports():
     crossed = [(5.0, "entry"), (8.0, "exit")]
     legs = [leg(low_m=0.6, crossed=crossed, reported=[(5.5, "entry"), (10.0, "exit")]),
             leg(ending="it turned over after 3 s", high_m=1.9, crossed=crossed, reported=[(1.0, "exit")])]
-    assert height.summary(legs) == ("1 of 2 ended well, 0.60 to 1.90 m; felt 2 of 4 (1 within 1.5 s), 0.5 to 2.0 s "
+    assert height.summary(legs) == ("1 of 2 ended well, 0.60 to 1.90 m; detected 2 of 4 (1 within 1.5 s), 0.5 to 2.0 s "
                                     "late; 1 false")
-    assert height.summary([leg()]) == "1 of 1 ended well, 0.70 to 0.90 m; felt 0 of 0; 0 false"
+    assert height.summary([leg()]) == "1 of 1 ended well, 0.70 to 0.90 m; detected 0 of 0; 0 false"
 
 
 def test_flights_that_were_kept_are_not_flown_again(monkeypatch, tmp_path, capsys):

@@ -20,12 +20,8 @@ def find_flights() -> Path | None:
         if not Path(named).is_dir():
             raise AirTouchError(f"AIRTOUCH_FLIGHTS={named}: no such folder")
         return _inner(Path(named))
-    checkout = Path(__file__).resolve().parents[4]
-    for beside in (Path.cwd().parent, checkout.parent):
-        folder = beside / "shared" / "flights"
-        if folder.is_dir():
-            return _inner(folder)
-    return None
+    folder = _beside()
+    return None if folder is None else _inner(folder)
 
 
 def need_flights(folder: Path | None = None) -> Path:
@@ -34,6 +30,28 @@ def need_flights(folder: Path | None = None) -> Path:
     if chosen is None:
         raise click.UsageError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")
     return chosen
+
+
+def data_folder(data_set: str = "") -> Path:
+    """The folder of a recorded data set, or of all of them, in AIRTOUCH_FLIGHTS or ../shared/flights.
+
+    The latter is looked for as by `find_flights`. The folder need not exist: `check_data_set` tells.
+    """
+    return Path(os.environ.get("AIRTOUCH_FLIGHTS") or _beside() or "../shared/flights") / data_set
+
+
+def check_data_set(folder: Path, *tables: str) -> None:
+    """Raise AirTouchError where a data set's folder lacks its manifest.csv or another of its tables."""
+    for name in (MANIFEST, *tables):
+        if not (folder / name).is_file():
+            raise AirTouchError(f"{folder} has no {name}: give the folder of the flights, or set AIRTOUCH_FLIGHTS")
+
+
+def _beside() -> Path | None:
+    """The folder shared/flights beside here or beside the checkout; None where neither has one."""
+    checkout = Path(__file__).resolve().parents[4]
+    folders = (beside / "shared" / "flights" for beside in (Path.cwd().parent, checkout.parent))
+    return next((folder for folder in folders if folder.is_dir()), None)
 
 
 def _inner(folder: Path) -> Path:

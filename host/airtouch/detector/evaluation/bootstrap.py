@@ -1,6 +1,7 @@
-"""Bootstrap intervals of ratios of sums, resampled by flight."""
+"""Bootstrap intervals: of ratios of sums, resampled by flight, and of any statistic of resampled cases."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -37,3 +38,14 @@ def bootstrap(
         bounds = np.percentile(finite, [tail, 100.0 - tail]) if len(finite) else None
         intervals[name] = None if bounds is None else (float(bounds[0]), float(bounds[1]))
     return intervals
+
+
+def resampled(statistic: Callable[..., Any], *sizes: int, replicates: int, level: float, seed: int = 0) -> np.ndarray:
+    """Percentile interval (2, ...) of a statistic that depends on each case, not on sums alone.
+
+    sizes: of the groups of cases, each of which is resampled on its own. statistic: takes the indices (size,) of each
+    group's cases in a replicate and gives one or more numbers; NaN are left out.
+    """
+    generator = np.random.default_rng(seed)
+    values = [statistic(*(generator.integers(0, size, size) for size in sizes)) for _ in range(replicates)]
+    return np.nanpercentile(np.array(values, float), (50.0 - 50.0 * level, 50.0 + 50.0 * level), axis=0)

@@ -3,9 +3,11 @@
 Parameters are scaled (`signatures.term`): 0 is neutral, 1 a natural step. The 90 % interval of each is made of its
 variance (`Term.quantities`), which is the sum of
 
-1. that of the fit: the likelihood's curvature, or chance in the logged times;
+1. that of the fit: the likelihood's curvature;
 2. the square of half the difference of the two halves of the data: what one half shows and the other does not;
 3. the square of the model's error, a fraction of the parameter (`model_error`).
+
+Of an effect in the logged times alone it is that of chance (`from_times`).
 
 On white noise of the expected power, intervals of the first alone would hold 88 %, as the likelihood's tails and the
 overlap of its blocks make it a little too sure; those of the first two hold 94 % (`tests/gap/answer/test_estimates.py`
@@ -18,10 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import CORRELATION_S
+from airtouch.gap.evidence.clock import CORRELATION_S, nominal_jitter_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, strength_variance
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.relations.readout import Reading
@@ -31,10 +34,10 @@ from airtouch.gap.signatures.term import Term
 #: fraction of a parameter by which the replay may be wrong: strong effects in eight simulated flights came out up to
 #: 0.26 % off, rms 0.14 % (`python tools/simulation/replay_error.py`)
 REPLAY_ERROR = 0.002
-#: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong; chosen
-MODEL_ERROR = 0.1
-#: fraction of an effect's only parameter by which the loop's model may be wrong, where the relations of signals measure
-#: it too: replayed inertia and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets
+#: fraction of a parameter by which the model of a random effect's spectrum may be wrong; chosen
+SPECTRUM_ERROR = 0.1
+#: fraction of a parameter by which the loop's model may be wrong: replayed inertia and late sensors lay 27 and 29 %
+#: off, the median of nine flights of two opened sealed sets
 LOOP_ERROR = 0.25
 
 
@@ -45,11 +48,10 @@ class Estimate(NamedTuple):
     covariance: np.ndarray
 
 
-def from_spectra(data: Data, term: Term, fitted: FittedTerms, halves: Sequence[FittedTerms], read: bool) -> Estimate:
+def from_spectra(data: Data, term: Term, fitted: FittedTerms, halves: Sequence[FittedTerms]) -> Estimate:
     """The estimate of an effect that shows in the spectra.
 
-    term: one of `fitted`, which is fitted to all the data; halves: fits of the same effects to each half, or none;
-    read: see `model_error`.
+    term: one of `fitted`, which is fitted to all the data; halves: fits of the same effects to each half, or none.
     """
     if term.shows_in == MEAN:
         place = fitted.place(term)
@@ -58,37 +60,37 @@ def from_spectra(data: Data, term: Term, fitted: FittedTerms, halves: Sequence[F
         x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)
     of_halves = [t.scaled(t.values) for f in halves for t in f.terms if t.slot == term.slot]
     apart = 0.5 * (of_halves[0] - of_halves[1]) if len(of_halves) == 2 else np.zeros(len(x))
-    error = model_error(data.study.loop, term, read and len(x) == 1)
+    error = model_error(data.study.loop, term)
     return Estimate(x, covariance + np.diag(apart ** 2) + np.diag((error * term.scaled(term.values)) ** 2))
 
 
-def model_error(loop: ClosedLoop | None, term: Term, read: bool) -> float:
-    """Fraction of its parameters by which the model of an effect may be wrong; its own scatter at least.
-
-    read: whether the relations of signals measure its only parameter too.
-    """
+def model_error(loop: ClosedLoop | None, term: Term) -> float:
+    """Fraction of its parameters by which the model of an effect may be wrong; its own scatter at least."""
     error = REPLAY_ERROR
     if loop is not None and loop.changes_loop((term.active(),)):
-        error = LOOP_ERROR if read else MODEL_ERROR
+        error = LOOP_ERROR
     elif term.shows_in == SPECTRUM:
-        error = MODEL_ERROR
+        error = SPECTRUM_ERROR
     return max(error, term.signature.own_scatter)
 
 
 def from_times(data: Data, term: Term) -> Estimate:
     """The estimate of an effect that shows in the logged times alone, its values being the measured ones.
 
-    The relative variance of a standard deviation from n independent values is 1 / (2 n); a jitter has one such value in
-    CORRELATION_S. That of a number of lost samples is E[L^2] / (E[L] times the number), where runs begin as in a
+    The relative variance of a standard deviation m from n independent values is 1 / (2 n); the clock has one such value
+    in CORRELATION_S. A jitter is what m has beyond the nominal one, s^2 = m^2 - nominal^2, so that its relative
+    variance is (m / s)^4 times that. That of a number of lost samples is E[L^2] / (E[L] times the number), where runs
+    begin as in a
     Poisson process and have L samples (compound Poisson); of geometric lengths of mean b it is (2 b - 1) / the number.
     No relative variance is more than 1.
     """
     samples = sum(len(f) for f in data.flights)
-    independent = samples / (CORRELATION_S / PERIOD_S)
-    inverse = 2.0 * independent  # of the relative variance
     if term.signature.loss_runs is not None:
         share, length = (term.values[p] for p in term.signature.loss_runs)
-        inverse = share * samples / (2.0 * length - 1.0)
+        inverse = share * samples / (2.0 * length - 1.0)  # of the relative variance
+    else:
+        independent, (jitter_s,) = samples / (CORRELATION_S / PERIOD_S), (term.values[p] for p in term.free)
+        inverse = 2.0 * independent / (1.0 + (nominal_jitter_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2
     x = term.scaled(term.values)
     return Estimate(x, np.diag(x ** 2 / max(inverse, 1.0)))
 
@@ -97,8 +99,8 @@ def with_reading(term: Term, estimate: Estimate, reading: Reading) -> Estimate:
     """An estimate by the replay and by the relations of signals together; unchanged without a reading.
 
     Both are weighted by precision (the update of a Kalman filter), so that parameters that the replay knows as a sum or
-    a product move together. Where the two differ by more than their errors, the covariance grows by that factor
-    squared (Birge 1932).
+    a product move together. Where the two differ by more than their errors, chi^2 of k parameters above k, the
+    covariance grows by chi^2 / k (Birge 1932).
     """
     x, covariance = estimate
     read = [i for i, name in enumerate(term.free) if name in reading]

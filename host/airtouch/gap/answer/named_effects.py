@@ -33,7 +33,7 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
     fitted = best_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
     shown = [t for t in fitted.terms if t.slot in selection.named_slots]
-    effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits, t.name in readings), readings)
+    effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits), readings)
                for t in shown if not t.companion]
     for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, part) for e in effects]
@@ -53,14 +53,14 @@ def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: n
 
     start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
     """
-    best = fit(data, all_blocks, terms, start)
+    best, chosen = fit(data, all_blocks, terms, start), list(terms)
     for i, term in enumerate(terms):
         level = judge(data, all_blocks, best.terms) + SHAPE_PRICE
         for shaped in term.shaped():
-            trial = fit(data, all_blocks, [*terms[:i], shaped, *terms[i + 1:]], start)
+            trial = fit(data, all_blocks, [*chosen[:i], shaped, *chosen[i + 1:]], start)
             gain = judge(data, all_blocks, trial.terms)
             if gain > level:
-                best, level = trial, gain
+                best, level, chosen[i] = trial, gain, shaped
     return converged(data, all_blocks, best)
 
 

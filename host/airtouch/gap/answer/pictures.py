@@ -142,7 +142,7 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
 
 def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
-    """The spectra of channels, means over all blocks in the air; none where no flight has such a block."""
+    """The spectra of channels in the air, means over flights; none where no flight has a block there."""
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
@@ -163,7 +163,9 @@ def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
 def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:
     """Mean power (bins, COUNT) with effects in the model.
 
-    The power of a random effect is subtracted from what is over the floor, as no sample of it can be predicted.
+    No sample of a random effect can be predicted, only its power. What it leaves is the floor times the ratio of the
+    power to that expected, floor and random effect together: the floor where the model is right, less where it predicts
+    too much.
     """
     power = np.mean([_power(g.flight, g.before if g.after is None else g.after) for g in gaps], axis=0)
     random = random_of(effects)
@@ -171,4 +173,4 @@ def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term
         return power
     of_random = sum(sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
                     for data in (Data(study, [g.flight]) for g in gaps))
-    return floor + np.abs(power - floor - of_random / len(gaps))
+    return power * floor / (floor + of_random / len(gaps))

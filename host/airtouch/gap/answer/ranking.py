@@ -23,10 +23,12 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     2. what is left beside the effects named is more than chance leaves: "unknown";
     3. no effect is named: "none"; else "effect".
 
-    What the log has done to itself shows in its times alone, and is no part of the gap; a passing effect is
-    seldom in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may
-    be calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no
-    nominal flight has odd times. A recorded one had calm air or a poor link.
+    Rule 1 does not hold where the gap cannot show the effects:
+
+    - every effect named acts in the logged times alone, or passes: the times are no part of the gap, and what passes
+      is seldom in both halves of the data, in whose common part the gap is measured;
+    - in simulated flights, the effects named bring the cells nearer to the floor, from above or from below;
+    - in simulated flights, the logged times are irregular, as no nominal simulated flight's are.
     """
     if selection.inference is None and _at_its_floor(data, selection, gap):
         return "none"

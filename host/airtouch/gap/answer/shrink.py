@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS
+from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
-from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
@@ -87,16 +87,16 @@ def shrink_of_jitter(data: Data) -> Shrink:
     """The shrink where only the logged times are odd: how well the jitter of one half predicts the other's.
 
     Gap is the rms of the logged times around regular ones, over that of nominal flights. After: the floor and what the
-    halves differ by.
+    halves differ by. Two numbers give no interval.
     """
-    floor = max(data.study.floor.clock_s, LEAST_JITTER_S)
+    floor = nominal_jitter_s(data.study)
     rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
                                                  np.array_split(f.clock_s, JITTER_PIECES)[half::2]]) ** 2)))
            for half in (0, 1)]
     before = float(np.mean(rms)) / floor
     after = 1.0 + abs(rms[0] - rms[1]) / floor
     share = share_closed(before ** 2, after ** 2)
-    return Shrink(before, after, Quantity(share, share, share))
+    return Shrink(before, after, Quantity(share))
 
 
 def share_closed(before: float, after: float) -> float:

@@ -10,6 +10,7 @@ from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
+from airtouch.gap.study import Study
 
 #: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
@@ -24,13 +25,18 @@ class TimesFault(NamedTuple):
     gain: float
 
 
+def nominal_jitter_s(study: Study) -> float:
+    """Rms (s) of the logged times around regular ones in nominal flights."""
+    return max(study.floor.clock_s, LEAST_JITTER_S)
+
+
 def jitter(data: Data) -> TimesFault:
     """Jitter of the logged times: its size is their rms (s) beyond that of nominal flights.
 
     The gain is that of normal times whose variance is the measured one, over nominal ones: of n independent values
     n/2 (r - 1 - log r), where r is the ratio of the variances.
     """
-    nominal = max(data.study.floor.clock_s, LEAST_JITTER_S)
+    nominal = nominal_jitter_s(data.study)
     clock = np.concatenate([f.clock_s for f in data.flights])
     measured = float(np.std(clock))
     if measured <= nominal:

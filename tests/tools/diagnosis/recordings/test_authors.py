@@ -1,4 +1,4 @@
-"""The three questions of the authors' flights, on a made manifest."""
+"""The three questions of the authors' flights, on a synthetic manifest."""
 
 from tools.diagnosis.recordings import authors
 

@@ -1,4 +1,4 @@
-"""Which flights `gap_real.py` diagnoses against which, on made manifests."""
+"""Which flights `gap_real.py` diagnoses against which, on synthetic manifests."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What CrazyPAD's conditions say, and its figures, on made answers whose counts are known."""
+"""What CrazyPAD's conditions say, and its figures, on synthetic answers whose counts are known."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Cuts of flights in which several vehicles fly at once, on a made data set of two flights."""
+"""Cuts of flights in which several vehicles fly at once, on a synthetic data set of two flights."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""The table of `gap_real.py`: what counts as an answer, and its counts, on made cases."""
+"""The table of `gap_real.py`: what counts as an answer, and its counts, on synthetic cases."""
 
 from collections import Counter
 
@@ -14,7 +14,7 @@ def case(row, truth, *effects, verdict="effect", condition="", **more):
             "flight": "pad_normal_E8_log00.csv.gz", "effects": [{"name": e, "parameters": {}, **more} for e in effects]}
 
 
-@pytest.mark.parametrize(("made", "answer"), [
+@pytest.mark.parametrize(("diagnosed", "answer"), [
     (case("swarm", "downwash", "downwash", "mass"), "downwash"),
     (case("swarm", "none", verdict="none"), "none"),
     (case("swarm", "downwash", verdict="unknown"), "unknown"),
@@ -25,8 +25,8 @@ def case(row, truth, *effects, verdict="effect", condition="", **more):
     (case("peers", "mass", "weak_motor"), "weak_motor"),
     (case("crazypad", "slung load", "slung_load"), "slung load"),
     (case("crazypad", "normal", verdict="none"), "normal")])
-def test_an_answer_is_in_the_words_of_its_rows_truths(made, answer):
-    assert table.answer(made) == answer
+def test_an_answer_is_in_the_words_of_its_rows_truths(diagnosed, answer):
+    assert table.answer(diagnosed) == answer
 
 
 def test_answers_are_counted_by_row_and_truth():

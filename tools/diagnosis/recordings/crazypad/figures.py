@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import spearmanr
 
+from airtouch.detector.evaluation.bootstrap import resampled
+
 from .labels import FAMILIES, LEAST_MM, cut_mm, family, large, millimetres, rotors
 
 #: effect that a diagnosis names -> family
@@ -40,19 +42,17 @@ def balanced_accuracy(table: list[dict]) -> float:
 
 def interval(table: list[dict], figure: Callable[[list[dict]], float]) -> tuple[float, float]:
     """90 % interval of a figure, resampling conditions (of a drone) within families."""
-    rng = np.random.default_rng(0)
     groups: dict[str, dict[str, list[dict]]] = {}
     for c in table:
         groups.setdefault(family(c["condition"]), {}).setdefault(c["drone"] + c["condition"], []).append(c)
-    values = []
-    for _ in range(RESAMPLES):
-        sample = []
-        for conditions in groups.values():
-            flights = list(conditions.values())
-            for k in rng.integers(0, len(flights), len(flights)):
-                sample += flights[k]
-        values.append(figure(sample))
-    low, high = np.nanpercentile(values, (5, 95))
+    families = [list(conditions.values()) for conditions in groups.values()]
+
+    def figure_of(*picks: np.ndarray) -> float:
+        """The figure of a sample: the numbers of the conditions that it has of each family."""
+        return figure([case for conditions, pick in zip(families, picks, strict=True)
+                       for k in pick for case in conditions[k]])
+
+    low, high = resampled(figure_of, *map(len, families), replicates=RESAMPLES, level=0.9)
     return low, high
 
 

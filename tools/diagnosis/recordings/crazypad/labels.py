@@ -9,7 +9,9 @@ import csv
 import re
 from pathlib import Path
 
-from ..folder import add_folder, check_folder
+from airtouch.cli.shared.flights import check_data_set
+
+from ..folder import add_folder
 
 VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
 #: families of conditions, in the order of the tables
@@ -44,9 +46,10 @@ def folder_and_part(description: str | None) -> argparse.Namespace:
     """`folder` and `part` of the command line of a script with this description."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "crazypad")
-    parser.add_argument("--part", choices=("build", "all"), default="build")
+    parser.add_argument("--part", choices=("build", "all"), default="build",
+                        help="all but every fourth condition with a defect, or all (default %(default)s)")
     options = parser.parse_args()
-    check_folder(parser, options.folder)
+    check_data_set(options.folder)
     return options
 
 

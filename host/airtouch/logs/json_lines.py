@@ -1,0 +1,31 @@
+"""JSON objects, one a line, to which a long run appends each result, so that it can go on where it stopped."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from airtouch.errors import AirTouchError
+
+
+def read(path: Path | None) -> list[dict[str, Any]]:
+    """The objects of a file; none without a file. Raises AirTouchError, with the line, for anything else in it."""
+    if path is None or not path.exists():
+        return []
+    objects = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            one = json.loads(line)
+        except ValueError:
+            one = None
+        if not isinstance(one, dict):
+            raise AirTouchError(f"{path}: line {number} is no JSON object; remove that line")
+        objects.append(one)
+    return objects
+
+
+def append(path: Path | None, objects: Iterable[dict[str, Any]]) -> None:
+    """Append objects to a file, which is made if it is not there; nothing without a path."""
+    if path is not None:
+        with path.open("a", encoding="utf-8") as out:
+            out.writelines(json.dumps(one) + "\n" for one in objects)
