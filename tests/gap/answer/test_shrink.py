@@ -15,7 +15,7 @@ from airtouch.gap.answer.shrink import (
     shrink_of,
     shrink_of_jitter,
 )
-from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, cell_numbers
+from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, VIEW_STRIDE, cell_numbers
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains
 from airtouch.gap.evidence.problem import problem_of
@@ -75,7 +75,7 @@ def test_cells_stand_out_that_have_enough_values():
     data = Data(FLOOR, [hover(7, louder=4.0, length_s=10.0)])
     parts = halves(data)
     gap = gap_of(data, parts, None)
-    channel = np.arange(CELLS) % 1000 % len(COLUMN)
+    channel = np.arange(CELLS) % VIEW_STRIDE % len(COLUMN)
     for shown_by, cells in zip(parts[::-1], gap.cells, strict=True):
         counts = np.where(channel < TORQUE.stop, counts_of(data, shown_by), 0)
         assert (counts[counts > 0] < FEWEST_VALUES).any()

@@ -1,16 +1,16 @@
-"""Fits of a mean effect with its random part: wherever they begin, they end where the likelihood is highest."""
+"""Fits of effects: wherever they begin, they end where the likelihood is highest; the strength of a random one."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import fit, judge
-from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.naming import judging
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.evidence.fit import LEAST_STRENGTH, fit, judge, strongest
+from airtouch.gap.evidence.problem import problem_of, whole_of
 from airtouch.gap.signatures import candidates
 from gap_flights import fly
+from hovers import FLOOR, hover
 
 
 @pytest.mark.parametrize("start", [0.05, 3.0])
@@ -26,16 +26,26 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
     assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
 
 
-def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(study):
-    """Beside a random effect the commands' floor is less certain: a changed gain, seen in them alone, gains less."""
-    data = Data(study, fly(1, 54, {"controller_gain": {"height": 0.5}}))
-    on = judging.trial_of(data)
-    gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
-    chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
-    certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
-                              for train, test in problem.TWO_FOLDS) for wide in (False, True))
-    assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
-    vibration = judging.PricedVariant("vibration", (candidates.terms("vibration")[0],), 0.0)
-    both = judging.cross_validated(on, vibration, chosen)
-    assert both.gain == pytest.approx(chosen.gain, abs=2.0)
-    assert both.charges.certainty_refund == pytest.approx(certain - uncertain)
+@pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])
+def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
+    """Against the best of a thousand strengths by the whole likelihood; one is less than the floor has."""
+    data = Data(FLOOR, [hover(1, louder=louder, length_s=12.0)])
+    problem = problem_of(data, whole_of(data))
+    (noise,) = candidates.terms("imu_noise")
+    values, other = problem.elements.base, beside * problem.elements.power
+    found = strongest(problem, noise, values, other)
+    strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
+    terms = [noise.fitted(np.full(1, x)) for x in strengths]
+    levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
+    best = strengths[int(np.argmax(levels))]
+    assert noise.scaled(found.values)[0] == pytest.approx(best, rel=0.01)
+    level = problem.likelihood(values, other + problem.random_power([found]))
+    assert level > max(levels) - 1e-2 and (best > 2.0 * LEAST_STRENGTH) == (louder > 1.0)
+
+
+def test_a_random_effect_that_adds_no_power_stays_as_it_is():
+    data = Data(FLOOR, [hover(1, length_s=12.0)])
+    problem = problem_of(data, whole_of(data))
+    (noise,) = candidates.terms("imu_noise")
+    elsewhere = replace(noise, gate=(("another flight", 0.0, 12.0),))
+    assert strongest(problem, elsewhere, problem.elements.base, np.zeros(len(problem.elements.base))) is elsewhere

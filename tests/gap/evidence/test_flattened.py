@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.cells import AXES
+from airtouch.gap.evidence.cells import SENSOR_AXES
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.flattened import FREEDOM_OF_BLOCK, LEAST_FREEDOM, OFFSETS, Offset
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
@@ -66,8 +66,8 @@ def test_torque_and_blocks_of_the_values(two):
     """Axis by axis a bin of a block has each channel once; only blocks in the air are numbered."""
     flat = flat_of(two)
     channel = flat.elements.channel[:flat.replay_count]
-    np.testing.assert_array_equal(flat.of_torque, (channel >= TORQUE.start) & (channel < TORQUE.stop))
-    assert (channel[:AXES] == np.arange(AXES)).all()
-    on_ground = flat.air.of < 0
+    np.testing.assert_array_equal(flat.is_torque, (channel >= TORQUE.start) & (channel < TORQUE.stop))
+    assert (channel[:SENSOR_AXES] == np.arange(SENSOR_AXES)).all()
+    on_ground = flat.air.block_of_value < 0
     assert on_ground.any() and (flat.elements.flight[:flat.replay_count][on_ground] == 0).all()
-    assert len(flat.air.begin) == flat.air.of.max() + 1
+    assert len(flat.air.begin) == flat.air.block_of_value.max() + 1

@@ -73,7 +73,7 @@ def test_slopes_of_a_linear_effect_are_its_differences(problem):
         one[i] = 1.0
         change = problem.values(active_at([BIAS], one)) - problem.values(active_at([BIAS], x))
         np.testing.assert_allclose(column, change, atol=1e-6 * np.abs(change).max())
-    assert not slopes.bent.any() and not np.array(slopes.powers).any()
+    assert not slopes.nonlinear.any() and not np.array(slopes.torque_powers).any()
 
 
 def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(problem):

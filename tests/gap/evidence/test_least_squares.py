@@ -1,11 +1,17 @@
 """Steps of ridge regression against SciPy's and NumPy's own least squares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, minimize_scalar
 
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.flattened import Offset
-from airtouch.gap.evidence.least_squares import bounded_step, normal_equations
+from airtouch.gap.evidence.least_squares import bounded_step, normal_equations, weights_of, without_offsets
+from airtouch.gap.evidence.problem import problem_of, whole_of
+from airtouch.gap.signals.channels import COUNT
+from hovers import FLOOR, hover
 
 FREE = np.full(3, -9.0), np.full(3, 9.0)
 
@@ -75,3 +81,51 @@ def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(sy
     normal = rows.T @ rows
     doubled = normal + np.diag(np.diag(normal))
     np.testing.assert_allclose(doubled @ damped, rows.T @ np.concatenate([aim, np.zeros(3)]))
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Two hovers, the second under a steady force; the means of two channels may differ from flight to flight."""
+    spread = np.zeros(COUNT)
+    spread[[0, 2]] = 0.05, 0.02
+    study = replace(FLOOR, floor=replace(FLOOR.floor, offset=spread))
+    data = Data(study, [hover(1, length_s=12.0), hover(2, (0.06, 0.0, -0.04), length_s=12.0, name="forced")])
+    return problem_of(data, whole_of(data))
+
+
+def test_weights_are_those_of_the_likelihoods_slope(problem):
+    """Least squares with these weights rise as minus the log likelihood does, for small changes of the values."""
+    rng = np.random.default_rng(4)
+    values = 3.0 * problem.elements.base
+    added = problem.elements.power * rng.uniform(0.0, 2.0, len(values))
+    weights = weights_of(problem, values, added)
+    for _ in range(5):
+        column = np.sqrt(problem.elements.power) * (rng.normal(size=len(values)) + 1j * rng.normal(size=len(values)))
+        up, down = (problem.likelihood(values + sign * 1e-5 * column, added) for sign in (1.0, -1.0))
+        assert 2.0 * (weights @ (column.conj() * values).real) == pytest.approx(-(up - down) / 2e-5, rel=1e-4, abs=1e-2)
+    unknown = replace(problem, flat=replace(problem.flat, elements=replace(
+        problem.elements, known=np.arange(len(values)) % 2 == 0)))
+    np.testing.assert_array_equal(weights_of(unknown, values, added)[1::2], 0.0)
+
+
+@pytest.mark.parametrize("louder", [0.0, 5.0])
+def test_offsets_that_are_subtracted_are_the_likeliest(problem, louder):
+    """Each against SciPy's maximum of likelihood and prior; two steps of least squares come near it."""
+    values, added = problem.elements.base, louder * problem.elements.power
+    gap, cost = without_offsets(problem, values, added)
+    amounts = []
+    for offset in problem.offsets:
+        changed = values.copy()
+
+        def lost(amount, offset=offset, changed=changed):
+            changed[offset.places] = values[offset.places] - amount * offset.column
+            return 0.5 * (amount / offset.spread) ** 2 - problem.likelihood(changed, added)
+
+        best = minimize_scalar(lost, bounds=(-5.0 * offset.spread, 5.0 * offset.spread), method="bounded",
+                               options={"xatol": 1e-9})
+        here = offset.places[np.argmax(np.abs(offset.column))]
+        amount = ((values - gap)[here] / offset.column[np.argmax(np.abs(offset.column))]).real
+        np.testing.assert_allclose((values - gap)[offset.places], amount * offset.column, atol=1e-9)
+        assert amount == pytest.approx(best.x, abs=0.02 * offset.spread) and lost(amount) < best.fun + 0.01
+        amounts.append(amount / offset.spread)
+    assert cost == pytest.approx(0.5 * np.sum(np.square(amounts))) and np.abs(amounts).max() > 0.5

@@ -8,15 +8,15 @@ from airtouch.gap.evidence.likelihood import Likelihood, tail, tailed
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, log_likelihood
 
 
-@pytest.mark.parametrize("exponents", [(-3.0, 3.0), (-60.0, -40.0), (40.0, 60.0)])
-def test_the_sum_is_numpys(exponents):
+@pytest.mark.parametrize("decades", [(-3.0, 3.0), (-60.0, -40.0), (40.0, 60.0)])
+def test_the_sum_is_numpys(decades):
     rng = np.random.default_rng(5)
-    power = 10.0 ** rng.uniform(*exponents, 3000)
+    power = 10.0 ** rng.uniform(*decades, 3000)
     size = power * rng.exponential(3.0, 3000) ** 4
-    falls = np.repeat([13.0, 7.0, 13.0], 1000)
+    exponents = np.repeat([13.0, 7.0, 13.0], 1000)
     known = rng.random(3000) > 0.1
-    expected = np.where(known, np.log(power) + falls * np.log1p(size / power / 12.0), 0.0).sum()
-    assert tailed(size, power, np.full(3000, 12.0), falls, known) == pytest.approx(expected, rel=1e-14)
+    expected = np.where(known, np.log(power) + exponents * np.log1p(size / power / 12.0), 0.0).sum()
+    assert tailed(size, power, np.full(3000, 12.0), exponents, known) == pytest.approx(expected, rel=1e-14)
 
 
 def test_with_the_tails_of_commands_it_is_the_law_that_corrects_their_floor():
@@ -44,7 +44,7 @@ def law():
 
 def test_the_likelihood_of_all_values_is_the_sum_of_that_of_each(law):
     likelihood, values = law
-    each = likelihood.each(values, 0.3)
+    each = likelihood.per_value(values, 0.3)
     assert likelihood(values, 0.3) == pytest.approx(each.sum()) and not each[~likelihood.known].any()
 
 
@@ -60,9 +60,41 @@ def test_its_slope_by_the_power_is_that_of_small_changes(law):
     likelihood, values = law
     added, small = np.full(200, 0.2), 1e-5
     slope, curvature = likelihood.power_slopes(values, added, 150)
-    step = [likelihood.each(values, added + sign * small) for sign in (1.0, -1.0)]
+    step = [likelihood.per_value(values, added + sign * small) for sign in (1.0, -1.0)]
     np.testing.assert_allclose(slope, ((step[0] - step[1]) / (2.0 * small))[:150], atol=1e-6)
     assert len(slope) == len(curvature) == 150 and (curvature[likelihood.known[:150]] > 0.0).all()
+
+
+def expected_curvature(likelihood, density, power):
+    """Mean of minus the second derivative of the log likelihood by the power (1,), by differences and quadrature."""
+    small = 1e-3 * power
+
+    def weighted(over):
+        levels = [likelihood.per_value(np.sqrt([over * power]) + 0j, np.array([x]))[0] for x in (-small, 0.0, small)]
+        return density(over) * (2.0 * levels[1] - levels[0] - levels[2]) / small ** 2
+
+    return quad(weighted, 0.0, np.inf, limit=200)[0]
+
+
+@pytest.mark.parametrize(("freedom", "of_exponential"), [(2.0, 0.55), (6.0, 0.77), (12.0, 0.86)])
+def test_its_curvature_by_the_power_is_that_expected_without_tails(freedom, of_exponential):
+    """That of the law with tails is nu / (nu + 2) of it, and but little more where power is exponential."""
+    power, nu = 3.0, np.full(1, freedom)
+
+    def law(tail):
+        return Likelihood(np.full(1, power), nu, np.full(1, tail), np.ones(1, bool))
+
+    _, (curvature,) = law(freedom).power_slopes(np.ones(1, complex), np.zeros(1), 1)
+
+    def exponential(over):
+        return np.exp(-over)
+
+    hardly_any = Likelihood(np.full(1, power), np.full(1, 1e7), np.full(1, 1e7), np.ones(1, bool))
+    assert curvature == pytest.approx(expected_curvature(hardly_any, exponential, power), rel=1e-3)
+    with_tails = expected_curvature(law(freedom), lambda over: (1.0 + over / freedom) ** -(freedom + 1.0), power)
+    assert with_tails / curvature == pytest.approx(freedom / (freedom + 2.0), rel=1e-3)
+    scaled = expected_curvature(law(tail(nu)[0]), exponential, power)
+    assert scaled / curvature == pytest.approx(of_exponential, abs=0.005)
 
 
 @pytest.mark.parametrize("freedom", [2.0, 6.0, 12.0])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import welch
+from scipy.signal import butter, get_window, lfilter, welch
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.answer.named_effects import named_effects
@@ -13,14 +13,14 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.channels import FORCE, TORQUE
+from airtouch.gap.signals.spectra import AIR, LENGTH, REST, frequencies
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import activate
 from airtouch.simulation.flight import prepare
 from gap_flights import LOOP
-from gap_flights import flight as made_flight
+from hovers import FLOOR, LIFT_N, PLACE, hover
 
 VEHICLE = vehicles.load()
 #: rotors that turn at speeds of their own, as real ones do: else their lines add up as their phases happen to stand
@@ -54,47 +54,12 @@ def added_power(data, name, **values):
     return random_effects.power(data, term)
 
 
-def test_lines_of_steady_rotors_lie_at_their_fold_with_their_power():
-    turns = np.array([318.0, 327.0, 336.0, 345.0])
-    speed = np.tile(2.0 * np.pi * turns, (400, 1))
-    hover = 2.0 * np.pi * 327.0
-    power = vibration_lines.folded(vibration_lines.two_sided(speed, hover, np.array([0, 128])))
-    f = frequencies(AIR)
-    for k, place in enumerate((18.0, 27.0, 36.0, 45.0)):
-        line = power[0, np.abs(f - place) < 2.0].sum() * f[1]
-        assert line == pytest.approx(0.5 * 0.5 ** 2 * (turns[k] / 327.0) ** 4, rel=0.02)
-        assert abs(f[np.argmax(np.where(np.abs(f - place) < 4.0, power[0], 0.0))] - place) <= f[1]
-    assert np.all(vibration_lines.folded(np.ones((1, 256)))[0, 1:-1] == 0.5)
-
-
-def test_a_rotor_whose_speed_was_lost_turns_on():
-    rpm = np.linspace(19000.0, 21000.0, 400)
-    lost = (np.arange(400) % 40) < 3
-    one = made_flight(4.0)
-    one.log.columns.update({name: np.where(lost, np.nan, rpm) for name in vibration_lines.RPM})
-    speed = vibration_lines.speeds(one, declared_study(VEHICLE, ()))
-    assert speed == pytest.approx(np.tile(rpm[:, None] * np.pi / 30.0, 4), rel=1e-2)
-
-
-def test_a_spread_keeps_the_power_and_has_its_width():
-    speed = np.full((256, 4), 2.0 * np.pi * 325.0)
-    sharp = vibration_lines.two_sided(speed, speed[0, 0], np.array([0]))
-    wide = vibration_lines.widened(sharp, 3.0)
-    assert wide.sum() == pytest.approx(sharp.sum(), rel=1e-6)
-    f = np.fft.fftfreq(256, 0.01)
-    middle = (f * wide[0]).sum() / wide.sum()
-    near = np.abs(f - 25.0) < 12.0
-    spread = np.sqrt(((f - middle) ** 2 * wide[0])[near].sum() / wide[0, near].sum())
-    assert middle == pytest.approx(25.0, abs=0.3) and spread == pytest.approx(3.0, rel=0.1)
-
-
 @pytest.mark.parametrize("cutoff", [0.0, 30.0])
 def test_logged_noise_has_the_shape_of_filtered_white_noise(cutoff):
     row = prepare(replace(VEHICLE, acc_lowpass_hz=cutoff), ())[0][0]
     still = next(iter(simulated("hover", 1, vehicle=replace(VEHICLE, acc_lowpass_hz=cutoff), seed=5, workers=1)))
     white = np.random.default_rng(3).normal(size=500_000)
     if cutoff:
-        from scipy.signal import butter, lfilter
         white = lfilter(*butter(2, cutoff, fs=500.0), white)
     white = white[::5] / white.std()
     f, power = welch(white, 100.0, nperseg=128)
@@ -102,6 +67,61 @@ def test_logged_noise_has_the_shape_of_filtered_white_noise(cutoff):
     assert np.abs(error).max() < 1.0 and abs(error.mean()) < 0.1
     at_rest = still.stack(["acc_x_mps2"])[:40, 0]  # and the simulator's rms is the declared one
     assert at_rest.std() == pytest.approx(VEHICLE.acc_noise_rms_mps2 * VEHICLE.acc_noise_ratio[0], rel=0.4)
+
+
+@pytest.fixture(scope="module")
+def steady():
+    """A hover at a constant thrust; nothing is known of its floor but the sensors' noise."""
+    return Data(FLOOR, [hover(1, length_s=12.0)])
+
+
+@pytest.mark.parametrize("time", [0.005, 0.02, 0.1])
+def test_power_of_thrust_noise_is_that_of_drawn_noise(steady, time):
+    """First-order noise on each rotor's thrust, drawn at 10 kHz and logged as the sensors do: SciPy's periodograms.
+
+    The accelerometer is sampled, the gyro's differences are means over a sample.
+    """
+    rms, every, step = 0.1, 100, 1e-4
+    decay = np.exp(-step / time)
+    white = np.random.default_rng(8).normal(size=(1_500_000, 4))
+    drawn = rms * LIFT_N * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], white, axis=0)
+    arm = VEHICLE.arm_m / np.sqrt(2.0)
+    front, left, yaw = (np.array([PLACE[i][k] for i in (1, 2, 3, 4)]) for k in range(3))
+    turning = drawn @ np.column_stack([left * arm, -front * arm, -yaw * VEHICLE.yaw_torque_over_thrust_m])
+    turning = (turning / np.array(VEHICLE.inertia_kg_m2)).reshape(-1, every, 3).mean(axis=1)
+    lifting = (drawn.sum(axis=1) / VEHICLE.mass_kg)[::every]
+    f, power = welch(np.column_stack([lifting, turning]), 100.0, nperseg=LENGTH[AIR], axis=0)
+    term = next(t for t in terms("motor_noise") if t.values["time"] == time)
+    expected = random_effects.power(steady, replace(term, values={**term.values, "rms": rms}))[0]
+    error = decibels(power, expected[AIR][0][:, [FORCE.stop - 1, *range(TORQUE.start, TORQUE.stop)]])
+    edges = (1.0, 5.0, 15.0, 30.0, 49.0)
+    short = 2.0 / np.pi * np.arctan(1.0 / (2.0 * np.pi * 250.0 * time))  # of the lift, what folds from above 250 Hz
+    error[:, 0] += decibels(1.0 - short, 1.0)
+    assert np.abs(bands(error[None], f, edges)).max() < 0.3
+    assert not expected[AIR][:, :, :FORCE.stop - 1].any() and not expected[REST].any()
+
+
+def test_within_a_gate_a_block_has_that_share_of_the_power(steady):
+    """The share of the window's square, SciPy's Hann window, that the gate covers."""
+    (noise,) = terms("imu_noise")
+    gate = (("synthetic", 3.0, 5.5), ("another", 0.0, 12.0))
+    whole, gated = (random_effects.power(steady, replace(noise.fitted(np.ones(1)), gate=g))[0][AIR] for g in ((), gate))
+    window = get_window("hann", LENGTH[AIR]) ** 2
+    t = 0.01 * np.arange(1200)
+    acts = (t >= 3.0 - 1e-9) & (t < 5.5 - 1e-9)
+    share = np.array([(window * acts[k:k + LENGTH[AIR]]).sum() for k in steady.first[0][AIR]]) / window.sum()
+    assert share.min() == 0.0 and share.max() > 0.9 and len(set(share)) > 3
+    np.testing.assert_allclose(gated, share[:, None, None] * whole, atol=1e-12 * whole.max())
+
+
+def test_power_grows_with_the_square_of_a_strength_and_with_that_of_a_factor_less_one(steady):
+    """Of a factor on noise that is there already the square less 1 is added."""
+    (noise,), lines = terms("imu_noise"), terms("vibration")[0]
+    (unit, half), one = ([noise.at(np.array([x]))["factor"] for x in (1.0, 0.5)]), random_effects.growth
+    assert one(lines, 3.0) == 9.0 and one(noise, 0.0) == 0.0 and one(noise, 1.0) == 1.0
+    assert one(noise, 0.5) == pytest.approx((half ** 2 - 1.0) / (unit ** 2 - 1.0)) and one(noise, -0.2) == 0.0
+    twice, thrice = (added_power(steady, "imu_noise", factor=x)[0][AIR] for x in (2.0, 3.0))
+    np.testing.assert_allclose(thrice, twice * (9.0 - 1.0) / (4.0 - 1.0))
 
 
 def test_power_of_noise_is_that_of_simulated_flights(study):

@@ -7,8 +7,10 @@ import pytest
 
 from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import TWO_FOLDS
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.judging import PricedVariant, covariance_among_all
+from airtouch.gap.naming.records import Candidate
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import fly
@@ -76,3 +78,18 @@ def test_certainty_refund_is_given_back_once(flying):
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
     third = judging.cross_validated(on, judging.PricedVariant("vibration", all_candidates()["vibration"][0], 0.0), both)
     assert third.charges.certainty_refund == both.charges.certainty_refund, "paid once"
+
+
+def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(study):
+    """Beside a random effect the commands' floor is less certain: a changed gain, seen in them alone, gains less."""
+    data = Data(study, fly(1, 54, {"controller_gain": {"height": 0.5}}))
+    on = judging.trial_of(data)
+    gain = next(t for t in terms("controller_gain") if "height" in t.free)
+    chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
+    certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
+                              for train, test in TWO_FOLDS) for wide in (False, True))
+    assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
+    vibration = judging.PricedVariant("vibration", (terms("vibration")[0],), 0.0)
+    both = judging.cross_validated(on, vibration, chosen)
+    assert both.gain == pytest.approx(chosen.gain, abs=2.0)
+    assert both.charges.certainty_refund == pytest.approx(certain - uncertain)

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import cell_in_words, shortfall
-from airtouch.gap.evidence.cells import CELLS, REST_VIEW, place_of
+from airtouch.gap.evidence.cells import CELLS, REST_VIEW, VIEW_STRIDE, place_of
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming import judging
@@ -56,7 +56,7 @@ def test_a_right_effect_does_not_over_predict():
 
 def test_loss_by_channel():
     gains = np.zeros(CELLS)
-    lift, forward, at_rest = 2, 0, 1000
+    lift, forward, at_rest = 2, 0, REST_VIEW * VIEW_STRIDE
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
     gains[at_rest + forward] = -8.0

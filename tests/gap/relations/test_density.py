@@ -67,7 +67,7 @@ def test_a_rescaling_turns_a_covariance_into_one():
     assert rescaling.level + log_density(rescaling(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
 
 
-def test_several_parameters_are_solved_interaction():
+def test_several_parameters_are_solved_together():
     """A plane: the least squares solution, within what was flown."""
     rng = np.random.default_rng(7)
     plane = rng.normal(size=(2, Q))

@@ -74,5 +74,7 @@ def clock_gains(data: Data, terms: Sequence[Term]) -> float:
 
 def clock_left(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood of the logged times that effects do not explain."""
-    explained = {t.signature.loses_rows for t in terms if t.shows_in == CLOCK}
-    return (0.0 if False in explained else jitter(data).gain) + (0.0 if True in explained else loss(data).gain)
+    of_times = [t for t in terms if t.shows_in == CLOCK]
+    loss_explained = any(t.signature.loses_rows for t in of_times)
+    jitter_explained = any(not t.signature.loses_rows for t in of_times)
+    return (0.0 if jitter_explained else jitter(data).gain) + (0.0 if loss_explained else loss(data).gain)

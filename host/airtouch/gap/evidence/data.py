@@ -15,10 +15,11 @@ from airtouch.gap.study import Study
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
-#: hypotheses whose spectra are cached, for flights of at most so many samples together, and the least number for
-#: longer ones; chosen for memory
-KEPT_SPECTRA, KEPT_SAMPLES, LEAST_KEPT = 96, 20000, 8
+KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights that are not long; chosen for memory
+KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached; chosen for memory
+LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are; chosen
 Spectra = dict[str, np.ndarray]  #: of one flight by state, (blocks, bins, COUNT)
+BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
 
 @dataclass
@@ -33,8 +34,8 @@ class Data:
 
     study: Study
     flights: Sequence[Flight]
-    first: list[dict[str, np.ndarray]] = field(init=False, compare=False, repr=False)
-    base: list[dict[str, np.ndarray]] = field(init=False, compare=False, repr=False)
+    first: list[BlockStarts] = field(init=False, compare=False, repr=False)
+    base: list[Spectra] = field(init=False, compare=False, repr=False)
     measured_torque: list[np.ndarray] = field(init=False, compare=False, repr=False)
     quiet: list[np.ndarray] = field(default_factory=list, init=False, compare=False, repr=False)
     bridging: list[np.ndarray] = field(init=False, compare=False, repr=False)
@@ -42,7 +43,11 @@ class Data:
 
     @property
     def means_only(self) -> bool:
-        """Whether torque counts in the means alone: nobody knows what commands above them are, aliases or torque."""
+        """Whether torque counts in its means alone.
+
+        Without a response of nominal flights nobody can tell how much of the faster logged commands is torque, and how
+        much is aliases of the 500 Hz loop.
+        """
         return self.study.response is None
 
     @property
@@ -51,7 +56,7 @@ class Data:
         return sum(len(f) for f in self.flights) * PERIOD_S
 
     def __post_init__(self) -> None:
-        self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
+        self.first = [{state: starts(f, state) for state in (AIR, REST)} for f in self.flights]
         self.measured_torque = [short_time_spectra(angular_acceleration(f), b[AIR], AIR)
                                 for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
@@ -100,11 +105,11 @@ def _by_response(data: Data, i: int, response: Response, active: Sequence[Active
     return {**gap, AIR: response.with_torque_gap(gap[AIR], data.quiet[i], torque, change)}
 
 
-def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],
-            disturbed: dict[str, np.ndarray]) -> TorqueSpectra:
+def _torque(measured: np.ndarray, nominal: Spectra, driven: Spectra, disturbed: Spectra) -> TorqueSpectra:
     """Torque of a flight in the air, from spectra of the gap under three hypotheses.
 
     nominal: without effects; driven: with those that act through the commands; disturbed: with outside torques as well.
+    Two that are of the same effects are the same object of the cache, and their difference is None.
     """
     gap = nominal[AIR][:, :, TORQUE]
     by_command = None if driven[AIR] is nominal[AIR] else driven[AIR][:, :, TORQUE] - gap
@@ -119,9 +124,10 @@ def command_torque(data: Data, i: int) -> np.ndarray:
 
 
 def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> list[Spectra] | None:
-    """Power by flight and state, as `gap_spectra`, that the gap may have because effects change what is cut of a step.
+    """Power by flight and state, as `gap_spectra`, by which the gap is uncertain where a set-point stepped.
 
-    None where they change nothing of it. flights: as for `gap_spectra`.
+    The limits of the commands clip the torque of a step, and effects of the loop change how much they clip. None where
+    they do not. flights: as for `gap_spectra`.
     """
     response, loop = data.study.response, data.study.loop
     change = loop.torque_change(active, frequencies(AIR)) if response is not None and loop is not None else None
@@ -129,7 +135,7 @@ def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> 
         return None
     out: list[Spectra] = [{} for _ in data.flights]
     for i in set(flights):
-        out[i] = {r: np.zeros(x.shape) for r, x in data.base[i].items()}
+        out[i] = {state: np.zeros(x.shape) for state, x in data.base[i].items()}
         if data.flights[i].rates is not None:
             doubt = response.doubt(data.quiet[i], command_torque(data, i), change)
             out[i][AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
@@ -137,14 +143,18 @@ def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> 
 
 
 def _without_scaling(data: Data, i: int, active: Sequence[Active]) -> Spectra:
-    """Spectra of flight i whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
+    """Spectra of the gap of flight i without a response of nominal flights.
+
+    Effects that only scale the torque are left out of it. Here the torque counts in its means alone; they are the trim,
+    which such an effect would shrink although it does not cause it.
+    """
     with_all = _replay_spectra(data, i, active)
     unscaled = [a for a in active if not signature_of(a.effect).scales_torque]
     if len(unscaled) == len(active):
         return with_all
-    out, without = {r: v.copy() for r, v in with_all.items()}, _replay_spectra(data, i, unscaled)
-    for r, v in out.items():
-        v[:, :, TORQUE] = without[r][:, :, TORQUE]
+    out, without = {state: v.copy() for state, v in with_all.items()}, _replay_spectra(data, i, unscaled)
+    for state, v in out.items():
+        v[:, :, TORQUE] = without[state][:, :, TORQUE]
     return out
 
 
@@ -158,10 +168,10 @@ def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
     flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
     bridged = bridged_residual(flight, (*data.study.calibration, *active))
     out = {}
-    for r, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
-        replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, r)
-        out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
-        out[r][:, :, :COMMAND.start] = replayed
+    for state, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
+        replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, state)
+        out[state] = np.zeros((*replayed.shape[:2], COUNT), complex)
+        out[state][:, :, :COMMAND.start] = replayed
     return out
 
 

@@ -23,15 +23,15 @@ from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term, Terms, mean_places
 from airtouch.simulation.effects import Active
 
-#: most turns of fitting mean, then random effects; nats that a further turn must gain; chosen
-TURNS, SETTLED = 6, 0.3
+TURNS = 6  #: turns of fitting mean, then random effects, at most; chosen
+SETTLED = 0.3  #: nats that a turn must gain for another to follow; chosen
 BRIEF = 2  #: steps of a brief fit; chosen
 STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps; chosen: it says next to nothing
 CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell; chosen
-#: strengths of a random effect that are tried before the best is refined: how many, from the least to the largest, in
-#: natural steps; chosen
-GRID_SIZE, LEAST_STRENGTH, LARGEST_STRENGTH = 40, 0.003, 1e3
+GRID_SIZE = 40  #: strengths of a random effect that are tried before the best is refined; chosen
+LEAST_STRENGTH = 0.003  #: least of them, natural steps; chosen
+LARGEST_STRENGTH = 1e3  #: largest of them, natural steps; chosen
 LEAST_CURVATURE = 1e-6  #: nats, curvature in the logarithm of a strength, by which is divided at least; chosen
 CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelihood's curvature is taken; chosen
 
@@ -62,13 +62,17 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     """Fit of effects to the blocks of `part`; the gap that they leave is judged elsewhere.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior: standard deviation of
-    these around neutral. Mean and random effects are fitted in turn until neither moves; brief: once, mean ones by
-    BRIEF steps.
+    these around neutral. Mean and random effects are fitted in turn, TURNS times at most, until a turn gains less than
+    SETTLED; brief: once, mean ones by BRIEF steps.
+
+    The last turn's fit is returned. It may be a little less likely than the one before: the mean fit also weighs the
+    priors, which the likelihood leaves out, and begins with the offsets at 0.
     """
     problem = problem_of(data, part)
     mean, random = mean_of(terms), random_of(terms)
     x = start_of(problem, mean, start)
     random_power: np.ndarray | float = 0.0
+    # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
         random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
@@ -89,7 +93,7 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
 
 def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -> Terms:
     """The terms with their values: mean ones at scaled parameters x (k,), random ones as fitted, in their order."""
-    fitted = {MEAN: iter([t.fitted(x[own]) for t, own in mean_places(terms)]), SPECTRUM: iter(random)}
+    fitted = {MEAN: iter([t.fitted(x[place]) for t, place in mean_places(terms)]), SPECTRUM: iter(random)}
     return tuple(next(fitted[t.shows_in]) if t.shows_in in fitted else t for t in terms)
 
 
@@ -116,13 +120,13 @@ def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
     flat = problem_of(data, part).flat
 
-    def of_each(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
+    def each_likelihood(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
         """Log likelihood (n,) of each value under effects."""
         _, values, power = left_over(data, part, hypothesis, wide)
-        return flat.likelihood.each(values, power - flat.elements.power)
+        return flat.likelihood.per_value(values, power - flat.elements.power)
 
-    without = of_each((), bool(random_of(terms)))
-    return np.bincount(flat.cells, of_each(terms, False) - without, CELLS)
+    without = each_likelihood((), bool(random_of(terms)))
+    return np.bincount(flat.cells, each_likelihood(terms, False) - without, CELLS)
 
 
 def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,

@@ -19,8 +19,8 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, sh
 from airtouch.gap.workspace import Workspace
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-#: independent values in a block for the floor's degrees of freedom, and the least that these are; chosen
-FREEDOM_OF_BLOCK, LEAST_FREEDOM = 3.0, 2.0
+FREEDOM_OF_BLOCK = 3.0  #: degrees of freedom that the floor has from each nominal block; chosen
+LEAST_FREEDOM = 2.0  #: degrees of freedom of the floor, however few its blocks are; chosen
 
 
 class Offset(NamedTuple):
@@ -37,8 +37,8 @@ class Offset(NamedTuple):
     def at(self, places: np.ndarray) -> np.ndarray:
         """What a unit offset adds, complex (k,), at other places (k,), each named once; 0 where it changes nothing."""
         out = np.zeros(len(places), complex)
-        _, there, own = np.intersect1d(places, self.places, assume_unique=True, return_indices=True)
-        out[there] = self.column[own]
+        _, there, here = np.intersect1d(places, self.places, assume_unique=True, return_indices=True)
+        out[there] = self.column[here]
         return out
 
 
@@ -93,7 +93,7 @@ class Flattened:
         return Likelihood(e.power, e.freedom, e.tail, e.known)
 
     @functools.cached_property
-    def of_torque(self) -> np.ndarray:
+    def is_torque(self) -> np.ndarray:
         """Whether a value of the replay view is one of the torque, bool (replay,)."""
         channel = self.elements.channel[:self.replay_count]
         return (channel >= TORQUE.start) & (channel < TORQUE.stop)
@@ -101,11 +101,11 @@ class Flattened:
     @functools.cached_property
     def cells(self) -> np.ndarray:
         """Number (n,) of the cell of each value (`cells`)."""
-        bands = {r: np.digitize(frequencies(r), BANDS_HZ)[:, None] - 1 for r in (AIR, REST)}
-        replay = self.layout.per_bin({r: cell_numbers(view, bands[r], np.arange(COUNT))
-                                      for r, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
-        of_commands = self.commands.elements
-        commands = cell_numbers(COMMAND_VIEW, np.digitize(of_commands.frequency, BANDS_HZ), of_commands.channel) \
+        bands = {state: np.digitize(frequencies(state), BANDS_HZ)[:, None] - 1 for state in (AIR, REST)}
+        replay = self.layout.per_bin({state: cell_numbers(view, bands[state], np.arange(COUNT))
+                                      for state, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
+        elements = self.commands.elements
+        commands = cell_numbers(COMMAND_VIEW, np.digitize(elements.frequency, BANDS_HZ), elements.channel) \
             if len(self.commands) else np.zeros(0)
         return np.concatenate([replay, commands]).astype(int)
 
@@ -118,7 +118,7 @@ def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
     """Some blocks of the flights of `data`, flattened."""
     layout = Layout(pieces, _counted(data.means_only))
     commands = view_of(data.study.loop, data.flights, data.first, pieces)
-    noise = layout.gather([{r: data.study.floor.of_blocks(f, b[r], r) for r in b}
+    noise = layout.gather([{state: data.study.floor.of_blocks(f, b[state], state) for state in b}
                            for f, b in zip(data.flights, data.first, strict=True)]).real
     elements = _of_replay(data, layout, noise).followed_by(_of_commands(commands.elements))
     return Flattened(layout, commands, elements, noise, _offsets(data, layout), layout.air_blocks(data.first))
@@ -126,7 +126,7 @@ def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:
     """Bins and channels (bins, COUNT) of the replay view that count, by state. means_only: `Data.means_only`."""
-    keep = {r: judged_bins(r) for r in (AIR, REST)}
+    keep = {state: judged_bins(state) for state in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
     if means_only:
@@ -167,5 +167,5 @@ def _unit_offset(data: Data, flight: int, channel: int) -> list[Spectra]:
     """Spectra by flight and state of 1 in one channel of one flight, in the air."""
     ones = np.zeros((len(data.flights[flight]), COUNT))
     ones[~data.flights[flight].on_ground, channel] = 1.0
-    return [{r: short_time_spectra(ones, begin, r) if j == flight else np.zeros_like(data.base[j][r])
-             for r, begin in first.items()} for j, first in enumerate(data.first)]
+    return [{state: short_time_spectra(ones, begin, state) if j == flight else np.zeros_like(data.base[j][state])
+             for state, begin in first.items()} for j, first in enumerate(data.first)]

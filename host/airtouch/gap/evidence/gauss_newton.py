@@ -15,7 +15,7 @@ ITERATIONS = 8  #: steps at most; chosen
 ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
 TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
 DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after one that failed; chosen
-FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: 0.1, damping after the first step that failed; chosen
+FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: damping after the first step that failed, 0.1 but for its last bit; chosen
 ROUNDING = 1e-9  #: nats that a step must gain at least; chosen, above rounding
 COMMAND_PRIOR = 1.5  #: standard deviation, natural steps, of parameters of effects that only the commands show; chosen
 CLOSE = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
@@ -52,8 +52,8 @@ class Posterior:
                  wide: bool) -> None:
         self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
-        own = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
-        self.prior = np.concatenate([own, [o.spread for o in problem.offsets]])
+        spreads = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
+        self.prior = np.concatenate([spreads, [o.spread for o in problem.offsets]])
 
     def at(self, x: np.ndarray, offsets: np.ndarray) -> _State:
         """The state at parameters x (k,) and offsets (m,)."""
@@ -107,7 +107,7 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
     equations = normal_equations(slopes.columns, posterior.prior, now.values,
                                  weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
                                  problem.offsets)
-    equations = equations.with_power(*slopes.of_power(now.x, now.values, now.power, posterior.wide))
+    equations = equations.with_power(*slopes.power_equations(now.x, now.values, now.power, posterior.wide))
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
@@ -117,25 +117,25 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
     return _Step(now, covariance, damping, False)
 
 
-def start_of(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
-    """Scaled parameters (k,) at which a fit begins: the known ones, else (NaN) close to neutral.
+def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -> np.ndarray:
+    """Scaled parameters (k,) at which a fit begins: those of `start`, close to neutral where it is NaN.
 
-    Effects of the loop of which nothing is known begin where their likelihood is highest on a coarse grid.
+    Effects of the loop without a start begin where their likelihood is highest on a coarse grid.
     """
     size = sum(len(t.free) for t in mean)
-    known = np.full(size, np.nan) if known is None else known
-    x = np.where(np.isnan(known), CLOSE, known)
-    for t, own in mean_places(mean):
-        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(known[own]).all():
-            x = _best_on_grid(problem, mean, x, range(own.start, own.stop))
+    start = np.full(size, np.nan) if start is None else start
+    x = np.where(np.isnan(start), CLOSE, start)
+    for t, place in mean_places(mean):
+        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(start[place]).all():
+            x = _best_on_grid(problem, mean, x, range(place.start, place.stop))
     return x
 
 
-def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
-    """The parameters (k,) with that one of an effect's `own` moved to that place of GRID that is likeliest."""
+def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, place: range) -> np.ndarray:
+    """The parameters (k,) with that one of an effect's (`place`) moved to that entry of GRID that is likeliest."""
     low, high = limits(mean)
     best, out = -np.inf, x
-    for i, amount in itertools.product(own, GRID):
+    for i, amount in itertools.product(place, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
         command_power, floor_cost = problem.loop_power(active_at(mean, trial))

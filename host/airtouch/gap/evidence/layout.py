@@ -16,11 +16,11 @@ Piece = tuple[int, str, np.ndarray]  #: number of a flight, state, and which of 
 class AirBlocks:
     """Blocks in the air, numbered through all flights.
 
-    of (n,): number of the block of each flattened value, -1 for one on the ground; begin (b,): first sample of each
-    block; flight (b,): number of its flight.
+    block_of_value (n,): number of the block of each flattened value, -1 for one on the ground; begin (b,): first sample
+    of each block; flight (b,): number of its flight.
     """
 
-    of: np.ndarray
+    block_of_value: np.ndarray
     begin: np.ndarray
     flight: np.ndarray
 
@@ -34,42 +34,44 @@ class Layout:
     def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:
         self.pieces, self.keep = pieces, keep
         self.flights = frozenset(i for i, _, _ in pieces)
-        self.sizes = [int(chosen.sum()) * int(keep[r].sum()) for _, r, chosen in pieces]  #: values of each piece
+        #: values of each piece
+        self.sizes = [int(chosen.sum()) * int(keep[state].sum()) for _, state, chosen in pieces]
 
     def gather(self, by_flight: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
         """Values (n,) that count of spectra (blocks, bins, COUNT), by flight and state."""
-        return _joined((by_flight[i][r].take(places)
-                        for (i, r, _), places in zip(self.pieces, self._places, strict=True)), complex)
+        return _joined((by_flight[i][state].take(places)
+                        for (i, state, _), places in zip(self.pieces, self._places, strict=True)), complex)
 
     def per_piece(self, value: Callable[[int, str], float]) -> np.ndarray:
         """A number (n,) that a flight and a state have, for each value."""
-        return _joined(np.full(size, value(i, r)) for (i, r, _), size in zip(self.pieces, self.sizes, strict=True))
+        return _joined(np.full(size, value(i, state))
+                       for (i, state, _), size in zip(self.pieces, self.sizes, strict=True))
 
     def per_bin(self, table: Mapping[str, np.ndarray]) -> np.ndarray:
         """The entry (n,) of a table (bins, COUNT) by state for each value; the same for all blocks."""
-        return _joined(np.tile(table[r][self.keep[r]], int(chosen.sum())) for _, r, chosen in self.pieces)
+        return _joined(np.tile(table[state][self.keep[state]], int(chosen.sum())) for _, state, chosen in self.pieces)
 
     def channels(self) -> np.ndarray:
         """The channel (n,) of each value."""
-        table = {r: np.broadcast_to(np.arange(COUNT), keep.shape) for r, keep in self.keep.items()}
+        table = {state: np.broadcast_to(np.arange(COUNT), keep.shape) for state, keep in self.keep.items()}
         return self.per_bin(table).astype(int)
 
     def air_blocks(self, first: Sequence[Mapping[str, np.ndarray]]) -> AirBlocks:
         """The blocks in the air. first: of every block the first sample, by flight and state."""
-        of, begin, flight = [], [], []
+        block_of_value, begin, flight = [], [], []
         for i, state, chosen in self.pieces:
             numbers = np.full(int(chosen.sum()), -1)
             if state == AIR:
                 numbers = len(begin) + np.arange(len(numbers))
                 begin += list(first[i][AIR][chosen])
                 flight += [i] * len(numbers)
-            of.append(np.repeat(numbers, int(self.keep[state].sum())))
-        return AirBlocks(_joined(of, int), np.array(begin, int), np.array(flight, int))
+            block_of_value.append(np.repeat(numbers, int(self.keep[state].sum())))
+        return AirBlocks(_joined(block_of_value, int), np.array(begin, int), np.array(flight, int))
 
     @functools.cached_property
     def _places(self) -> list[np.ndarray]:
         """Of each piece, the indices of its values in the flattened spectra of its flight."""
-        return [np.flatnonzero(chosen[:, None, None] & self.keep[r]) for _, r, chosen in self.pieces]
+        return [np.flatnonzero(chosen[:, None, None] & self.keep[state]) for _, state, chosen in self.pieces]
 
 
 def _joined(parts: Iterable[np.ndarray], kind: type = float) -> np.ndarray:

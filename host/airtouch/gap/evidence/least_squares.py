@@ -39,10 +39,10 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
     k, m = len(columns), len(offsets)
     matrix, right = np.diag(1.0 / prior ** 2), -at / prior ** 2
     if k:
-        j = columns.view(float)  # real and imaginary parts side by side
-        wj = j * np.repeat(weights, 2)
-        matrix[:k, :k] += 2.0 * (wj @ j.T)
-        right[:k] -= 2.0 * (wj @ np.ascontiguousarray(values, complex).view(float))
+        parts = columns.view(float)  # real and imaginary parts side by side
+        weighted_parts = parts * np.repeat(weights, 2)
+        matrix[:k, :k] += 2.0 * (weighted_parts @ parts.T)
+        right[:k] -= 2.0 * (weighted_parts @ np.ascontiguousarray(values, complex).view(float))
     for i, (places, column, _) in zip(range(k, k + m), offsets, strict=True):
         weighted = (weights[places] * column).conj()
         matrix[i, i] += 2.0 * (weighted @ column).real
@@ -53,7 +53,9 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
 
 def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
                  damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A step (k + m,) that leaves parameters at a bound there when it would take them past it; covariance (k, k) of x.
+    """Solve the equations for a step (k + m,) within bounds; return it and the covariance (k, k) of the parameters.
+
+    A parameter at a bound that the step would pass stays there, and the others are solved without it.
 
     x (k,): parameters where the step begins; bounds (k,) each: lowest and highest; damping: share of the matrix's
     diagonal that is added to it for the step.
@@ -61,19 +63,20 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
     matrix, right = equations
     n, (low, high) = len(x), bounds
     free = np.ones(len(right), bool)
-    covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], LEAST_POWER))  # of those at a bound: all else known
+    # of parameters at a bound it stays so, as if all others were known
+    covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], LEAST_POWER))
     for _ in range(n + 1):
         change = np.zeros(len(right))
-        where = np.flatnonzero(free)
-        if not len(where):
+        solved = np.flatnonzero(free)
+        if not len(solved):
             break
-        full = np.linalg.pinv(matrix[np.ix_(where, where)], hermitian=True)
-        damped = matrix[np.ix_(where, where)] + damping * np.diag(np.diag(matrix)[where])
-        change[where] = np.linalg.solve(damped, right[where]) if damping else full @ right[where]
+        full = np.linalg.pinv(matrix[np.ix_(solved, solved)], hermitian=True)
+        damped = matrix[np.ix_(solved, solved)] + damping * np.diag(np.diag(matrix)[solved])
+        change[solved] = np.linalg.solve(damped, right[solved]) if damping else full @ right[solved]
         stuck = np.zeros(len(right), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
-            free_parameters = where[where < n]
+            free_parameters = solved[solved < n]
             covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck
@@ -94,8 +97,8 @@ def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) 
     """
     elements = problem.elements
     power = elements.power + added
-    e = squared(values) / power
-    return OVERLAP_WEIGHT * (elements.freedom + 1.0) / (elements.tail + e) / power * elements.known
+    over_expected = squared(values) / power
+    return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail + over_expected) / power * elements.known
 
 
 def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -103,11 +106,11 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
 
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
-    elements = problem.elements
+    elements, exponent = problem.elements, problem.likelihood.exponent
     power, gap, cost = elements.power + added, values.copy(), 0.0
     for places, column, spread in problem.offsets:
         amount = 0.0
-        largest_weight = OVERLAP_WEIGHT * (elements.freedom[places] + 1.0) * elements.known[places] / power[places]
+        largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.known[places] / power[places]
         for _ in range(2):
             weights = largest_weight / (elements.tail[places] + squared(gap[places]) / power[places])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2

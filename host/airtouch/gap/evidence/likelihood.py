@@ -18,7 +18,7 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 
 REPLAY_FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 _COLUMN = float64[::1]
-LEAST, MOST = 1e-100, 1e100  #: of a product of values before its logarithm is taken; chosen, far from overflow
+LEAST, MOST = 1e-100, 1e100  #: size of a product of values before its logarithm is taken; chosen, far from overflow
 BRACKET = 1e-3, 600.0  #: tails' scales among which `tail` seeks; chosen, beyond any in use, and exp does not overflow
 
 
@@ -37,41 +37,47 @@ class Likelihood:
 
     def __call__(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """Log likelihood of values (n,)."""
-        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self._exponent, self.known)
+        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self.exponent, self.known)
 
-    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+    def per_value(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        each = _each(squared(values), self.power + added, self.tail, self._exponent)
-        each[~self.known] = 0.0
-        return each
+        levels = _levels(squared(values), self.power + added, self.tail, self.exponent)
+        levels[~self.known] = 0.0
+        return levels
 
     def along(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
         """Log likelihood as a function of x where others + x * unit is added; only what changes is computed anew.
 
         size (n,): the values' squared size.
         """
-        grows = (unit != 0.0) & self.known
-        rest = tailed(size, self.power + others, self.tail, self._exponent, self.known & ~grows)
-        own = np.flatnonzero(grows)
-        power, tail, falls, known = (x[own] for x in (self.power + others, self.tail, self._exponent, self.known))
-        own_size, own_unit = size[own], unit[own]
+        changing = (unit != 0.0) & self.known
+        rest = tailed(size, self.power + others, self.tail, self.exponent, self.known & ~changing)
+        places = np.flatnonzero(changing)
+        power, tail, exponents, known = (x[places] for x in (self.power + others, self.tail, self.exponent, self.known))
+        size_there, unit_there = size[places], unit[places]
 
         def at(x: float) -> float:
             """Log likelihood at x."""
-            return -OVERLAP_WEIGHT * (rest + tailed(own_size, power + x * own_unit, tail, falls, known))
+            return -OVERLAP_WEIGHT * (rest + tailed(size_there, power + x * unit_there, tail, exponents, known))
 
         return at
 
     def power_slopes(self, values: np.ndarray, added: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Slope and expected curvature (count,) against the expected power of each of the first `count` values."""
-        own = slice(count)
-        power = self.power[own] + added[own]
-        e = squared(values[own]) / power
-        share = OVERLAP_WEIGHT * self.known[own] / power
-        return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
+        """Slope and curvature (count,) against the expected power of each of the first `count` values.
+
+        The curvature is what is expected of the law without tails (Whittle's). It is larger than that of the law with
+        tails, nu / (nu + 2) of it, by (nu + 2) / nu; so errors of effects that it gives are smaller by up to the root
+        of that. nu: the degrees of freedom.
+        """
+        places = slice(count)
+        power = self.power[places] + added[places]
+        over_expected = squared(values[places]) / power
+        share = OVERLAP_WEIGHT * self.known[places] / power
+        counted = self.exponent[places] * over_expected / (self.tail[places] + over_expected)
+        return share * (counted - 1.0), share / power
 
     @functools.cached_property
-    def _exponent(self) -> np.ndarray:
+    def exponent(self) -> np.ndarray:
         """Exponent nu + 1 (n,) of the tails (1 + e / tail)^-(nu + 1), where e is a value's power over that expected.
 
         nu: the degrees of freedom.
@@ -79,12 +85,12 @@ class Likelihood:
         return self.freedom + 1.0
 
 
-def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, falls: np.ndarray) -> np.ndarray:
+def _levels(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     """Log likelihood (n,) of values of a squared size; in place of the power."""
     tails = size / power
     tails /= tail
     np.log1p(tails, out=tails)
-    tails *= falls
+    tails *= exponents
     np.log(power, out=power)
     power += tails
     power *= -OVERLAP_WEIGHT
@@ -108,24 +114,24 @@ def _tail(nu: float) -> float:
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")
-def tailed(size, power, tail, falls, known):
-    """Sum of log(power) + falls log(1 + size / power / tail) over those values (n,) that are known.
+def tailed(size, power, tail, exponents, known):
+    """Sum of log(power) + exponent log(1 + size / power / tail) over those values (n,) that are known.
 
     It is minus the log likelihood, but for a constant, of values of this squared size where this power is expected;
-    where `tail` is falls - 1, that is `loop.command_spectra.log_likelihood`.
+    where `tail` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
     Sums of logarithms are logarithms of products; what the addition rounds off is carried along (Kahan).
     """
     total, lost = 0.0, 0.0
-    powers, rises, fall = 1.0, 1.0, 0.0
+    powers, over, exponent = 1.0, 1.0, 0.0
     for i in range(len(size)):
         if not known[i]:
             continue
-        if falls[i] != fall or not (powers > LEAST and powers < MOST and rises < MOST):
-            term = np.log(powers) + fall * np.log(rises) - lost
+        if exponents[i] != exponent or not (powers > LEAST and powers < MOST and over < MOST):
+            term = np.log(powers) + exponent * np.log(over) - lost
             new = total + term
             lost = (new - total) - term
             total = new
-            powers, rises, fall = 1.0, 1.0, falls[i]
+            powers, over, exponent = 1.0, 1.0, exponents[i]
         powers *= power[i]
-        rises *= 1.0 + size[i] / (power[i] * tail[i])
-    return total + (np.log(powers) + fall * np.log(rises) - lost)
+        over *= 1.0 + size[i] / (power[i] * tail[i])
+    return total + (np.log(powers) + exponent * np.log(over) - lost)

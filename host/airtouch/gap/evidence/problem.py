@@ -96,8 +96,8 @@ class Problem:
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
     """Every block of every flight, or of the flights of these numbers."""
     numbers = range(len(data.flights)) if flights is None else flights
-    return BlockSet(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in numbers for r in (AIR, REST)
-                          if len(data.first[i][r])))
+    return BlockSet(tuple((i, state, np.ones(len(data.first[i][state]), bool)) for i in numbers for state in (AIR, REST)
+                          if len(data.first[i][state])))
 
 
 def problem_of(data: Data, part: BlockSet) -> Problem:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.data import Data, Spectra
 from airtouch.gap.evidence.vibration_lines import lines
+from airtouch.gap.flights.blocks import hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
@@ -40,7 +41,7 @@ RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
 LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
 
 
-def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
+def power(data: Data, term: Term) -> list[Spectra]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state."""
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     of_unit = data.workspace.cached("random", unit.active().key,
@@ -49,16 +50,16 @@ def power(data: Data, term: Term) -> list[dict[str, np.ndarray]]:
     neutral = neutral_of(parameter_of(term.effect, name))
     scale = growth(term, (term.values[name] - neutral) / (unit.values[name] - neutral))
     if term.gate:
-        return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()}
+        return [{state: scale * v * _covered(data, i, state, term.gate) for state, v in f.items()}
                 for i, f in enumerate(of_unit)]
-    return [{r: scale * v for r, v in f.items()} for f in of_unit]
+    return [{state: scale * v for state, v in f.items()} for f in of_unit]
 
 
 def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
     """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[state], data.first[i][state]
-    weight = np.hanning(length + 1)[:-1] ** 2
+    weight = hann_window(length)[0][:, 0] ** 2
     windows = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
     return (windows @ weight / weight.sum())[:, None, None]
 
@@ -71,7 +72,7 @@ def growth(term: Term, x: float) -> float:
     return max(factor ** 2 - 1.0, 0.0) / (of_one ** 2 - 1.0)
 
 
-def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+def _unit_power(data: Data, i: int, term: Term) -> Spectra:
     """PSD (blocks, bins, COUNT) by state that a random effect of unit strength adds to flight i."""
     closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
     power_by_state = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
@@ -81,7 +82,7 @@ def _unit_power(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     return power_by_state
 
 
-def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+def _by_running(data: Data, i: int, term: Term) -> Spectra:
     """Power by state of an effect that is run on the flight's own signals with several seeds.
 
     A channel has one shape of the spectrum, at the strength of each block.
@@ -90,16 +91,17 @@ def _by_running(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
             for seed in range(SEEDS)]
     mean, out = np.mean(runs, axis=0), _no_power(data, i)
-    for r, first in data.first[i].items():
+    for state, first in data.first[i].items():
         changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
-        total = np.sum([np.abs(short_time_spectra(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
+        total = np.sum([np.abs(short_time_spectra(change, first, state)) ** 2 / (SEEDS - 1) for change in changes],
+                       axis=0)
         if not len(total):
             continue
-        if r == AIR:
+        if state == AIR:
             total[:, :, TORQUE] *= _over_a_sample()[:, None]
         shape = total.mean(axis=0, keepdims=True)
         strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), LEAST_POWER)
-        out[r] = shape * strength
+        out[state] = shape * strength
     return out
 
 
@@ -112,32 +114,33 @@ def _over_a_sample() -> np.ndarray:
     return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
 
 
-def _no_power(data: Data, i: int) -> dict[str, np.ndarray]:
+def _no_power(data: Data, i: int) -> Spectra:
     """Zeros (blocks, bins, COUNT) by state, of flight i."""
-    return {r: np.zeros(gap.shape) for r, gap in data.base[i].items()}
+    return {state: np.zeros(gap.shape) for state, gap in data.base[i].items()}
 
 
-def _imu_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+def _imu_noise(data: Data, i: int, term: Term) -> Spectra:
     """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
     row = prepare(data.study.vehicle, ())[0][0]
     extra = term.values["factor"] ** 2 - 1.0
     out = _no_power(data, i)
-    for r, table in out.items():
-        f = frequencies(r)
+    for state, table in out.items():
+        f = frequencies(state)
         white = np.zeros((len(f), COUNT))
         white[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
         if data.flights[i].rates is not None:
             gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
-            white[:, TORQUE] = _torque_noise(data.study, r, _difference(r)[:, None] * gyro)
+            white[:, TORQUE] = _torque_noise(data.study, state, _difference(state)[:, None] * gyro)
             white[:, RATE] = gyro
         table[:] = extra * white
     return out
 
 
 def _torque_noise(study: Study, state: str, gyro: np.ndarray) -> np.ndarray:
-    """PSD (bins, 3) of the torque from that of the gyro's differences: part of these the commands foretell in the air.
+    """PSD (bins, 3) of the torque from that of the gyro's differences, gyro (bins, 3).
 
-    Only as much as the floor holds is seen, and of what the floor holds beyond it the gyro's share of the commands.
+    In the air the controller answers the gyro's noise, so that the commands predict part of it: at most the nominal
+    floor is left in the residual. What the floor holds beyond comes from the commands, in part moved by the gyro too.
     """
     if state != AIR or state not in study.floor.power:
         return gyro
@@ -185,7 +188,7 @@ def _difference(state: str) -> np.ndarray:
     return difference_power(np.maximum(f, LEAKED * f[1])) / PERIOD_S ** 2
 
 
-def _thrust_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
     """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing; at rest the rotors stand."""
     out, study, f = _no_power(data, i), data.study, frequencies(AIR)
     row = prepare(study.vehicle, study.calibration)[0][0]
@@ -204,7 +207,7 @@ def _thrust_noise(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
     return out
 
 
-def _rotor_lines(data: Data, i: int, term: Term) -> dict[str, np.ndarray]:
+def _rotor_lines(data: Data, i: int, term: Term) -> Spectra:
     """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
     out = _no_power(data, i)
     if not len(data.base[i][AIR]):

@@ -15,15 +15,16 @@ FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slop
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     """Mean effects at scaled parameters x (k,), without those that are neutral there."""
-    return [t.active(x[own]) for t, own in mean_places(mean) if x[own].any() or t.acts_when_neutral]
+    return [t.active(x[place]) for t, place in mean_places(mean) if x[place].any() or t.acts_when_neutral]
 
 
 class SpectraSlopes:
     """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
 
     at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;
-    rises (bins, axes): of the logarithm of the commands' power; powers (replay,): of the floor of the torque; bent:
-    whether it changes the loop, in which nothing is linear. high (k,): largest parameters.
+    rises (bins, axes): of the logarithm of the commands' power; torque_powers (replay,): of the floor of the torque;
+    nonlinear: whether it changes the loop, so that the spectra are no linear function of it and its slopes are taken
+    anew at every step. high (k,): largest parameters.
     """
 
     def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
@@ -31,13 +32,13 @@ class SpectraSlopes:
         size = sum(len(t.free) for t in mean)
         self.at = np.full(size, np.inf)
         self.columns = [np.zeros(0)] * size
-        self.rises, self.powers = [np.zeros(0)] * size, [np.zeros(0)] * size
-        self.bent = np.ones(size, bool)
+        self.rises, self.torque_powers = [np.zeros(0)] * size, [np.zeros(0)] * size
+        self.nonlinear = np.ones(size, bool)
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or if anew."""
+        """Take slopes at scaled parameters x (k,): the nonlinear ones; all where x is far from the last, or if anew."""
         anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
-        stale = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
+        stale = np.arange(len(x)) if anew else np.flatnonzero(self.nonlinear)
         if not len(stale):
             return
         before = active_at(self.mean, x)
@@ -49,11 +50,11 @@ class SpectraSlopes:
             after = active_at(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.flat.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.torque_power(after) - power) / step
-            self.bent[i] = loops_differ(self.problem.data, before, after)
+            self.torque_powers[i] = (self.problem.torque_power(after) - power) / step
+            self.nonlinear[i] = loops_differ(self.problem.data, before, after)
         self.at = x.copy() if anew else self.at
 
-    def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
+    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
                  ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
@@ -61,10 +62,10 @@ class SpectraSlopes:
         """
         problem = self.problem
         gradient, information = problem.flat.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
-        powers = np.array(self.powers)
+        powers = np.array(self.torque_powers)
         if powers.any():
-            push, weight = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
+            slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
                                                            problem.flat.replay_count)
-            gradient = gradient + powers @ push
-            information = information + (powers * weight) @ powers.T
+            gradient = gradient + powers @ slope
+            information = information + (powers * curvature) @ powers.T
         return gradient, information

@@ -25,15 +25,17 @@ def torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.nd
     """
     loop, count = data.study.loop, flat.replay_count
     effects = beside_edges(active) if loop and count else []
-    of_loop = loop.torque_change(effects, frequencies(AIR)) if loop and effects else None
-    if of_loop is None:
+    loop_change = loop.torque_change(effects, frequencies(AIR)) if loop and effects else None
+    if loop_change is None:
         return np.zeros(count)
     gather, flights = flat.layout.gather, flat.layout.flights
     base, known = flat.elements.base[:count], flat.elements.known[:count]
     change = np.where(known, gather(gap_spectra(data, effects, flights)) - base, 0.0)
-    steps = step_doubt(data, effects, flights)
-    doubt = TORQUE_DOUBT ** 2 * squared(change) * flat.of_torque + (0.0 if steps is None else gather(steps).real)
-    return doubt + flat.noise * _noise_growth(data, flat, of_loop)
+    step_power = step_doubt(data, effects, flights)
+    doubt = TORQUE_DOUBT ** 2 * squared(change) * flat.is_torque
+    if step_power is not None:
+        doubt = doubt + gather(step_power).real
+    return doubt + flat.noise * _noise_growth(data, flat, loop_change)
 
 
 def _noise_growth(data: Data, flat: Flattened, change: Change) -> np.ndarray:

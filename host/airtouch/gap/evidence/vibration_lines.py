@@ -14,6 +14,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tailed
+from airtouch.gap.flights.blocks import hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH
@@ -24,7 +25,7 @@ from airtouch.simulation.plant import hover_speed
 
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
 WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one; chosen
-SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place, tried one by one; chosen
+SPREADS_HZ = (0.0, 1.0, 3.0)  #: spreads of the single rotors' lines around their common place, tried one by one; chosen
 #: relative error of a rotor's speed where the vehicle declares thrust over speed squared; chosen
 KNOWN_SPEED = 0.02
 #: columns of the rotors' logged speeds, 1/min
@@ -58,7 +59,7 @@ def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
 
     speed (n, 4) rad/s at 100 Hz; first: samples at which the blocks begin. Bins as numpy.fft has them.
     """
-    window = np.hanning(BINS + 1)[:-1]
+    window = hann_window(BINS)[0][:, 0]
     place = first[:, None] + np.arange(BINS)
     total = np.zeros((len(first), BINS))
     for one in speed.T:
@@ -97,34 +98,35 @@ def _search(data: Data) -> Lines:
     """The place and spread of the lines that explain some blocks of all flights best: on a coarse grid, then a fine."""
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
-    each = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
-    known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
+    powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
+    speed_known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
     turns = hover / (2.0 * np.pi)
-    reach = int(min(np.ceil(KNOWN_SPEED * turns * PERIOD_S * BINS), BINS // 2)) if known else BINS // 2
-    sample = _Sample(data, each)
-    if not len(sample.share):
-        return Lines([folded(widened(z, 0.0)) for z in each], 0, 0.0)
-    wide, shifts = SPREADS_HZ[1], range(-reach, reach + 1, 2)
-    rough = max(shifts, key=lambda s: sample.gain(wide, s))
+    reach = int(min(np.ceil(KNOWN_SPEED * turns * PERIOD_S * BINS), BINS // 2)) if speed_known else BINS // 2
+    sample = _Sample(data, powers)
+    if not len(sample.over_floor):
+        return Lines([folded(widened(z, 0.0)) for z in powers], 0, 0.0)
+    rough_spread, shifts = SPREADS_HZ[1], range(-reach, reach + 1, 2)
+    rough = max(shifts, key=lambda s: sample.gain(rough_spread, s))
     fine_grid = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
     spread, shift = max(fine_grid, key=lambda x: sample.gain(*x))
-    power = [folded(widened(z, spread), shift) for z in each]
+    power = [folded(widened(z, spread), shift) for z in powers]
     return Lines(_with_flight_shares(data, power), int(shift), spread)
 
 
 class _Sample:
     """Some blocks of all flights, and how well lines at a place explain them."""
 
-    def __init__(self, data: Data, each: list[np.ndarray]) -> None:
+    def __init__(self, data: Data, powers: list[np.ndarray]) -> None:
         blocks = np.concatenate([b[AIR][:, :, :3] for b in data.base])
         chosen = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).astype(int)) if len(blocks) else []
-        self.share, self.floor = _over_floor(data, blocks[chosen])
-        two = np.concatenate(each)[chosen]
-        self.two = {h: widened(two, h) for h in SPREADS_HZ}
+        self.over_floor, self.floor = _over_floor(data, blocks[chosen])
+        two_sided_power = np.concatenate(powers)[chosen]
+        self.two_sided_power = {h: widened(two_sided_power, h) for h in SPREADS_HZ}
 
     def gain(self, spread_hz: float, shift: int) -> float:
         """Twice the log likelihood that lines of the best strength gain over none."""
-        return _best_strength(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
+        shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
+        return _best_strength(self.over_floor, shape)[0]
 
 
 def _judged() -> np.ndarray:
@@ -144,15 +146,16 @@ def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """Twice the log likelihood that lines of the best strength gain over none, and that strength (power).
 
-    over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1.
+    over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
+    scale nu, not `likelihood.tail` of nu as elsewhere: with that other strengths would be found.
     """
     strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
-    tail, falls, known = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
+    tail, exponents, known = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
         """Twice the log likelihood of lines of a strength (power), but for a constant."""
-        return -tailed(size, 1.0 + strength * flat, tail, falls, known)
+        return -tailed(size, 1.0 + strength * flat, tail, exponents, known)
 
     levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))

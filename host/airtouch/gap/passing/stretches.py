@@ -100,14 +100,15 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
-    each = problem.likelihood.each(values, power - problem.elements.power)[:problem.flat.replay_count]
-    in_air = problem.flat.air.of >= 0
-    return np.bincount(problem.flat.air.of[in_air], each[in_air])
+    levels = problem.likelihood.per_value(values, power - problem.elements.power)[:problem.flat.replay_count]
+    in_air = problem.flat.air.block_of_value >= 0
+    return np.bincount(problem.flat.air.block_of_value[in_air], levels[in_air])
 
 
 def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:
     """Which blocks (b,) are explained worst: a share WORST of them, of the least log likelihood of a value."""
-    count = np.maximum(np.bincount(air.of[air.of >= 0], minlength=len(level_without)), 1)
+    in_air = air.block_of_value[air.block_of_value >= 0]
+    count = np.maximum(np.bincount(in_air, minlength=len(level_without)), 1)
     out = np.zeros(len(level_without), bool)
     out[np.argsort(level_without / count)[:max(int(WORST * len(level_without)), LEAST_WORST)]] = True
     return out

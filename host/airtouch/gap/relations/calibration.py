@@ -16,7 +16,7 @@ from scipy.stats import t as student
 
 from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
-from airtouch.gap.relations.inference import LEAST_EVIDENCE
+from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
@@ -37,7 +37,6 @@ TRIED, SHOWN = 3, 0.5  #: flights at each of these strengths, and the share of t
 QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
 DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
 LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
-LEAST_GAIN = 10.0  #: nats that chance may gain beside any class, as many as `inference.LEAST_NAMELESS`
 LEAST_FLIGHTS = 12  #: calibration flights that show the effect; with fewer a class gives no parameters
 
 
@@ -173,10 +172,10 @@ def _measured(library: Library, drawing: Drawing, one: _Fitted, with_second: boo
 def share_of(gains: Iterable[tuple[float, float]]) -> float:
     """The share of a class's evidence that something beside it gains in most of its flights.
 
-    gains: for each flight what is gained and the evidence, nats. LEAST_GAIN is chance's; one share of 0 is always among
-    those of which the quantile is taken, so that a class without flights has none.
+    gains: for each flight what is gained and the evidence, nats. Chance gains NAMELESS_ALLOWANCE; one share of 0 is
+    always among those of which the quantile is taken, so that a class without flights has none.
     """
-    shares = [max(gain - LEAST_GAIN, 0.0) / evidence for gain, evidence in gains]
+    shares = [max(gain - NAMELESS_ALLOWANCE, 0.0) / evidence for gain, evidence in gains]
     return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
 
 

@@ -69,8 +69,8 @@ def log_density(values: np.ndarray) -> float:
 class Fit:
     """A class at its likeliest strength (parameters,).
 
-    level: log density of the flight there; evidence: the same averaged over the strengths that the
-    class may have.
+    level: log density of the flight there; evidence: the same averaged over the strengths that the class may have, by
+    Laplace's approximation, and `level` where that would exceed it.
     """
 
     of: EffectClass
@@ -190,7 +190,7 @@ def _step(likelihood: _Likelihood, strength: np.ndarray) -> np.ndarray:
 
 
 def _occam_factor(likelihood: _Likelihood, strength: np.ndarray) -> float:
-    """Logarithm of the share of what a strength may be that the flight leaves (Laplace's method).
+    """Laplace approximation of log(evidence / peak likelihood).
 
     MacKay, Information Theory, Inference, and Learning Algorithms, 2003, section 28.1. A strength may be anything
     between the least and the most that was flown, on a logarithmic scale, in any direction.

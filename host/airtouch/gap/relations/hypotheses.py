@@ -54,7 +54,7 @@ class Hypothesis:
 
     @cached_property
     def shift(self) -> np.ndarray:
-        """Expected shift (Q,)."""
+        """Expected shift (Q,); 0 without effects."""
         return np.sum([f.shift for f in self.fits], axis=0)
 
 
@@ -71,24 +71,25 @@ class FlightHypotheses:
 
     def with_class(self, of: EffectClass) -> Hypothesis:
         """The hypothesis of one class alone."""
-        base, f = log_density(self.values), fit(of, self.values, unchanged(len(self.values)))
+        base, f = log_density(self.values), fit(of, self.values, self.rescaling(()))
         return Hypothesis((f,), f.level - base, f.evidence - base)
 
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
                       ) -> list[Hypothesis]:
         """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
-        known = self.rescaling(hypothesis.fits)
-        residual = known(self.values - hypothesis.shift)
+        rescaling = self.rescaling(hypothesis.fits)
+        residual = rescaling(self.values - hypothesis.shift)
         cost = hypothesis.evidence - hypothesis.level
-        out = [self.at_fits((*hypothesis.fits, fit(c, residual, known)), cost)
+        out = [self.at_fits((*hypothesis.fits, fit(c, residual, rescaling)), cost)
                for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
 
     def with_two(self, one: EffectClass, two: EffectClass) -> Hypothesis:
         """The hypothesis of two classes: the second fitted beside the first, then both in turn."""
-        first = fit(one, self.values, unchanged(len(self.values)))
-        known = rescaling_of(first.factors())
-        return self.refitted(self.at_fits((first, fit(two, known(self.values - first.shift), known))))
+        first = fit(one, self.values, self.rescaling(()))
+        rescaling = rescaling_of(first.factors())
+        second = fit(two, rescaling(self.values - first.shift), rescaling)
+        return self.refitted(self.at_fits((first, second)))
 
     def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis with its effects fitted in turn, each beside the others."""
@@ -96,8 +97,8 @@ class FlightHypotheses:
         for _ in range(TURNS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
-                known = self.rescaling(others)
-                fits[i] = fit(f.of, known(self.values - np.sum([o.shift for o in others], axis=0)), known)
+                rescaling = self.rescaling(others)
+                fits[i] = fit(f.of, rescaling(self.values - np.sum([o.shift for o in others], axis=0)), rescaling)
             tried = self.at_fits(tuple(fits))
             if tried.level <= best.level:
                 break
@@ -106,19 +107,18 @@ class FlightHypotheses:
 
     def squared_distance(self, hypothesis: Hypothesis) -> float:
         """Squared distance of the flight from a hypothesis, relative to the scatter about it."""
-        fits = hypothesis.fits
-        residual = self.rescaling(fits)(self.values - hypothesis.shift) if fits else self.values
+        residual = self.rescaling(hypothesis.fits)(self.values - hypothesis.shift)
         return float(residual @ residual)
 
     def nameless_evidence(self, hypothesis: Hypothesis) -> float:
         """Evidence over none of a hypothesis with a nameless disturbance beside it, nats."""
-        known = self.rescaling(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
-        residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
-        axes, of_unit_size = principal(known(self.model.nameless.T).T)
+        rescaling = self.rescaling(hypothesis.fits)
+        residual = rescaling(self.values - hypothesis.shift)
+        axes, of_unit_size = principal(rescaling(self.model.nameless.T).T)
         along = (residual @ axes) ** 2
         variance = 1.0 + np.outer(SIZES ** 2, of_unit_size)  # (sizes, r)
         gain = 0.5 * ((along * (1.0 - 1.0 / variance)) - np.log(variance)).sum(axis=1)
-        averaged = float(logsumexp(known.level + log_density(residual) + gain) - np.log(len(SIZES)))
+        averaged = float(logsumexp(rescaling.level + log_density(residual) + gain) - np.log(len(SIZES)))
         return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.level
 
     def at_fits(self, fits: Sequence[Fit], cost: float | None = None) -> Hypothesis:
@@ -126,14 +126,16 @@ class FlightHypotheses:
 
         cost: nats that averaging over the strengths of all but the last changes, if known.
         """
-        known = self.rescaling(fits)
-        residual = known(self.values - np.sum([f.shift for f in fits], axis=0))
-        level = known.level + log_density(residual) - log_density(self.values)
+        rescaling = self.rescaling(fits)
+        residual = rescaling(self.values - np.sum([f.shift for f in fits], axis=0))
+        level = rescaling.level + log_density(residual) - log_density(self.values)
         own = [f.evidence - f.level for f in fits]
         return Hypothesis(tuple(fits), level, level + (sum(own) if cost is None else cost + own[-1]))
 
     def rescaling(self, fits: Sequence[Fit]) -> Rescaling:
-        """The rescaling by which the scatter of a flight under effects has the covariance 1."""
+        """The rescaling by which the scatter of a flight under effects has the covariance 1; none changes nothing."""
+        if not fits:
+            return unchanged(len(self.values))
         sizes = [float(np.linalg.norm(f.shift)) for f in fits]
         smaller = float(np.sqrt(sum(min(a, b) ** 2 for a, b in combinations(sizes, 2))))
         interaction = [smaller * self.model.interaction] if smaller else []

@@ -25,16 +25,17 @@ from airtouch.simulation.effects import get
 LEAST_EVIDENCE = 18.0
 #: nats that a nameless disturbance may gain beside the right effects, whatever their evidence; 7 was tried on
 #: 2026-11-25 and taken back after the opened set of seed 112233 (host/docs/looks.md)
-LEAST_NAMELESS = 10.0
-#: nats by which two effects must be likelier than one with a nameless disturbance beside it; 36 of 44 wrong
-#: pairs, found where the right effect was left out, were not
-OVER_NAMELESS = 30.0
-#: fraction of what the second effect gains by which the two may be behind that, as two effects are not their sum. 0.07
-#: to 0.3 gave the same answers to the opened set of seed 271828, 0.05 two fewer right pairs of 116 (host/docs/looks.md)
-BEHIND_NAMELESS = 0.1
-#: shares of the effects' evidence, beside that of their classes, that a nameless disturbance may gain, because no
-#: curve is exact; PAIR: the same for two effects, because they are not a sum; chosen on flights of `learning.SEED`
-CRUDE_NAMELESS, PAIR_NAMELESS = 0.01, 0.01
+NAMELESS_ALLOWANCE = 10.0
+#: nats by which effects must be likelier than those without the last one and with a nameless disturbance in its place;
+#: 36 of 44 wrong pairs, found where the right effect was left out, were not
+NAMELESS_MARGIN = 30.0
+#: fraction of the last effect's gain by which NAMELESS_MARGIN is lowered, as two effects are not their sum. 0.07 to 0.3
+#: gave the same answers to the opened set of seed 271828, 0.05 two fewer right pairs of 116 (host/docs/looks.md)
+MARGIN_RELIEF = 0.1
+#: share of the effects' evidence that a nameless disturbance may gain beside that of their classes, because no curve is
+#: exact; chosen on flights of `learning.SEED`
+MODEL_ERROR_SHARE = 0.01
+PAIR_ERROR_SHARE = 0.01  #: the same once more for several effects, because they are not their sum; chosen there
 #: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
 #: below 10,000 nats lie farther, half of them because they hit something (2,750 flights of `learning.SEED`, scatters
 #: and limit by other halves)
@@ -83,7 +84,10 @@ class Inference:
         return max(self.evidence, key=lambda name: self.evidence[name], default="")
 
     def probabilities(self) -> dict[str, float]:
-        """Probabilities of each effect alone and of `none`; they sum to 1."""
+        """Probabilities of each effect alone and of `none`; they sum to 1.
+
+        `none` counts as an effect of LEAST_EVIDENCE: an effect that has just enough evidence is as likely as none.
+        """
         names = [*self.evidence, "none"]
         score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / TEMPERATURE
         return dict(zip(names, np.exp(score - logsumexp(score)).tolist(), strict=True))
@@ -126,8 +130,8 @@ def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Ag
 
 def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: ByClass) -> Against:
     """What a nameless disturbance gains beside effects."""
-    share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
-    return Against(flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence, False)
+    share = _largest(best, shares) + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
+    return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence, False)
 
 
 def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: ByClass, library: Library) -> Against:
@@ -153,7 +157,13 @@ def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
 
 
 def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library) -> Hypothesis:
-    """The likeliest hypothesis, with no more effects than its evidence supports."""
+    """The likeliest hypothesis, with no more effects than its evidence supports.
+
+    A second effect is always tried, a third only where too much speaks against the two. One more effect is kept if it
+    gains LEAST_EVIDENCE and what wrong second effects gain beside those classes (`Library.second_share`), and if it
+    explains the flight better than a nameless disturbance in its place would. A third is tried beside the chosen two
+    alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
+    """
     choices, second = _choices(library), _by_class(library, library.second_share)
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
         return flight.none
@@ -166,7 +176,7 @@ def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Lib
         gain = first.evidence - best.evidence
         if gain < LEAST_EVIDENCE + _largest(best, second) * best.evidence:
             break
-        if first.evidence < flight.nameless_evidence(best) + OVER_NAMELESS - BEHIND_NAMELESS * gain:
+        if first.evidence < flight.nameless_evidence(best) + NAMELESS_MARGIN - MARGIN_RELIEF * gain:
             break
         best, beam = first, [first]
     return best

@@ -1,0 +1,25 @@
+"""A library of relations without any learning: six effects along six axes of their coordinates."""
+
+import numpy as np
+
+from airtouch.gap.features.feature_space import Standard
+from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.hypotheses import LearnedModel
+from airtouch.gap.relations.library import Library
+
+Q = 100  #: coordinates
+KNOTS = np.log([0.5, 5.0, 50.0])
+NAMES = ("mass", "wind", "inertia", "motor_lag", "vibration", "gust")
+
+
+def library():
+    """Six effects along six axes, each by its strength alone; what has no name lies anywhere."""
+    classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
+                                np.zeros(0)) for i, n in enumerate(NAMES))
+    model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
+    return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
+                   (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), 0.0)
+
+
+def noise(seed=1):
+    return np.random.default_rng(seed).normal(size=Q)
