@@ -64,15 +64,6 @@ def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(mon
     assert len(infer(library(), values).classes) == 1
 
 
-@pytest.mark.parametrize(("second", "named"), [(45.0, {"mass", "wind"}), (20.0, {"mass"})])
-def test_two_effects_may_be_behind_something_without_a_name_by_a_fraction_of_what_the_second_gains(second, named):
-    """What has no name lies along the second effect and one axis more, of which 50 nats are in the flight."""
-    nameless = np.eye(Q)[:, [1, 7]] / np.sqrt(2.0)
-    of = replace(library(), model=replace(library().model, nameless=nameless))
-    values = noise() + 48.0 * np.eye(Q)[0] + second * np.eye(Q)[1] + 10.0 * np.eye(Q)[7]
-    assert {c.name for c in infer(of, values[None]).classes} == named
-
-
 def test_the_mean_of_flights_is_as_one_of_less_noise():
     """Four flights: evidence is that of one whose noise is half as large, whose shift is twice as long."""
     way = np.eye(Q)[0]

@@ -29,9 +29,6 @@ NAMELESS_ALLOWANCE = 10.0
 #: nats by which effects must be likelier than those without the last one and with a nameless disturbance in its place;
 #: 36 of 44 wrong pairs, found where the right effect was left out, were not
 NAMELESS_MARGIN = 30.0
-#: fraction of the last effect's gain by which NAMELESS_MARGIN is lowered, as two effects are not their sum. 0.07 to 0.3
-#: gave the same answers to the opened set of seed 271828, 0.05 two fewer right pairs of 116 (host/docs/looks.md)
-MARGIN_RELIEF = 0.1
 #: share of the effects' evidence that a nameless disturbance may gain beside that of their classes, because no curve is
 #: exact; chosen on flights of `learning.SEED`
 MODEL_ERROR_SHARE = 0.01
@@ -173,10 +170,8 @@ def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Lib
         if not larger:
             break
         first = _by_thing(larger, choices)
-        gain = first.evidence - best.evidence
-        if gain < LEAST_EVIDENCE + _largest(best, second) * best.evidence:
-            break
-        if first.evidence < flight.nameless_evidence(best) + NAMELESS_MARGIN - MARGIN_RELIEF * gain:
+        needed = best.evidence + LEAST_EVIDENCE + _largest(best, second) * best.evidence
+        if first.evidence < max(needed, flight.nameless_evidence(best) + NAMELESS_MARGIN):
             break
         best, beam = first, [first]
     return best

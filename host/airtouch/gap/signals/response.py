@@ -37,9 +37,9 @@ from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.spectra import SMOOTH, squared
 
 FIRST_BIN = 2  #: bins below it hold the means, which the Hann window spreads over two bins: there q is 1
-#: quiet blocks that a response needs on each axis, and stepped ones that a law of these needs; chosen: of so many
-#: blocks of noise the coherence is 1/8 by chance, which NOISE lies above
+#: blocks that a response needs, and stepped ones that a law of these needs; chosen
 FEWEST_OF_KIND = 8
+FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a single one is 1, whatever is in it
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
@@ -205,7 +205,7 @@ def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed) -> Response |
     if len(y) < FEWEST_OF_KIND:
         return None
     power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
-    if quiet.sum(axis=0).min() < FEWEST_OF_KIND:
+    if quiet.sum(axis=0).min() < FEWEST_QUIET:
         return None
     quiet_law, floor = _law(QUIET, y, w, quiet, loop, None)
     stepped_law = None
@@ -230,7 +230,8 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     q = mean(y * w.conj()) / np.maximum(power, VANISHING_POWER)
     coherence = _smooth(np.abs(q) ** 2 * power / np.maximum(mean(np.abs(y) ** 2), VANISHING_POWER))
     transfer = _smooth(q.real) + 1j * _smooth(q.imag)
-    coherent = transfer * np.clip((coherence - NOISE) / NOISE, 0.0, 1.0)
+    noise = np.maximum(NOISE, 1.0 / count)  # of n blocks of noise the coherence is 1/n by chance
+    coherent = transfer * np.clip((coherence - noise) / noise, 0.0, 1.0)
     own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER))))
     enough = chosen.sum(axis=0) >= FEWEST_OF_KIND
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
