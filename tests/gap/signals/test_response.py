@@ -100,7 +100,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
 
 @pytest.mark.parametrize("count", [1, 2, 4, 6, 12])
 def test_of_few_quiet_blocks_a_higher_coherence_is_believed(monkeypatch, count):
-    """The coherence of n blocks of noise is 1/n by chance: noise alone is next to never believed, a clean response is."""
+    """The coherence of n blocks of noise is 1/n by chance: noise is next to never believed, a clean response is."""
     estimate = quiet_blocks.estimate_quiet_power
 
     def with_few_on_one_axis(modelled, power):
