@@ -132,8 +132,8 @@ def _plots(pictures: Pictures) -> list[Plot]:
     if pictures.spectra:
         text = "Mean over the flights."
         if any(s.after is not None for s in pictures.spectra):
-            text += (" A random effect cannot be predicted sample by sample: its green curve is what is left of the "
-                     "power.")
+            text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
+                     "the ratio of the power to the expected one.")
         plots.append(Plot("Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:

@@ -1,4 +1,4 @@
-"""The curves of a report: each has what its caption says, worked out by hand from made flights."""
+"""The curves of a report: each has what its caption says, worked out by hand from synthetic flights."""
 
 from dataclasses import replace
 
@@ -60,56 +60,56 @@ def test_signal_holds_what_is_below_the_frequency_that_is_told(band_hz, push_hz,
     It is drawn up to the end of the cell's band, and up to 2 Hz at least.
     """
     push, share = np.sin(2.0 * np.pi * push_hz * TIME_S), push_hz < highest_hz
-    made = flight(SECONDS, push[:, None] * [1.0, 0.0, 0.0] + FORWARD)
-    drawn = pictures(made, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
+    pushed_flight = flight(SECONDS, push[:, None] * [1.0, 0.0, 0.0] + FORWARD)
+    drawn = pictures(pushed_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
     inside = slice(300, -300)
     assert drawn.highest_hz == highest_hz
     np.testing.assert_allclose(drawn.before[inside], 0.5 + share * push[inside], atol=0.05)
 
 
 def test_nothing_is_drawn_where_nothing_is_judged():
-    drawn = pictures(replace(made := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
-    assert made.usable.all()
+    drawn = pictures(replace(whole_flight := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
+    assert whole_flight.usable.all()
     np.testing.assert_array_equal(np.isfinite(drawn.signal.before), used)
     np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
 
 
 def test_flight_of_the_signal_is_that_of_the_median_gap():
     """By the standard deviation in the cell's channel; in another channel their order is another."""
-    made = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
+    noisy_flights = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
             for i, (forward, up) in enumerate([(3.0, 1.0), (1.0, 2.0), (2.0, 3.0)])]
-    assert pictures(*made).signal.flight == "2.0"
-    assert pictures(*made, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
+    assert pictures(*noisy_flights).signal.flight == "2.0"
+    assert pictures(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
 
 
 @pytest.mark.parametrize(("channel", "gyro", "shown"), [
     ("torque_y", 0.01, True), ("torque_y", None, False), ("rate_x", 0.01, False)])
 def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):
     """Of torque the slope of the gyro; of rates only the difference to the model is known."""
-    made = flight(SECONDS, gyro=0.0 if gyro is None else noise(SECONDS, gyro, 5))
+    turning_flight = flight(SECONDS, gyro=0.0 if gyro is None else noise(SECONDS, gyro, 5))
     if gyro is None:
-        made = replace(made, rates=None)
-    drawn = pictures(made, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
+        turning_flight = replace(turning_flight, rates=None)
+    drawn = pictures(turning_flight, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
     assert (drawn.measured is not None) is shown
     if shown:
-        pitch = angular_acceleration(made)[:, 1]
+        pitch = angular_acceleration(turning_flight)[:, 1]
         assert np.corrcoef(drawn.measured[100:-100], pitch[100:-100])[0, 1] > 0.5
 
 
 def test_spectra_are_of_the_cells_channels_each_once_and_the_first_few():
     channels = ["force_z", "force_x", "force_z", "torque_x", "force_y"]
-    made = pictures(hover(1, length_s=SECONDS), cells=[cell(c, "hover", 1.0) for c in channels])
-    assert [s.channel for s in made.spectra] == ["force_z", "force_x", "torque_x"] and MOST_SPECTRA == 3
-    assert [s.unit for s in made.spectra] == ["m/s^2", "m/s^2", "rad/s^2"]
-    np.testing.assert_array_equal(made.frequency_hz, frequencies(AIR))
-    for s in made.spectra:
-        assert s.before.shape == s.floor.shape == made.frequency_hz.shape and s.after is None
+    curves = pictures(hover(1, length_s=SECONDS), cells=[cell(c, "hover", 1.0) for c in channels])
+    assert [s.channel for s in curves.spectra] == ["force_z", "force_x", "torque_x"] and MOST_SPECTRA == 3
+    assert [s.unit for s in curves.spectra] == ["m/s^2", "m/s^2", "rad/s^2"]
+    np.testing.assert_array_equal(curves.frequency_hz, frequencies(AIR))
+    for s in curves.spectra:
+        assert s.before.shape == s.floor.shape == curves.frequency_hz.shape and s.after is None
 
 
 def test_spectrum_before_is_the_mean_power_of_white_noise():
     """2 rms^2 T, one-sided, over blocks of several flights."""
-    made = [flight(60.0, noise(60.0, rms, 20 + i)) for i, rms in enumerate((0.1, 0.3))]
-    (spectrum,) = pictures(*made).spectra
+    noisy_flights = [flight(60.0, noise(60.0, rms, 20 + i)) for i, rms in enumerate((0.1, 0.3))]
+    (spectrum,) = pictures(*noisy_flights).spectra
     assert spectrum.before[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * np.mean([0.1 ** 2, 0.3 ** 2]), rel=0.05)
 
 
@@ -128,11 +128,11 @@ def test_spectrum_after_lacks_the_power_of_a_mean_effect():
 
 
 def test_spectrum_after_a_random_effect_is_near_the_floor():
-    """Its samples cannot be predicted: its power is taken off what is over the floor."""
+    """Its samples cannot be predicted: what it leaves is the floor times the ratio of the power to that expected."""
     louder = terms("imu_noise")[0].fitted(np.ones(1))
     factor = louder.values["factor"]
-    made = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
-    (spectrum,) = pictures(made, effects=[louder]).spectra
+    noisy_flight = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
+    (spectrum,) = pictures(noisy_flight, effects=[louder]).spectra
     above = slice(2, -1)
     assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
     off = np.abs(spectrum.after - spectrum.floor)[above].mean()
@@ -148,9 +148,9 @@ def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():
 
 
 def test_without_a_cell_the_commands_are_all():
-    made = pictures(flight(SECONDS), cells=[])
-    assert made.signal is None and made.spectra == () and not len(made.frequency_hz)
-    assert made.commands is not None
+    curves = pictures(flight(SECONDS), cells=[])
+    assert curves.signal is None and curves.spectra == () and not len(curves.frequency_hz)
+    assert curves.commands is not None
 
 
 def test_commands_of_nominal_flights_are_drawn_where_there_are_any():
@@ -162,10 +162,10 @@ def test_commands_of_nominal_flights_are_drawn_where_there_are_any():
 
 
 def test_without_flights_nothing_is_drawn():
-    made = pictures()
-    assert made.signal is None and made.spectra == () and made.commands is None
+    curves = pictures()
+    assert curves.signal is None and curves.spectra == () and curves.commands is None
 
 
 def test_a_flight_too_short_for_a_block_has_a_signal_and_no_spectrum():
-    made = pictures(flight(1.0, FORWARD))
-    assert made.signal is not None and made.spectra == ()
+    curves = pictures(flight(1.0, FORWARD))
+    assert curves.signal is not None and curves.spectra == ()

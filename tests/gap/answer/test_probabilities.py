@@ -67,8 +67,8 @@ def test_what_is_missing_counts_in_full():
 @pytest.mark.parametrize("answer", ["wind", "none", "downwash"])
 def test_an_answer_with_less_evidence_is_as_probable_as_the_candidate_with_most(answer):
     """Wind beside a gate, a gap at its floor, an effect that is no candidate alone: mass has most evidence."""
-    made = selection({"mass": 30.0, "wind": 12.0, "gust": 1.0})
-    by_evidence, chance = probabilities(made, "mass"), probabilities(made, answer)
+    selected = selection({"mass": 30.0, "wind": 12.0, "gust": 1.0})
+    by_evidence, chance = probabilities(selected, "mass"), probabilities(selected, answer)
     assert chance[answer] == chance["mass"] == max(chance.values())
     assert sum(chance.values()) == pytest.approx(1.0)
     for other in {"mass", "wind", "gust", "none"} - {answer}:
@@ -76,6 +76,6 @@ def test_an_answer_with_less_evidence_is_as_probable_as_the_candidate_with_most(
 
 
 def test_an_answer_with_most_evidence_changes_no_weight():
-    made = selection({"mass": 30.0, "wind": 12.0}, left=0.1 * LIMIT)
-    as_answer, without = (probabilities(made, answer) for answer in ("mass", "unknown"))
+    selected = selection({"mass": 30.0, "wind": 12.0}, left=0.1 * LIMIT)
+    as_answer, without = (probabilities(selected, answer) for answer in ("mass", "unknown"))
     assert as_answer == without

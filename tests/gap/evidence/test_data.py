@@ -27,10 +27,10 @@ WEIGHT = 2.0  #: of the law of stepped blocks
 
 def flown():
     """A flight back and forth whose commands are noise, as its rates are."""
-    made = swaying()
+    swaying_flight = swaying()
     rng = np.random.default_rng(7)
-    return replace(made, pwm=made.pwm + rng.normal(0.0, 2000.0, made.pwm.shape),
-                   rates=made.rates + rng.normal(0.0, 0.02, made.rates.shape))
+    return replace(swaying_flight, pwm=swaying_flight.pwm + rng.normal(0.0, 2000.0, swaying_flight.pwm.shape),
+                   rates=swaying_flight.rates + rng.normal(0.0, 0.02, swaying_flight.rates.shape))
 
 
 def law(kind, weight):

@@ -39,9 +39,10 @@ def test_offsets_are_of_the_channels_that_differ_in_each_flight(two):
 
 def test_a_unit_offset_is_what_a_constant_force_adds_in_the_air(two):
     """1 m/s^2 forward on the first flight, which begins at rest on the ground."""
-    made = two[0]
-    forward = (~made.on_ground)[:, None] * [1.0, 0.0, 0.0]
-    before, after = flat_of(two), flat_of([replace(made, acceleration=made.acceleration + forward), two[1]])
+    first_flight = two[0]
+    forward = (~first_flight.on_ground)[:, None] * [1.0, 0.0, 0.0]
+    moved = replace(first_flight, acceleration=first_flight.acceleration + forward)
+    before, after = flat_of(two), flat_of([moved, two[1]])
     offset = before.offsets[0]
     added = np.zeros(len(before.elements.base), complex)
     added[offset.places] = offset.column

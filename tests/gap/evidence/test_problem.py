@@ -26,14 +26,14 @@ def test_without_a_response_torque_counts_in_the_means_alone():
 
 def test_all_blocks_of_some_flights_are_flattened_once(monkeypatch):
     """A long-lived set of flights, judged a thousand times, else kept a thousand copies of them."""
-    made = []
-    monkeypatch.setattr(problem, "flattened", lambda data, pieces: made.append(pieces) or flattened(data, pieces))
+    calls = []
+    monkeypatch.setattr(problem, "flattened", lambda data, pieces: calls.append(pieces) or flattened(data, pieces))
     data = Data(declared_study(VEHICLE, ()), [flight(20.0), flight(20.0, name="other")])
     blocks = whole_of(data)
     assert {i for i, _, _ in blocks.pieces} == {0, 1} and all(chosen.all() for _, _, chosen in blocks.pieces)
     assert problem_of(data, whole_of(data)).flat is problem_of(data, blocks).flat
     assert {i for i, _, _ in whole_of(data, [1]).pieces} == {1}
-    assert [BlockSet(pieces).key for pieces in made] == [blocks.key]
+    assert [BlockSet(pieces).key for pieces in calls] == [blocks.key]
 
 
 @pytest.fixture

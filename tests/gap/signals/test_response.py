@@ -167,17 +167,18 @@ def drawn_change(cut=0.0):
 
 @pytest.mark.parametrize("kind", [QUIET, STEPPED])
 def test_ratio_of_roll_and_pitch_is_that_of_the_torque_share(kind):
-    change, made = drawn_change(), law(kind, coherent=4.0)
-    np.testing.assert_array_equal(made.ratio(change)[:, :2], response_ratio(change, kind, made.transfer)[:, :2])
+    change, response_law = drawn_change(), law(kind, coherent=4.0)
+    expected = response_ratio(change, kind, response_law.transfer)
+    np.testing.assert_array_equal(response_law.ratio(change)[:, :2], expected[:, :2])
 
 
 @pytest.mark.parametrize(("coherent", "part"), [(0.5, 1.0), (1.0, 1.0), (2.0, 0.25), (-3.0j, 1.0 / 9.0)])
 def test_in_yaw_the_ratio_changes_less_where_the_response_is_above_one(coherent, part):
     """There most of it is noise of the gyro, which no effect changes: of its square 1 / |q~|^2 is the vehicle's."""
-    change, made = drawn_change(), law(coherent=coherent)
-    whole = response_ratio(change, QUIET, made.transfer)[:, 2]
+    change, response_law = drawn_change(), law(coherent=coherent)
+    whole = response_ratio(change, QUIET, response_law.transfer)[:, 2]
     assert np.abs(whole - 1.0).max() > 0.1
-    np.testing.assert_allclose(made.ratio(change)[:, 2] - 1.0, part * (whole - 1.0))
+    np.testing.assert_allclose(response_law.ratio(change)[:, 2] - 1.0, part * (whole - 1.0))
 
 
 def test_torque_is_weighted_as_blocks_of_its_kind_are():

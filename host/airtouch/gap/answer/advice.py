@@ -40,7 +40,7 @@ def steps(answer: Diagnosis, flights: Sequence[Flight]) -> tuple[NextStep, ...]:
 
 
 def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
-    """The command that flies the named effects in the simulator, those that come and go from begin to end."""
+    """The command that flies the named effects in the simulator, those that come and go all the time."""
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
         arguments = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"

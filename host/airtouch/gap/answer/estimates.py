@@ -7,7 +7,7 @@ variance (`Term.quantities`), which is the sum of
 2. the square of half the difference of the two halves of the data: what one half shows and the other does not;
 3. the square of the model's error, a fraction of the parameter (`model_error`).
 
-Of an effect in the logged times alone it is that of chance (`from_times`).
+An effect that shows in the logged times alone has the variance of their chance instead (`from_times`).
 
 On white noise of the expected power, intervals of the first alone would hold 88 %, as the likelihood's tails and the
 overlap of its blocks make it a little too sure; those of the first two hold 94 % (`tests/gap/answer/test_estimates.py`
@@ -79,8 +79,9 @@ def from_times(data: Data, term: Term) -> Estimate:
 
     The relative variance of a standard deviation m from n independent values is 1 / (2 n); the clock has one such value
     in CORRELATION_S. A jitter is what m has beyond the nominal one, s^2 = m^2 - nominal^2, so that its relative
-    variance is (m / s)^4 times that. That of a number of lost samples is E[L^2] / (E[L] times the number), where runs
-    begin as in a
+    variance is (m / s)^4 times that.
+
+    The relative variance of a number of lost samples is E[L^2] / (E[L] times the number), where runs begin as in a
     Poisson process and have L samples (compound Poisson); of geometric lengths of mean b it is (2 b - 1) / the number.
     No relative variance is more than 1.
     """

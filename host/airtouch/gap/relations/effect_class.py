@@ -96,11 +96,11 @@ def _parts(strength: np.ndarray, signed: bool) -> np.ndarray:
 def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Weights (n, k) of the knots at strengths (n,): straight lines in the logarithm, constant outside."""
     x = np.minimum(np.maximum(np.log(np.maximum(size, SMALLEST)), knots[0]), knots[-1])
-    left = np.minimum(np.maximum(np.searchsorted(knots, x) - 1, 0), len(knots) - 2)
-    share = (x - knots[left]) / (knots[left + 1] - knots[left])
+    lower_knot = np.minimum(np.maximum(np.searchsorted(knots, x) - 1, 0), len(knots) - 2)
+    share = (x - knots[lower_knot]) / (knots[lower_knot + 1] - knots[lower_knot])
     out = np.zeros((len(x), len(knots)))
     place = np.arange(len(x))
-    out[place, left], out[place, left + 1] = 1.0 - share, share
+    out[place, lower_knot], out[place, lower_knot + 1] = 1.0 - share, share
     return out
 
 

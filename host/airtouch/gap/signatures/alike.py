@@ -57,13 +57,13 @@ def interchangeable(one: str, other: str) -> bool:
 
 def same_things(names: Sequence[str], others: Sequence[str]) -> bool:
     """Whether two lists of effects stand for the same things in these logs, whatever their order."""
-    left = list(others)
+    unmatched = list(others)
     for name in names:
-        same = next((other for other in left if interchangeable(name, other)), None)
-        if same is None:
+        match = next((other for other in unmatched if interchangeable(name, other)), None)
+        if match is None:
             return False
-        left.remove(same)
-    return not left
+        unmatched.remove(match)
+    return not unmatched
 
 
 def confusion_among(names: Sequence[str]) -> Confusion:
