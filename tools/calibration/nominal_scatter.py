@@ -33,6 +33,8 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set, data_folder
+from airtouch.detector.evaluation.data.dataset import collect
+from airtouch.detector.evaluation.data.folds import BUILD_FOLDS, still_air
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
@@ -54,7 +56,7 @@ SIMULATED = 4  #: groups of simulated flights; no source: round number
 #: scenarios that draw each flight's rotors and battery, one group each of so many flights; no source: of the shipped
 #: ones those least alike
 OWN_TRIM, OWN_TRIM_FLIGHTS = ("paper-low", "paper-9cm", "paper-mixed", "steps"), 6
-BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
+BUILD_DAYS = ("19", "20")  #: of neural-swarm, on which numbers may be chosen (host/docs/looks.md)
 #: a log's name, and a function that reads it, which can be sent to a worker process
 Log = tuple[str, Callable[[], FlightLog]]
 
@@ -88,14 +90,11 @@ def pool_of(jobs: int) -> ProcessPoolExecutor:
 
 def nominal_groups(folder: Path) -> Iterator[Group]:
     """The groups of nominal flights, recorded and simulated."""
-    by_group = defaultdict(list)
-    for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
-        if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in BUILD_FOLDS:
-            log = _read(folder / "airtouch" / r["file"])
-            by_group[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
     vehicle = vehicles.load("crazyflie-2.1-flow")
-    for key, files in by_group.items():
-        yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle, files)
+    build = [file for file in collect([folder / "airtouch"]) if file.condition.fold in BUILD_FOLDS]
+    for key, files in still_air(build).items():
+        yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle,
+                    [_read(file.path) for file in files])
     swarm = folder / "neuralswarm"
     by_group = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):
