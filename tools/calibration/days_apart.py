@@ -52,7 +52,7 @@ def line(title: str, one: Sequence[FlightData], other: Sequence[FlightData]) -> 
 def main() -> None:
     """One line for each pair of days."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights of one drone")
     parser.add_argument("--fewest", type=int, default=MIN_FLIGHTS, help="flights of a day (default %(default)s)")
     options = parser.parse_args()
     days = read_days(options.folders)

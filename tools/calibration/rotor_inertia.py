@@ -90,7 +90,7 @@ def report(log: FlightLog, craft: Vehicle) -> str:
 def main() -> None:
     """Print a line for each flight."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", type=Path, nargs="+")
+    parser.add_argument("flights", type=Path, nargs="+", help="logs with rotor speeds")
     parser.add_argument("--vehicle", default="crazyflie-2.1", help="name or file: mass and Jz (default %(default)s)")
     options = parser.parse_args()
     craft = vehicle.load(options.vehicle)

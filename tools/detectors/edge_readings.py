@@ -161,7 +161,7 @@ def print_tables(name: str, passes: Passes) -> None:
 def main() -> None:
     """Recorded flights, then the twin's."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, help="of recorded flights, with a manifest.csv")
     parser.add_argument("--fold", type=int, action="append", default=[],
                         help="only flights of this fold; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")

@@ -124,7 +124,7 @@ def head(first: str, names: Sequence[str]) -> str:
 def main() -> None:
     """Print the tables, by class of height."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
     parser.add_argument("--model", type=Path, action="append", default=[], help="a `best` model; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
