@@ -1,6 +1,6 @@
 """Measures how strong every effect seems to be in nominal flights, for gap/signatures/nominal_scatter.toml.
 
-    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]
+    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]    # hours
 
 Every nominal flight is compared twice with up to five others of its vehicle, on which the vehicle is calibrated: with
 flights of its own group (drone, day and condition), and with flights of other groups of the same drone. Strengths of

@@ -1,6 +1,6 @@
 """Prints in how many flights `best` finds the same edges when it computes at the other half of the samples.
 
-    python tools/detectors/half_of_best.py [FOLDER]
+    python tools/detectors/half_of_best.py [FOLDER]    # 12 s
 
 `best` computes at every second sample; in a log without its first sample it computes at the others. The app counts
 samples from the moment that its battery was plugged in, so it may compute at either half. Also printed: the same count

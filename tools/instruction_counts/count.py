@@ -1,7 +1,7 @@
 """Prints instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
 
-    python -m tools.instruction_counts.count                        the table, beside its budget
-    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there)
+    python -m tools.instruction_counts.count                        the table, beside its budget; 16 s
+    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there); 2 min
     python -m tools.instruction_counts.count --optimise=-Os         as the Crazyflie firmware compiles by default
     python -m tools.instruction_counts.count --toml                 limits for budget.toml beside this file, 3 % above
 
@@ -116,7 +116,7 @@ def main() -> None:
         _toml(options.core, costs)
         return
     chosen = options.compiler or compilers(options.core)[0]
-    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a made-up flight of 15 s")
+    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a synthetic flight of 15 s")
     _table(costs, budget.load(options.core) if options.core == "cortex-m4" and options.optimise == "-O2" else {})
     if options.flights:
         _flights(code, options.flights)
