@@ -1,6 +1,6 @@
 """Prints the seconds that `airtouch gap diagnose` takes for a packaged flight of 25 s and four baseline flights.
 
-    python tools/benchmarks/bench_diagnosis.py [--runs 5]
+    python tools/benchmarks/bench_diagnosis.py [--runs 5]    # a minute a run
 
 JSON and report are written too. Each run is a process of its own, on all processors and on one in turn, after one
 warm-up that compiles: with the first flight against a baseline, and with a further one, for which the baseline's
