@@ -110,8 +110,8 @@ def nominal_groups(folder: Path) -> Iterator[Group]:
                                      for i, log in enumerate(logs)]
         yield Group(scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs)
     for scene in OWN_TRIM:
-        every = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
-        logs = [sealed.stripped(log) for log in every if isinstance(log, FlightLog)]
+        flown = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
+        logs = [sealed.stripped(log) for log in flown if isinstance(log, FlightLog)]
         named_logs: list[Log] = [(f"{scene} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
         yield Group(scatter_estimates.OWN_TRIM, scene, scene, vehicle, named_logs)
 
@@ -128,7 +128,7 @@ def _read(path: Path) -> Log:
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
              look: Callable[[Data], ApparentStrengths] = apparent_strengths) -> Iterator[tuple[str, ApparentStrengths]]:
-    """Each flight against others of its group, or against those given, as `look` sees it."""
+    """(Name, `look` at it) of each flight, against others of its group or against `others`."""
     ready = _ready(logs, vehicle)
     if others is not None:
         base = [f for _, f in _ready(_evenly_spaced(others), vehicle)]

@@ -1,6 +1,6 @@
 """Prints what the down range reads at platform edges, and what the firmware's height control makes of it.
 
-    python tools/detectors/edge_readings.py FOLDER --fold 0 --fold 1 --fold 2 [--twin FOLDER]    # 10 s without --twin
+    python tools/detectors/edge_readings.py FOLDER --fold 0 --fold 1 --fold 2 [--twin FOLDER]    # 15 s without --twin
 
 For recorded flights, and with --twin for the same courses flown by that twin:
 - the one reading in which an edge passes: where between the two distances it lies;

@@ -32,7 +32,7 @@ MARGIN = 1.03  #: a new budget over the measured cost
 
 
 def kernel_inputs(code: FlightCode, flight: np.ndarray) -> dict[str, np.ndarray]:
-    """What each kernel is given in a flight (n,) of edgeSample_t."""
+    """Input of each kernel in a flight (n,) of edgeSample_t."""
     events = code.fly("edge_pipeline", flight)
     channels = code.fly("motion_channels", flight).output
     first = best.load(None).int8.layers[0]

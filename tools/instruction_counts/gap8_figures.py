@@ -38,7 +38,7 @@ RESAMPLES = 2000  #: bootstrap samples over flights; no source: round number
 
 @dataclass(frozen=True)
 class Row:
-    """A network: detector and what its fit is given; shipped: whether its shipped model is what is counted."""
+    """A network: detector and arguments of its fit; shipped: whether its shipped model is counted."""
 
     name: str
     detector: str
