@@ -43,15 +43,15 @@ def main() -> None:
     runs = parser.parse_args().runs
     if runs < 1:
         parser.error("--runs must be at least 1")
-    available = os.sched_getaffinity(0)
+    free = os.sched_getaffinity(0)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         cache_folder = str(out / "cache")
         rows = {f"{flight} flight, {name}": (processors, cache)
                 for flight, cache in (("first", ""), ("further", cache_folder))
-                for name, processors in ((f"{len(available)} processors", available), ("1 processor", {min(available)}))}
+                for name, processors in ((f"{len(free)} processors", free), ("1 processor", {min(free)}))}
         print("warming up: the first time compiles", file=sys.stderr, flush=True)
-        seconds(available, out, cache_folder)
+        seconds(free, out, cache_folder)
         rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
                   for _ in range(runs)]
     for row in rows:

@@ -92,9 +92,9 @@ def nominal_groups(folder: Path) -> Iterator[Group]:
     """The groups of nominal flights, recorded and simulated."""
     vehicle = vehicles.load("crazyflie-2.1-flow")
     build = [file for file in collect([folder / "airtouch"]) if file.condition.fold in BUILD_FOLDS]
-    for key, files in still_air(build).items():
+    for key, alike in still_air(build).items():
         yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle,
-                    [_read(file.path) for file in files])
+                    [_read(file.path) for file in alike])
     swarm = folder / "neuralswarm"
     by_group = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):

@@ -1,7 +1,7 @@
 """Prints instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
 
     python -m tools.instruction_counts.count                        the table, beside its budget; 16 s
-    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there); 2 min
+    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too; 2 min
     python -m tools.instruction_counts.count --optimise=-Os         as the Crazyflie firmware compiles by default
     python -m tools.instruction_counts.count --toml                 limits for budget.toml beside this file, 3 % above
 

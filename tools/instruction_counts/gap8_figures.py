@@ -2,8 +2,8 @@
 
     python -m tools.instruction_counts.gap8_figures [FLIGHTS] [--out out/gap8] [--counts]
 
-Costs come from emulators, 45 s in all. Accuracy and edge error come from five folds by flight; folds that are done are kept
-in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
+Costs come from emulators, 45 s in all. Accuracy and edge error come from five folds by flight; folds that are done are
+kept in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
 """
 
 import json

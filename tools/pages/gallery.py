@@ -2,8 +2,9 @@
 
     airtouch gap demo; airtouch demo --force; python tools/pages/gallery.py
 
-The three take four minutes, the last of them under one. Flights are simulated with fixed seeds. Reports are photographed in Chromium at 1,280 and 390 pixels; without a browser
-or a report those pictures stay as they are, and the tool says so.
+The three take four minutes, the last of them under one. Flights are simulated with fixed seeds. Reports are
+photographed in Chromium at 1,280 and 390 pixels; without a browser or a report those pictures stay as they are, and the
+tool says so.
 """
 
 import argparse

@@ -3,8 +3,8 @@
     airtouch crossval --detector best --json out/best.json
     python tools/pages/picture.py
 
-The first command trains for two to four minutes a fold, the second takes seconds. It draws a flight of fold 0 with the model that never saw it (host/docs/img/flight.png) and the reliability over all folds
-(reliability.png).
+The first command trains for two to four minutes a fold, the second takes seconds. It draws a flight of fold 0 with the
+model that never saw it (host/docs/img/flight.png) and the reliability over all folds (reliability.png).
 """
 
 import argparse
