@@ -8,6 +8,7 @@ import pytest
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
+from airtouch.gap.relations.library import NominalDistance
 from airtouch.gap.relations.readout import Readout
 from axis_library import NAMES, Q, library, noise
 
@@ -107,7 +108,7 @@ def test_a_second_effect_needs_a_share_of_the_firsts_evidence():
 def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_two_effects(monkeypatch):
     """The distance says nothing here: nominal flights scatter widely."""
     monkeypatch.setattr(inference, "NAMELESS_MARGIN", -np.inf)
-    wide = replace(library(), distance=(float(Q), 1e6))
+    wide = replace(library(), distance=NominalDistance(float(Q), 1e6))
     for true, share in (((45.0,), 0.01), ((45.0, 30.0), 0.02)):
         values = noise(4) + sum(size * np.eye(Q)[i] for i, size in enumerate(true))
         values[60:] *= 2.5
