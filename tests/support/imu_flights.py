@@ -7,6 +7,7 @@ from airtouch.gap.flights import flight
 from airtouch.simulation.batch import flights as simulated
 
 VEHICLE = vehicles.load()
+FASTER = replace(VEHICLE, thrust_per_speed2=1.9e-8)  #: its rotors turn faster for their thrust than those of VEHICLE
 #: rotors that turn at speeds of their own, as real ones do: else their lines add up as their phases happen to stand
 APART = [("weak_motor", {"rotor": i, "thrust_loss": 0.01 * i}) for i in (1, 2, 3)]
 HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")

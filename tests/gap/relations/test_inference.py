@@ -88,7 +88,7 @@ def test_scatter_between_flights_averages_out():
 def test_what_may_stand_beside_a_mass(other, effect, may):
     """Another name of it may not, another parameter of the same effect may if each has a class of its own."""
     mass = FlightHypotheses(noise() + 45.0 * np.eye(Q)[0], library().model).with_class(library().model.classes[0])
-    assert inference.may_stand_beside(replace(mass.fits[0].of, name=other, effect=effect), mass) is may
+    assert inference.may_stand_beside(replace(mass.fits[0].effect_class, name=other, effect=effect), mass) is may
 
 
 def test_no_more_effects_are_named_than_a_flight_may_have(monkeypatch):

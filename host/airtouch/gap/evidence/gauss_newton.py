@@ -12,7 +12,7 @@ from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
 from airtouch.gap.signatures.term import Term, mean_places
 
 ITERATIONS = 8  #: steps at most; chosen
-ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
+LEAST_STEP_GAIN = 0.02  #: nats that a step must gain for the fit to go on; chosen
 TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
 DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after one that failed; chosen
 FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: damping after the first step that failed, 0.1 but for its last bit; chosen
@@ -94,7 +94,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)
         gain = before - now.cost if gained else 0.0
-        if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
+        if gain < LEAST_STEP_GAIN and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
             break
         stuck = gain == 0.0
     return MeanFit(now.x, covariance, now.values)

@@ -70,14 +70,14 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
         solved = np.flatnonzero(free)
         if not len(solved):
             break
-        full = np.linalg.pinv(matrix[np.ix_(solved, solved)], hermitian=True)
+        inverse = np.linalg.pinv(matrix[np.ix_(solved, solved)], hermitian=True)
         damped = matrix[np.ix_(solved, solved)] + damping * np.diag(np.diag(matrix)[solved])
-        change[solved] = np.linalg.solve(damped, right[solved]) if damping else full @ right[solved]
+        change[solved] = np.linalg.solve(damped, right[solved]) if damping else inverse @ right[solved]
         stuck = np.zeros(len(right), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
             free_parameters = solved[solved < n]
-            covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
+            covariance[np.ix_(free_parameters, free_parameters)] = inverse[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck
     return change, covariance

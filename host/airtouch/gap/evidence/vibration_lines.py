@@ -125,7 +125,7 @@ class _Sample:
         self.two_sided_power = {h: widened(two_sided_power, h) for h in SPREADS_HZ}
 
     def gain(self, spread_hz: float, shift: int) -> float:
-        """Twice the log likelihood that lines of the best strength gain over none."""
+        """Log likelihood, without OVERLAP_WEIGHT, that lines of the best strength gain over none."""
         shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
         return _best_strength(self.over_floor, shape)[0]
 
@@ -145,7 +145,7 @@ def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
-    """Twice the log likelihood that lines of the best strength gain over none, and that strength (power).
+    """Nats, without OVERLAP_WEIGHT, that lines of the best strength gain over none, and that strength (power).
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
     scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
@@ -155,7 +155,7 @@ def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     tail, exponents, valid = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
-        """Twice the log likelihood of lines of a strength (power), but for a constant."""
+        """Log likelihood of lines of a strength (power), without OVERLAP_WEIGHT and but for a constant."""
         return -minus_log_likelihood(size, 1.0 + strength * flat, tail, exponents, valid)
 
     levels = [likelihood(s) for s in strengths]

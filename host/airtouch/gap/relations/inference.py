@@ -97,9 +97,8 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     singles = flight.single_effects()
     best, against = _likeliest(flight, singles, library)
     return Inference(
-        classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles), against=against, readings=_readings(best),
-        without_sign=tuple(f.of.effect for f in best.fits
-                           if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
+        classes=tuple(f.effect_class for f in best.fits), evidence=_by_effect(singles), against=against,
+        readings=_readings(best), without_sign=_without_sign(best))
 
 
 def _by_class(library: Library, numbers: np.ndarray) -> ByClass:
@@ -112,9 +111,17 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
 
     An effect of which several parameters act gives none: each was calibrated acting alone.
     """
-    count = Counter(f.of.effect for f in best.fits)
-    return {f.of.effect: read_out(f.of.readout, get(f.of.effect), f.strength)
-            for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
+    count = Counter(best.effect_names)
+    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
+    return {effect: read_out(readout, get(effect), strength)
+            for effect, readout, strength in classes if readout is not None and count[effect] == 1}
+
+
+def _without_sign(best: Hypothesis) -> tuple[str, ...]:
+    """The effects of a hypothesis whose strength does not tell their sign."""
+    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
+    return tuple(effect for effect, readout, strength in classes
+                 if readout is not None and not readout.shows_sign(strength))
 
 
 def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
@@ -138,9 +145,9 @@ def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: ByClass, lib
                    of_distance=True)
 
 
-def _largest(of: Hypothesis, shares: ByClass) -> float:
+def _largest(hypothesis: Hypothesis, shares: ByClass) -> float:
     """Largest share of the classes of a hypothesis, 0 for no class."""
-    return max((shares[f.of.name, f.of.shape] for f in of.fits), default=0.0)
+    return max((shares[f.effect_class.name, f.effect_class.shape] for f in hypothesis.fits), default=0.0)
 
 
 def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
@@ -208,7 +215,7 @@ def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
 
 def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
-    by_classes = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
+    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h
                   for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
     likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
@@ -227,5 +234,5 @@ def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
     """Evidence for each effect, the mean of its classes' likelihoods."""
     own: dict[str, list[float]] = {}
     for h in singles:
-        own.setdefault(h.fits[0].of.effect, []).append(h.evidence)
+        own.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
     return {name: float(logsumexp(v) - np.log(len(v))) for name, v in own.items()}
