@@ -54,11 +54,11 @@ def test_one_force_while_thrust_is_steady():
 
 @pytest.mark.parametrize("tilt", [UPPER_GUESS, 2.0 * UPPER_GUESS])
 def test_a_fit_tells_flapping_from_drag_by_its_moment_alone(study, tilt):
-    """The force acts above the centre of mass; in its middle flapping would gain what drag gains.
+    """The force acts above the centre of mass; in the centre itself flapping would gain what drag gains.
 
-    What part of a gap that is known exactly gains is its energy S over the floor, nats, with a standard deviation of
-    sqrt(2 S): both parts of white noise of variance 1 beside it. What two parts gain differs by 2 sqrt(S D) at most,
-    where D is the energy of their difference (Cauchy and Schwarz).
+    A part of the gap whose model is right gains the energy S that it has over the floor, nats; noise beside it moves
+    that by sqrt(2 S), one standard deviation. Two models of a gap of energy S gain alike but for 2 sqrt(S D), where D
+    is the energy of their difference (Cauchy and Schwarz).
     """
     data = Data(study, fly(1, {"blade_flapping": {"tilt": tilt}}, 32))
     blocks, problem = whole_of(data), problem_of(data, whole_of(data))
@@ -71,10 +71,10 @@ def test_a_fit_tells_flapping_from_drag_by_its_moment_alone(study, tilt):
         return OVERLAP_WEIGHT * float(np.sum(squared(ours - theirs) / problem.elements.power))
 
     (flapping,), (drag, *_) = candidates.terms("blade_flapping"), candidates.terms("rotor_drag")
-    in_the_middle = replace(flapping, values={**flapping.values, **NO_MOMENT})
+    in_the_centre = replace(flapping, values={**flapping.values, **NO_MOMENT})
     whole, push = {"blade_flapping": {"tilt": tilt}}, {"blade_flapping": {"tilt": tilt, **NO_MOMENT}}
     as_drag = {"rotor_drag": {"horizontal": tilt * WEIGHT}}
-    of_push, of_drag = gain(in_the_middle), gain(replace(drag, free=("horizontal",)))
+    of_push, of_drag = gain(in_the_centre), gain(replace(drag, free=("horizontal",)))
     assert min(of_push, of_drag) > LEAST_GAIN, "enough for a name"
     assert abs(of_push - of_drag) < 2.0 * np.sqrt(energy(whole) * energy(push, as_drag))
     moment = energy(whole, push)

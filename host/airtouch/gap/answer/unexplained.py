@@ -68,7 +68,10 @@ def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
 
 
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:
-    """Flights with their ratios (blocks,), NaN in blocks most of which is another phase; as they are where all are."""
+    """Flights with their ratios (blocks,), NaN in blocks of which most is another phase.
+
+    Where no block of any flight is mostly of the phase, all count.
+    """
     place = KINDS.index(phase)
     within = [(f, np.where(_commonest_phase(f) == place, ratio, np.nan)) for f, ratio in ratios]
     return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] or [(f, r) for f, r in ratios if len(r)]
