@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+import imu_flights
 from airtouch.gap import second_process
 from airtouch.gap.nominal import calibrate
 from gap_flights import VEHICLE, fly
@@ -23,3 +24,10 @@ def one_core():
 def study(tmp_path_factory):
     """A vehicle calibrated on five nominal flights."""
     return once(tmp_path_factory, "study", lambda: calibrate.calibrated(VEHICLE, fly(5, 41))[0])
+
+
+@pytest.fixture(scope="session")
+def study_apart(tmp_path_factory):
+    """A vehicle calibrated on three flights whose rotors turn at speeds of their own."""
+    return once(tmp_path_factory, "study_apart", lambda: calibrate.calibrated(
+        imu_flights.VEHICLE, imu_flights.fly(3, imu_flights.APART, seed=31))[0])

@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
-from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.controls import control, shrink_by_vehicle
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
@@ -152,7 +152,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(comparison.declared, judged, selection, result) if is_effect else {},
+        arms=shrink_by_vehicle(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),

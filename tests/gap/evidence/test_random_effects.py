@@ -1,4 +1,4 @@
-"""Noise and lines of the IMU: power in closed form and against simulated flights of other seeds, and their names."""
+"""Power that random effects add: in closed form, and against simulated flights of other seeds."""
 
 from dataclasses import replace
 
@@ -7,36 +7,17 @@ import pytest
 from scipy.signal import butter, get_window, lfilter, welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.evidence import random_effects, vibration_lines
+from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights import flight
-from airtouch.gap.naming.select import select
-from airtouch.gap.nominal import calibrate
 from airtouch.gap.signals.channels import FORCE, TORQUE
 from airtouch.gap.signals.spectra import AIR, LENGTH, REST, frequencies
-from airtouch.gap.signatures.candidates import all_candidates, terms
+from airtouch.gap.signatures.candidates import terms
 from airtouch.simulation.batch import flights as simulated
-from airtouch.simulation.effects import activate
 from airtouch.simulation.flight import prepare
-from gap_flights import LOOP
 from hovers import FLOOR, LIFT_N, PLACE, hover
+from imu_flights import APART, fly
 
 VEHICLE = vehicles.load()
-#: rotors that turn at speeds of their own, as real ones do: else their lines add up as their phases happen to stand
-APART = [("weak_motor", {"rotor": i, "thrust_loss": 0.01 * i}) for i in (1, 2, 3)]
-HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")
-
-
-def fly(count, effects=(), seed=0, vehicle=VEHICLE):
-    logs = simulated("diagnosis", count, vehicle=vehicle, effects=effects, seed=seed, workers=1)
-    return [flight.ready(replace(log, columns={k: v for k, v in log.columns.items() if k not in HIDDEN}), VEHICLE)
-            for log in logs]
-
-
-@pytest.fixture(scope="module")
-def study_apart():
-    return calibrate.calibrated(VEHICLE, fly(3, APART, seed=31))[0]
 
 
 def decibels(measured, expected):
@@ -157,46 +138,3 @@ def test_power_of_lines_is_that_of_simulated_flights(study_apart, amplitude):
         over = np.median(np.abs(b[AIR][:, 12:-1, :3]) ** 2 / (e[AIR] + study_apart.floor.power[AIR])[:, 12:-1, :3])
         assert 0.3 < over < 1.2  # the median of an exponential is 0.69: the power lies in the right bins
         assert np.all(e[REST] == 0.0)
-
-
-def select_from(study, flights, without=LOOP):
-    data = Data(study, flights)
-    selection = select(data, all_candidates(without))
-    return [s.name for s in selection.steps], {e.name: e.parameters for e in named_effects(data, selection)}, data
-
-
-@pytest.mark.parametrize(("amplitude", "seed"), [(0.3, 41), (3.0, 43)])
-def test_vibration_is_named_and_not_called_noise(study_apart, amplitude, seed):
-    effects = [("vibration", {"amplitude": amplitude, "gyro": 0.05}), *APART]
-    names, values, _ = select_from(study_apart, fly(1, effects, seed=seed))
-    assert names[0] == "vibration" and "imu_noise" not in names
-    assert values["vibration"]["amplitude"].value == pytest.approx(amplitude, rel=0.2)
-
-
-@pytest.mark.parametrize("seed", [44])
-def test_lines_that_lie_upon_each_other_are_vibration_too(study, seed):
-    """Rotors of one speed: how strong their lines are together depends on the flight, what they are does not."""
-    names, _, _ = select_from(study, fly(1, {"vibration": {"amplitude": 1.0, "gyro": 0.05}}, seed=seed))
-    assert names[0] == "vibration" and "imu_noise" not in names
-
-
-@pytest.mark.parametrize(("factor", "seed"), [(1.2, 51), (3.0, 53)])
-def test_noise_is_named_and_not_called_vibration(study, factor, seed):
-    names, values, _ = select_from(study, fly(1, {"imu_noise": {"factor": factor}}, seed=seed))
-    assert names[0] == "imu_noise" and "vibration" not in names
-    assert values["imu_noise"]["factor"].value == pytest.approx(factor, rel=0.2)
-
-
-def test_rotors_that_turn_at_another_speed_are_found_where_they_are(study):
-    """Thrust over speed squared is not declared: the fold lies anywhere."""
-    other = replace(VEHICLE, thrust_per_speed2=1.9e-8)
-    flights = fly(1, {"vibration": {"amplitude": 1.0, "gyro": 0.05}}, seed=46, vehicle=other)
-    names, _, data = select_from(study, flights)
-    assert names[0] == "vibration"
-    turns = [np.sqrt(VEHICLE.mass_kg * VEHICLE.gravity_mps2 / 4.0 / k) / (2.0 * np.pi) for k in (1.9e-8, 2.1e-8)]
-    assert vibration_lines.lines(data).shift * frequencies(AIR)[1] == pytest.approx(turns[0] - turns[1], abs=1.2)
-
-
-def test_effects_of_the_imu_alone_leave_still_flights_alone(study):
-    names, _, _ = select_from(study, fly(1, activate({}), seed=61), ())
-    assert not {"vibration", "imu_noise"} & set(names)

@@ -1,4 +1,4 @@
-"""Slopes of the spectra by effects of the loop, of which nothing is linear: against differences of the likelihood."""
+"""Slopes of the spectra: of a linear effect, its differences; of effects of the loop, those of the likelihood."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,12 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.least_squares import limits
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
+from airtouch.gap.evidence.slopes import FAR, SpectraSlopes, active_at
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import fly
+from hovers import FLOOR, hover
 
-LAG, MASS = terms("motor_lag")[0], terms("mass")[0]
+LAG, MASS, BIAS = (terms(name)[0] for name in ("motor_lag", "mass", "imu_bias"))
 MEAN = [LAG, MASS]
 AT = np.array([*np.full(len(LAG.free), 1.0), 0.3])
 
@@ -55,20 +56,48 @@ def test_slopes_of_the_loop_are_taken_anew_wherever_the_fit_stands(slopes):
     np.testing.assert_array_equal(slopes.at, AT)
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, wide):
+@pytest.mark.parametrize("uncertain_floor", [False, True])
+def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, uncertain_floor):
     """The gap stays as it is: only the power that is expected of it changes."""
     values = problem.values(active_at(MEAN, AT))
 
     def level(x):
-        power, cost = problem.loop_power(active_at(MEAN, x), wide)
+        power, cost = problem.loop_power(active_at(MEAN, x), uncertain_floor)
         return problem.likelihood(values, power) - cost
 
-    added, _ = problem.loop_power(active_at(MEAN, AT), wide)
-    gradient, information = slopes.power_equations(AT, values, added, wide)
+    added, _ = problem.loop_power(active_at(MEAN, AT), uncertain_floor)
+    gradient, information = slopes.power_equations(AT, values, added, uncertain_floor)
     for i in range(len(AT)):
         expected = central(level, i)
         assert gradient[i] == pytest.approx(expected, rel=0.03)
     assert abs(central(level, 0)) > 1.0
     np.testing.assert_allclose(information, information.T, rtol=1e-9)
     assert np.linalg.eigvalsh(information).min() > -1e-9 * information.max()
+
+
+@pytest.fixture(scope="module")
+def still():
+    """A hover without a loop."""
+    data = Data(FLOOR, [hover(1, length_s=12.0)])
+    return problem_of(data, whole_of(data))
+
+
+def test_slopes_of_a_linear_effect_are_its_differences(still):
+    slopes = SpectraSlopes(still, [BIAS], limits([BIAS])[1])
+    x = np.zeros(len(BIAS.free))
+    slopes.take(x)
+    for i, column in enumerate(slopes.columns):
+        one = x.copy()
+        one[i] = 1.0
+        change = still.values(active_at([BIAS], one)) - still.values(active_at([BIAS], x))
+        np.testing.assert_allclose(column, change, atol=1e-6 * np.abs(change).max())
+    assert not slopes.nonlinear.any() and not np.array(slopes.torque_powers).any()
+
+
+def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(still):
+    slopes = SpectraSlopes(still, [BIAS], limits([BIAS])[1])
+    slopes.take(np.zeros(len(BIAS.free)))
+    for moved, anew in ((0.9 * FAR, False), (1.1 * FAR, True)):
+        before = slopes.columns[0]
+        slopes.take(np.full(len(BIAS.free), moved))
+        assert (slopes.columns[0] is not before) is anew and np.all(slopes.at == moved * anew)

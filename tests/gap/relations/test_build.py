@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.features.feature_space import Standard, directions
+from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations.build import CLEAR_NAMELESS, PairedFlights, Whitening, _beyond_noise, _scatter_of_nameless
 from airtouch.gap.relations.learning import drawings
 
@@ -42,12 +42,3 @@ def test_effects_of_a_pair_are_of_the_upper_half_of_their_strengths():
     paired = PairedFlights(drawing, none, none, none, (0.001, 0.1))
     strengths = [paired.draw_strong(np.random.default_rng(i)).values["fraction"] for i in range(200)]
     assert 0.01 <= min(strengths) < 0.011 and 0.09 < max(strengths) <= 0.1
-
-
-def test_directions_hold_the_shifts_of_every_class_whatever_their_length():
-    rng = np.random.default_rng(4)
-    nameless = 50.0 * rng.normal(size=(100, 1)) * np.eye(8)[0]
-    strong, weak = (s * rng.normal(size=(100, 1)) * np.eye(8)[i] for s, i in ((1000.0, 1), (10.0, 2)))
-    axes = directions([strong, weak], 1, nameless, 1)
-    assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.norm(axes, axis=1) == pytest.approx([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)

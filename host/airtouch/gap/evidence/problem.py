@@ -60,25 +60,25 @@ class Problem:
         if replayed:
             replay_values = flat.layout.gather(gap_spectra(self.data, replayed, flat.layout.flights))
         command_values = flat.commands.values_without([a for a in active if not a.gate])
-        return np.where(flat.elements.known, flat.joined(replay_values, command_values), 0.0)
+        return np.where(flat.elements.valid, flat.joined(replay_values, command_values), 0.0)
 
-    def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
+    def modelled(self, terms: Sequence[Term], uncertain_floor: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: the gap (n,) with its mean effects, the power (n,) that it adds, and nats that its floor costs.
 
-        wide: the commands' floor is as uncertain as under random effects, though there are none.
+        uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
         """
         random = random_of(terms)
         mean = [t.active() for t in mean_of(terms)]
-        command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
+        command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], uncertain_floor or bool(random))
         return self.values(mean), self.random_power(random) + command_power, cost
 
-    def loop_power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+    def loop_power(self, active: Sequence[Active], uncertain_floor: bool = False) -> tuple[np.ndarray, float]:
         """Power (n,) that effects of the loop add to the floors of torque and commands, and nats that this costs.
 
-        wide: as in `modelled`.
+        uncertain_floor: as in `modelled`.
         """
         commands = self.flat.commands
-        power, cost = commands.power([a for a in active if not a.gate], wide)
+        power, cost = commands.power([a for a in active if not a.gate], uncertain_floor)
         return np.concatenate([self.torque_power(active), power - commands.elements.floor]), cost
 
     def torque_power(self, active: Sequence[Active]) -> np.ndarray:

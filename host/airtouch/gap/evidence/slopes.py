@@ -54,14 +54,15 @@ class SpectraSlopes:
             self.nonlinear[i] = loops_differ(self.problem.data, before, after)
         self.at = x.copy() if anew else self.at
 
-    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
-                 ) -> tuple[np.ndarray, np.ndarray]:
+    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, uncertain_floor: bool,
+                        ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
-        values, added: the gap, and the power over the floor, flattened.
+        values, added: the gap, and the power over the floor, flattened; uncertain_floor: as in `Problem.modelled`.
         """
         problem = self.problem
-        gradient, information = problem.flat.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
+        active, rises = active_at(self.mean, x), np.array(self.rises)
+        gradient, information = problem.flat.commands.slopes(active, rises, uncertain_floor)
         powers = np.array(self.torque_powers)
         if powers.any():
             slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),

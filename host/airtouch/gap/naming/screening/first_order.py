@@ -115,7 +115,7 @@ def shows(data: Data, term: Term) -> bool:
 def column(data: Data, problem: Problem, term: Term, i: int) -> np.ndarray:
     """Change (n,) of the flattened spectra of a problem per scaled parameter i of a term at neutral."""
     gathered = problem.flat.layout.gather(_change(data, term, i))
-    return np.where(problem.elements.known, problem.flat.joined(gathered), 0.0)
+    return np.where(problem.elements.valid, problem.flat.joined(gathered), 0.0)
 
 
 def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
