@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import control, shrink_by_vehicle
@@ -16,6 +14,7 @@ from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import gap_closure
@@ -186,7 +185,7 @@ def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
     """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
     seconds = sum(len(f) for f in flights) * PERIOD_S
     keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
-    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
+    return evenly_spaced(flights, keep)
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:

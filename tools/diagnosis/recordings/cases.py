@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from airtouch.detector.evaluation.data.dataset import collect
-from airtouch.detector.evaluation.data.folds import BUILD_FOLDS, still_air
+from airtouch.detector.evaluation.data.folds import BUILD_DAYS, BUILD_FOLDS, still_air
 
 from . import peers as peer_flights
 from . import swarm_cuts
@@ -19,7 +19,6 @@ from .crazypad.labels import baseline, building, family, manifest
 OTHERS = 5  #: most baseline flights of one; as tools/calibration/nominal_scatter.py, whose table the diagnosis uses
 PER_GROUP = 4  #: flights tested of a day and condition; no source: enough for a count, few enough for time
 LEAST_GROUP = 3  #: nominal flights of a group, for each to have two others
-BUILD_DAYS = ("19", "20")  #: neural-swarm's days of the part "build" (host/docs/looks.md)
 
 
 @dataclass(frozen=True)

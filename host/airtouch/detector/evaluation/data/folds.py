@@ -9,6 +9,7 @@ Folds = dict[int, list[FlightFile]]
 GROUPS_OF_DAYS = 5  #: as many as the manifest has folds
 #: folds of the authors' flights on which settings are chosen; each look at the others is in host/docs/looks.md
 BUILD_FOLDS = (0, 1, 2)
+BUILD_DAYS = ("19", "20")  #: neural-swarm's days on which settings are chosen, as its manifest names them
 
 
 def by_fold(files: Sequence[FlightFile]) -> Folds:
