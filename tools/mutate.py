@@ -5,7 +5,8 @@
 
 A group is a few modules and the tests that are there for them. mutmut works on a copy in build/mutate, where what is
 done is not done again; `--force` begins anew. A sample is drawn by a seed from all mutants; without one each is
-run. Needs `pip install airtouch[mutate]`.
+run. Each mutant runs those of its group's tests that reach it, until one fails: a sample of 60 does so
+sixty times. Needs `pip install airtouch[mutate]`.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from airtouch.gap.sealed.intervals import wilson
 
 ROOT = Path(__file__).parents[1]  #: of the checkout
 BUILD = ROOT / "build" / "mutate"  #: where mutated copies lie
-LEAST = 0.85  #: share of the mutants that tests must notice; no source: round number
+LEAST = 0.85  #: fraction of the mutants that tests must notice; no source: round number
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def results(place: Path) -> dict[str, int | None]:
 
 
 def table(codes: dict[str, int | None]) -> float:
-    """Print a line for each module and one for all. Returns the share of all that is noticed."""
+    """Print a line for each module and one for all. Returns the fraction of all that is noticed."""
     by_module: dict[str, Counter] = {}
     for mutant, code in codes.items():
         if code is not None:
@@ -125,7 +126,7 @@ def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run or show the mutants of the groups; the exit code is 1 if a group's share noticed is below LEAST."""
+    """Run or show the mutants of the groups; 1 where the fraction noticed of one is below LEAST."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
     parser.add_argument("--sample", type=int, help="mutants of each group")

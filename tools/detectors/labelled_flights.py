@@ -6,8 +6,12 @@
 
 Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
 other groups, and a network trained on the same K alone. Prints a Markdown table: means over all draws and seeds, 95 %
-intervals by bootstrap over flights, and missed edges by height. --help explains the options. host/docs/twin.md has the
-table of the authors' flights, host/docs/results.md that of another month.
+intervals by bootstrap over flights, and missed edges by height. host/docs/twin.md has the table of the authors'
+flights, host/docs/results.md that of another month.
+
+By default it trains `best` 160 times: two groups, four K, five draws and two seeds, each once with 300 steps from
+--start and once with 1,000 alone. With --twin the former have 2,500 steps, with --beside 400 (`adapt.STEPS`). What
+--out holds is not trained again, so a run that was ended goes on.
 """
 
 import argparse

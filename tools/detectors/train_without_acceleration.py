@@ -7,6 +7,8 @@ The twin's edges are laid over the flights' free air as `airtouch adapt` does, b
 long as the recorded ones: a detector of recorded passes alone misses shorter ones of another month. Acceleration is
 left out of all flights; recorded and simulated flights have half of the crops each. --hold-out: not trained on the
 flights of this fold of the manifest, for a cross-validation, whose figures are in host/docs/results.md.
+
+One training of 2,500 steps (`adapt.STEPS`), after the twin's flights are simulated.
 """
 
 import argparse

@@ -3,8 +3,9 @@
     python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
         [--detector best] [--without none --without ground_effect ...]
 
-A row that is in --out already, for the same flights, settings and simulator sources, is not done again.
-Prints the table of host/docs/simulation-checks.md.
+By default 24 trainings, `best` and `paper` with all effects and with each of the scenario's eleven off. A row that is
+in --out already, for the same flights, settings and simulator sources, is not done again. Prints the table of
+host/docs/simulation-checks.md.
 """
 
 import argparse
