@@ -17,6 +17,7 @@ import time
 from importlib import resources
 from pathlib import Path
 
+from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.nominal.kept_scatter import VARIABLE
 
@@ -53,7 +54,7 @@ def main() -> None:
         print("warming up: the first time compiles", file=sys.stderr, flush=True)
         seconds(free, out, cache_folder)
         rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
-                  for _ in range(runs)]
+                  for _ in with_bar(range(runs), "runs")]
     for row in rows:
         column = [times[row] for times in rounds]
         print(f"{row}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")

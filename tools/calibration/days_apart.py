@@ -58,8 +58,8 @@ def main() -> None:
     days = read_days(options.folders)
     large = {day: flights for day, flights in sorted(days.items()) if len(flights) >= options.fewest}
     if len(large) < 2:
-        raise SystemExit(f"two days with {options.fewest} flights or more are needed, here: " +
-                         (", ".join(f"{day} {len(flights)}" for day, flights in sorted(days.items())) or "none"))
+        raise AirTouchError(f"two days with {options.fewest} flights or more are needed, see --fewest; here: " +
+                            (", ".join(f"{day} {len(flights)}" for day, flights in sorted(days.items())) or "none"))
     print(f"| | flights | {' | '.join(PHASES)} |\n|---|---|{'---|' * len(PHASES)}", flush=True)
     pooled = [flight for flights in days.values() for flight in flights]
     order = np.random.default_rng(0).permutation(len(pooled))

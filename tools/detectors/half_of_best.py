@@ -14,6 +14,7 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.cli.shared.flights import check_data_set, data_folder
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
 from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.evaluation.data.folds import BUILD_FOLDS
@@ -48,7 +49,7 @@ def main() -> None:
     folder = parser.parse_args().folder
     check_data_set(folder)
     halves, headings = [], []
-    for file in (f for f in collect([folder]) if f.condition.fold in BUILD_FOLDS):
+    for file in with_bar([f for f in collect([folder]) if f.condition.fold in BUILD_FOLDS], "flights"):
         log = logs.read(file.path)
         edges = best.run(log).edges
         halves.append(same(edges, best.run(without_first_sample(log)).edges, 1))

@@ -148,16 +148,13 @@ def main() -> None:
 
 
 def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
-    """Logs and courses by class of height. Ends the program where a flight is not usable."""
+    """Logs and courses by class of height. Raises AirTouchError where a flight is not usable."""
     usable, left_out = adapt_report.readable(listed)
     if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
+        raise AirTouchError(left_out[0][1])
     groups: Groups = {name: [] for name in CLASSES}
     for flight in usable:
-        try:
-            path = course(flight.log, SPEED_MPS)
-        except AirTouchError as error:
-            raise SystemExit(str(error)) from None
+        path = course(flight.log, SPEED_MPS)
         name = height_class(path.clearance_m)
         if name:
             groups[name].append((flight.log, path))

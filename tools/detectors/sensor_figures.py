@@ -47,7 +47,7 @@ def main() -> None:
         parser.error(f"{odd[0]} is not NAME=JSON=WHERE")
     content = {name: figures(Path(path), where) for name, path, where in (pair.split("=") for pair in options.pairs)}
     if set(content) != {"all", *sensors.SENSORS}:
-        raise SystemExit(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
+        raise AirTouchError(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
     write_bytes((json.dumps(content, indent=1) + "\n").encode(), options.out, force=True)
     print(f"written: {options.out}")
 

@@ -28,6 +28,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch.cli.shared.flights import check_data_set
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector.evaluation.data.folds import BUILD_DAYS
 from airtouch.errors import in_one_line
 from recordings import swarm_cuts
@@ -55,7 +56,7 @@ def main() -> None:
     folder = options.flights / "neuralswarm"
     all_days = options.part == "all" and not options.false_alarms
     rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in BUILD_DAYS]
-    tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
+    tracks = [track(folder, r) for r in with_bar([r for r in rows if r.get("truth") != "ground_effect"], "tracks")]
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)
     else:

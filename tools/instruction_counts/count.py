@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.detector import best
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.errors import in_one_line
@@ -110,6 +111,8 @@ def main() -> None:
     parser.add_argument("--flights", type=Path, metavar="FOLDER", help="count over its clean flights too")
     parser.add_argument("--toml", action="store_true", help="print limits for budget.toml instead of the table")
     options = parser.parse_args()
+    if options.flights:
+        check_data_set(options.flights)
     code = FlightCode(compile_flight_code(options.core, optimise=options.optimise, compiler=options.compiler))
     costs = measure(code)
     if options.toml:
