@@ -163,6 +163,8 @@ def main() -> int:
     parser.add_argument("--shapes", type=int, help="hostile files of this length instead of mutated ones")
     parser.add_argument("--only", type=int, help="one input, with its traceback; its bytes go to out/fuzzed.log")
     options = parser.parse_args()
+    if options.only is not None and len(options.format or ()) != 1:
+        parser.error("--only is a number of one format: give that with --format")
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
     with tempfile.TemporaryDirectory() as folder:
         if options.only is not None:

@@ -18,6 +18,7 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from airtouch.cli.shared.flights import data_folder
@@ -136,10 +137,14 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     if unknown := set(args.groups) - set(GROUPS):
         parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
+    if not args.show and find_spec("mutmut") is None:
+        parser.error("mutmut is not installed: pip install 'airtouch[mutate]', or run it by make mutate")
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:
-            print_mutants(BUILD / name, results(BUILD / name))
+            if not (codes := results(BUILD / name)):
+                parser.error(f"no mutants of {name} yet: leave out --show first")
+            print_mutants(BUILD / name, codes)
             continue
         place = stage(name, args.force)
         if args.sample:

@@ -66,7 +66,11 @@ def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
     if not store.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
-        over, before = zip(*filter(None, map(pieces, evenly_spaced(close, MOST_PASSES))), strict=True)
+        cuts = [pair for pair in map(pieces, evenly_spaced(close, MOST_PASSES)) if pair is not None]
+        if not cuts:
+            raise AirTouchError(f"{len(close)} flights have the height `low` in the manifest, none with a platform and "
+                                "the free air before it: give other folds with --groups")
+        over, before = zip(*cuts, strict=True)
         craft = vehicle.load(VEHICLE)
         whole, near = diagnose(evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
         calibration = near.calibrated[1] if near.calibrated else None

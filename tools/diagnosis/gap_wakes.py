@@ -46,16 +46,18 @@ def main() -> None:
     parser.add_argument("--part", choices=("build", "all"), default="build",
                         help="days 19 and 20, or all days (default %(default)s)")
     parser.add_argument("--answers", type=Path, help="what `gap_real.py --keep` wrote")
-    parser.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
-    parser.add_argument("--without-seconds", action="store_true", help="what a test without the seconds sees")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
+    instead.add_argument("--without-seconds", action="store_true", help="what a test without the seconds sees")
     options = parser.parse_args()
+    if (options.false_alarms or options.without_seconds) and (options.part == "all" or options.answers):
+        parser.error("--part all and --answers are of the test that knows the seconds: leave them out")
     check_data_set(options.flights / "neuralswarm")
     if options.without_seconds:
         show_without_seconds(options.flights)
         return
     folder = options.flights / "neuralswarm"
-    all_days = options.part == "all" and not options.false_alarms
-    rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in BUILD_DAYS]
+    rows = [r for r in swarm_cuts.cuts(folder) if options.part == "all" or r["day"] in BUILD_DAYS]
     tracks = [track(folder, r) for r in with_bar([r for r in rows if r.get("truth") != "ground_effect"], "tracks")]
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)
