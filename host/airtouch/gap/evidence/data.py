@@ -65,7 +65,8 @@ class Data:
     @cached_property
     def bridging(self) -> list[np.ndarray]:
         """Power (blocks, bins, COUNT) that lost rows add in the air, by flight, unit^2/Hz."""
-        study, quiet = self.study, self.quiet or [None for _ in self.flights]
+        study = self.study
+        quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         return [bridging_power(f, study.vehicle, study.calibration, first[AIR], where, study.response)
                 for f, first, where in zip(self.flights, self.first, quiet, strict=True)]
 
