@@ -1,6 +1,9 @@
-"""Prints benchmarks against the peers, each in the same run: `make bench`.
+"""Prints how long kernels, detectors and networks take beside their peers, each pair in the same run.
+
+    python tools/bench.py [--flights 20] [--train]    # 2 to 3 min without --train; `make bench` runs it too
 
 Every pair is timed in turn (A B A B ...), after one warm-up; the ratio is the median of the pairs'.
+host/docs/ablations.md has the figures.
 """
 
 import argparse
@@ -126,7 +129,7 @@ def row_of_peers(table: Table, name: str, ours: Callable[[], object], tflite: by
         row(table, name, a / computed, b / len(q), ratio * computed / len(q), peer, f"n = {computed} and {len(q)}")
 
 
-def micro(content: bytes) -> Callable | None:
+def micro(content: bytes) -> Callable:
     """tflite-micro's interpreter as a function."""
     from tflite_micro.python.tflite_micro import runtime
 
@@ -174,7 +177,7 @@ def row(table: Table, name: str, ours: float, peer: float, ratio: float, what: s
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=20, help="how many (default 20)")
     parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
     options = parser.parse_args()

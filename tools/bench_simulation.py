@@ -1,6 +1,6 @@
 """Prints simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
-    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
+    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]    # a minute
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.

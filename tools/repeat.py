@@ -4,9 +4,9 @@
     python tools/repeat.py tests/sitl --times 200
     nice -n 10 python tools/repeat.py tests/crazyflie/connection/test_log_blocks.py -k refuses
 
-Best on a machine that is busy with other work. Each test is repeated before the next one begins; fixtures of a module
-or of the session are made once. Prints for each test how often it passed and failed; what the failures printed is kept
-in build/repeat. Exit code 1 when anything failed.
+It takes as long as the tests, times the repetitions. Best on a machine that is busy with other work. Each test is
+repeated before the next one begins; fixtures of a module or of the session are made once. Prints for each test how
+often it passed and failed; what the failures printed is kept in build/repeat. Exit code 1 when anything failed.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Measures how strong every effect seems to be in nominal flights, for gap/signatures/nominal_scatter.toml.
 
-    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]
+    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]    # hours
 
 Every nominal flight is compared twice with up to five others of its vehicle, on which the vehicle is calibrated: with
 flights of its own group (drone, day and condition), and with flights of other groups of the same drone. Strengths of
@@ -33,6 +33,8 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set, data_folder
+from airtouch.detector.evaluation.data.dataset import collect
+from airtouch.detector.evaluation.data.folds import BUILD_FOLDS, still_air
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight, ready_flights
@@ -54,7 +56,7 @@ SIMULATED = 4  #: groups of simulated flights; no source: round number
 #: scenarios that draw each flight's rotors and battery, one group each of so many flights; no source: of the shipped
 #: ones those least alike
 OWN_TRIM, OWN_TRIM_FLIGHTS = ("paper-low", "paper-9cm", "paper-mixed", "steps"), 6
-BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
+BUILD_DAYS = ("19", "20")  #: of neural-swarm, on which numbers may be chosen (host/docs/looks.md)
 #: a log's name, and a function that reads it, which can be sent to a worker process
 Log = tuple[str, Callable[[], FlightLog]]
 
@@ -88,14 +90,11 @@ def pool_of(jobs: int) -> ProcessPoolExecutor:
 
 def nominal_groups(folder: Path) -> Iterator[Group]:
     """The groups of nominal flights, recorded and simulated."""
-    by_group = defaultdict(list)
-    for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
-        if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in BUILD_FOLDS:
-            log = _read(folder / "airtouch" / r["file"])
-            by_group[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
     vehicle = vehicles.load("crazyflie-2.1-flow")
-    for key, files in by_group.items():
-        yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle, files)
+    build = [file for file in collect([folder / "airtouch"]) if file.condition.fold in BUILD_FOLDS]
+    for key, alike in still_air(build).items():
+        yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle,
+                    [_read(file.path) for file in alike])
     swarm = folder / "neuralswarm"
     by_group = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):
@@ -111,8 +110,8 @@ def nominal_groups(folder: Path) -> Iterator[Group]:
                                      for i, log in enumerate(logs)]
         yield Group(scatter_estimates.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs)
     for scene in OWN_TRIM:
-        every = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
-        logs = [sealed.stripped(log) for log in every if isinstance(log, FlightLog)]
+        flown = simulated(scene, OWN_TRIM_FLIGHTS, vehicle=vehicle, workers=1)
+        logs = [sealed.stripped(log) for log in flown if isinstance(log, FlightLog)]
         named_logs: list[Log] = [(f"{scene} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
         yield Group(scatter_estimates.OWN_TRIM, scene, scene, vehicle, named_logs)
 
@@ -129,7 +128,7 @@ def _read(path: Path) -> Log:
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
              look: Callable[[Data], ApparentStrengths] = apparent_strengths) -> Iterator[tuple[str, ApparentStrengths]]:
-    """Each flight against others of its group, or against those given, as `look` sees it."""
+    """(Name, `look` at it) of each flight, against others of its group or against `others`."""
     ready = _ready(logs, vehicle)
     if others is not None:
         base = [f for _, f in _ready(_evenly_spaced(others), vehicle)]

@@ -1,7 +1,7 @@
 """Chooses the `best` detector's decoder settings from cross-validated models.
 
     airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
-    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...
+    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...    # a minute a folder of 87 flights
 
 Each flight is decoded from the logits of the model that never saw it, once for each folder; with --silence SENSOR from
 the log without that sensor. Prints the settings that are best over all folds, and an honest figure for choosing them:

@@ -84,7 +84,7 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--start", type=Path, action="append", default=[],
                         help="model to go on from, one for all groups or one for each in their order, which knows no "
                              "flight of its group; the rows without it if left out")

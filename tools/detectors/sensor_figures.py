@@ -6,8 +6,9 @@
     python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
         rates=out/rates.json=folds acceleration=out/november.json="another month"
 
-`out/folds` and `out/any` are what `airtouch crossval` kept, the second with --any-sensor. All figures are of flights
-that neither the weights nor the decoder's settings have seen; the text after the second = says which.
+The last command only reads files. `out/folds` and `out/any` are what `airtouch crossval` kept, the second with
+--any-sensor. All figures are of flights that neither the weights nor the decoder's settings have seen; the text after
+the second = says which.
 """
 
 import argparse

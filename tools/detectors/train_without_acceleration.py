@@ -48,7 +48,7 @@ def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightL
 def main() -> None:
     """Read, train, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights with edges")
     parser.add_argument("--twin", type=Path, required=True, help="folder of `airtouch twin`")
     parser.add_argument("--free-air", type=Path, action="append", default=[], help="folder of flights without edges")
     parser.add_argument("--hold-out", type=int, metavar="FOLD", help="train on no flight of this fold")

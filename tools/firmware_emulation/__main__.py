@@ -5,6 +5,8 @@
     python -m tools.firmware_emulation ~/crazyflie-firmware --fly       # its stabilizer flies the simulator's drone
     python -m tools.firmware_emulation ~/crazyflie-firmware --gap8      # with the network on the GAP8, and faults
     python -m tools.firmware_emulation ~/crazyflie-firmware --height    # with and without the height over a platform
+
+It compiles for a minute; 24 s of a recorded flight then take 2 s.
 """
 
 import argparse

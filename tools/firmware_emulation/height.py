@@ -93,8 +93,8 @@ def delays(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float,
     """Seconds by which reports follow their crossings (s, kind): of the same kind, one to one, within MOST_DELAY_S."""
     late = []
     for kind in ("entry", "exit"):
-        true, felt = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
-        late += [felt[j] - true[i] for i, j in match(true, felt, MOST_DELAY_S)]
+        true, detected = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
+        late += [detected[j] - true[i] for i, j in match(true, detected, MOST_DELAY_S)]
     return np.array(late)
 
 

@@ -1,7 +1,7 @@
 """Prints instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
 
-    python -m tools.instruction_counts.count                        the table, beside its budget
-    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there)
+    python -m tools.instruction_counts.count                        the table, beside its budget; 16 s
+    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too; 2 min
     python -m tools.instruction_counts.count --optimise=-Os         as the Crazyflie firmware compiles by default
     python -m tools.instruction_counts.count --toml                 limits for budget.toml beside this file, 3 % above
 
@@ -32,7 +32,7 @@ MARGIN = 1.03  #: a new budget over the measured cost
 
 
 def kernel_inputs(code: FlightCode, flight: np.ndarray) -> dict[str, np.ndarray]:
-    """What each kernel is given in a flight (n,) of edgeSample_t."""
+    """Input of each kernel in a flight (n,) of edgeSample_t."""
     events = code.fly("edge_pipeline", flight)
     channels = code.fly("motion_channels", flight).output
     first = best.load(None).int8.layers[0]
@@ -116,7 +116,7 @@ def main() -> None:
         _toml(options.core, costs)
         return
     chosen = options.compiler or compilers(options.core)[0]
-    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a made-up flight of 15 s")
+    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a synthetic flight of 15 s")
     _table(costs, budget.load(options.core) if options.core == "cortex-m4" and options.optimise == "-O2" else {})
     if options.flights:
         _flights(code, options.flights)

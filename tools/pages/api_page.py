@@ -1,6 +1,6 @@
-"""Write host/docs/api.md: every public function of `airtouch` and `airtouch.gap`, from its signature and docstring.
+"""Writes host/docs/api.md: every public function of `airtouch` and `airtouch.gap`, from its signature and docstring.
 
-    python tools/pages/api_page.py
+    python tools/pages/api_page.py    # under a second
 """
 
 import argparse

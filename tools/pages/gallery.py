@@ -1,9 +1,10 @@
-"""Pictures of the gallery page (host/docs/gallery.md), from simulated flights and from reports that exist.
+"""Draws the pictures of the gallery page (host/docs/gallery.md), from simulated flights and from reports that exist.
 
     airtouch gap demo; airtouch demo --force; python tools/pages/gallery.py
 
-Flights are simulated with fixed seeds. Reports are photographed in Chromium at 1,280 and 390 pixels; without a browser
-or a report those pictures stay as they are, and the tool says so.
+The three take four minutes, the last of them under one. Flights are simulated with fixed seeds. Reports are
+photographed in Chromium at 1,280 and 390 pixels; without a browser or a report those pictures stay as they are, and the
+tool says so.
 """
 
 import argparse
@@ -80,7 +81,7 @@ def zig_zag_map() -> bytes:
 
 
 def virtual_errors(count: int = 20) -> bytes:
-    """PNG: share of edges found within a distance, three detectors, `count` flights of paper-low."""
+    """PNG: fraction of edges detected within a distance, three detectors, `count` flights of paper-low."""
     flights = at.simulate("paper-low", count, seed=1)
     scores = {}
     for name, module in (("best", best), ("paper", paper), ("baseline", baseline)):

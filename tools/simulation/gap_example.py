@@ -1,6 +1,6 @@
 """Makes the flights of `airtouch gap demo`: four nominal ones, and one with an effect that its file does not name.
 
-    python tools/simulation/gap_example.py [FOLDER]    # seconds; the package's own example by default
+    python tools/simulation/gap_example.py [FOLDER]    # 3 s; the package's own example by default
 """
 
 import argparse

@@ -36,7 +36,7 @@ def test_none_asks_for_nothing_to_be_added():
 @pytest.mark.parametrize("phase", sorted(MISSIONS))
 def test_an_open_gap_is_flown_again_in_its_phase(phase):
     again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))
-    assert again.command == collect(MISSIONS[phase]) and "--effects-file" in own.command
+    assert again.command == collect(MISSIONS[phase]) and "--effect-file" in own.command
 
 
 def test_an_open_gap_at_landing_is_flown_again_as_it_was():
