@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.ranking import AT_FLOOR, TOLD_APART, alike_of, ranking_of, verdict_of
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
-from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR

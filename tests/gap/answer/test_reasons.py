@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.evidence.cells import REST_VIEW, cell_numbers
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
@@ -17,7 +18,7 @@ from airtouch.gap.naming.records import (
     TakenBack,
 )
 from airtouch.gap.naming.unknown import is_explained
-from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
+from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.signals.channels import COLUMN
 from hovers import FLOOR
 

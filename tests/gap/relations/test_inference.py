@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
@@ -149,7 +150,7 @@ def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
 def test_probabilities_are_those_of_half_the_evidence():
     """Tails are heavier than normal ones; what has the least evidence of an effect is as likely as none."""
     evidence = {"mass": inference.LEAST_EVIDENCE, "wind": inference.LEAST_EVIDENCE - 4.0}
-    chance = inference.Inference((), evidence, inference.Against(0.0, 1.0, False)).probabilities()
+    chance = inference.Inference((), evidence, Against(0.0, 1.0, False)).probabilities()
     assert chance["mass"] == pytest.approx(chance["none"])
     assert chance["wind"] == pytest.approx(chance["mass"] * np.exp(-2.0))
 

@@ -37,7 +37,7 @@ LEAST_CURVATURE = 1e-6  #: nats, curvature in the logarithm of a strength, by wh
 CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelihood's curvature is taken; chosen
 
 
-@dataclass
+@dataclass(frozen=True)
 class FittedTerms:
     """A hypothesis fitted.
 
@@ -75,7 +75,8 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     random_power: np.ndarray | float = 0.0
     # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
-        random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
+        random = _with_strengths(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
+        random_power = problem.random_power(random)
     last_level = -np.inf
     for _ in range(1 if brief else TURNS):
         posterior = Posterior(problem, mean, random_power, prior, uncertain_floor=bool(random))
@@ -83,9 +84,9 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             break
-        command_power, floor_cost = problem.loop_power(active, uncertain_floor=True)
-        random_power = _random_power(problem, random, solution.values, active)
-        level = problem.likelihood(solution.values, random_power + command_power) - floor_cost
+        random = _with_strengths(problem, random, solution.values, active)
+        random_power, of_loop = problem.random_power(random), problem.loop_power(active, uncertain_floor=True)
+        level = problem.likelihood(solution.values, random_power + of_loop.power) - of_loop.cost
         if not mean or level < last_level + SETTLED:
             break
         last_level = level
@@ -126,7 +127,7 @@ class LeftOver(NamedTuple):
 
     def log_likelihoods(self) -> np.ndarray:
         """Log likelihood (n,) of each value, without the cost."""
-        return self.problem.likelihood.per_value(self.gap, self.power - self.problem.elements.power)
+        return self.problem.likelihood.per_value(self.gap, self.added)
 
 
 def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> LeftOver:
@@ -135,9 +136,9 @@ def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor
     uncertain_floor: see `judge`.
     """
     problem = problem_of(data, part)
-    values, added, floor_cost = problem.modelled(terms, uncertain_floor)
-    gap, offset_cost = without_offsets(problem, values, added)
-    return LeftOver(problem, gap, added, offset_cost + floor_cost)
+    modelled = problem.modelled(terms, uncertain_floor)
+    gap, offset_cost = without_offsets(problem, modelled.gap, modelled.added)
+    return LeftOver(problem, gap, modelled.added, offset_cost + modelled.cost)
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
@@ -147,20 +148,18 @@ def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     return np.bincount(without.problem.flat.cells, gains, CELLS)
 
 
-def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
-    """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
-    command_power, _ = problem.loop_power(mean, uncertain_floor=True)
-    for _ in range(STRENGTH_ROUNDS if len(random) > 1 else 1):
-        for i in range(len(random)):
-            random[i] = _strength(problem, random, i, values, command_power)
-    return problem.random_power(random)
+def _with_strengths(problem: Problem, random: Sequence[Term], values: np.ndarray, mean: Sequence[Active],
+                    ) -> list[Term]:
+    """Random effects with their strengths of highest likelihood, fitted one after another, the others as they are.
 
-
-def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray,
-              command_power: np.ndarray) -> Term:
-    """A random effect's strength of highest likelihood, the others as they are."""
-    other_power = command_power + problem.random_power([t for i, t in enumerate(random) if i != which])
-    return strongest(problem, random[which], values, other_power)
+    values (n,): the gap under the mean effects `mean`.
+    """
+    fitted, loop_power = list(random), problem.loop_power(mean, uncertain_floor=True).power
+    for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
+        for i, term in enumerate(fitted):
+            others = loop_power + problem.random_power([*fitted[:i], *fitted[i + 1:]])
+            fitted[i] = strongest(problem, term, values, others)
+    return fitted
 
 
 def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.ndarray) -> Term:

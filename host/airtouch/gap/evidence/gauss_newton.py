@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
+from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
 from airtouch.gap.signatures.term import Term, mean_places
 
 ITERATIONS = 8  #: steps at most; chosen
@@ -61,10 +61,10 @@ class Posterior:
         values = self.problem.values(active) if self.mean else self.problem.elements.base.copy()
         for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[places] -= amount * column
-        command_power, floor_cost = self.problem.loop_power(active, self.uncertain_floor)
-        power = self.added + command_power
+        of_loop = self.problem.loop_power(active, self.uncertain_floor)
+        power = self.added + of_loop.power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
-        return _State(x, offsets, values, power, floor_cost + (0.5 * away - self.problem.likelihood(values, power)))
+        return _State(x, offsets, values, power, of_loop.cost + (0.5 * away - self.problem.likelihood(values, power)))
 
 
 class _Step(NamedTuple):
@@ -88,9 +88,10 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
     if not mean and not problem.offsets:
         return MeanFit(x, covariance, problem.elements.base)
     now = posterior.at(x, offsets)
-    slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
+    slopes: SpectraSlopes | None = None
+    stuck, damping = False, 0.0
     for _ in range(most):
-        slopes.take(now.x, stuck)
+        slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)
         gain = before - now.cost if gained else 0.0
@@ -104,7 +105,7 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
           damping: float) -> _Step:
     """A step, shortened until it gains, TRIES times at most."""
     problem, size = posterior.problem, len(now.x)
-    equations = normal_equations(slopes.columns, posterior.prior, now.values,
+    equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior, now.values,
                                  weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
                                  problem.offsets)
     equations = equations.with_power(*slopes.power_equations(now.x, now.values, now.power, posterior.uncertain_floor))
@@ -138,8 +139,8 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, place: 
     for i, amount in itertools.product(place, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        command_power, floor_cost = problem.loop_power(active_at(mean, trial))
-        level = problem.likelihood(problem.elements.base, command_power) - floor_cost
+        of_loop = problem.loop_power(active_at(mean, trial))
+        level = problem.likelihood(problem.elements.base, of_loop.power) - of_loop.cost
         if level > best:
             best, out = level, trial
     return out

@@ -27,8 +27,8 @@ class PartResiduals:
 
     def __init__(self, data: Data, part: BlockSet, terms: Sequence[Term]) -> None:
         self.problem = problem = problem_of(data, part)
-        self.values, added, _ = problem.modelled(terms)
-        self.power = problem.elements.power + added
+        modelled = problem.modelled(terms)
+        self.values, self.power = modelled.gap, problem.elements.power + modelled.added
         self.cells = problem.flat.cells
         self.regressors = regressors_of(data, part, problem)
 

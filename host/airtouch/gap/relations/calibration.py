@@ -48,7 +48,7 @@ def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Lib
     found = []
     for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
         say(f"calibration of {own.name} {own.shape or ''}")
-        found.append(calibrate_class(scene, library, place, drawing))
+        found.append(calibrate_class(scene, library, place, drawing, CLASS_FLIGHTS))
     library = with_calibrations(library, found)
     say("flights of two effects")
     return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings))
@@ -64,8 +64,7 @@ class ClassCalibration:
     distance_scatter: float
 
 
-def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int = CLASS_FLIGHTS,
-                    ) -> ClassCalibration:
+def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int) -> ClassCalibration:
     """Measure the class at a place of the library by so many flights."""
     shown = _calibration_flights(scene, library, place, drawing, count)
     return ClassCalibration(

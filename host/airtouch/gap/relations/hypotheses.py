@@ -43,14 +43,19 @@ class Hypothesis:
     evidence: float
 
     @property
+    def classes(self) -> tuple[EffectClass, ...]:
+        """The classes of the effects."""
+        return tuple(f.effect_class for f in self.fits)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the classes."""
-        return tuple(f.effect_class.name for f in self.fits)
+        return tuple(c.name for c in self.classes)
 
     @property
     def effect_names(self) -> tuple[str, ...]:
         """Names of the classes' effects in the registry, in their order."""
-        return tuple(f.effect_class.effect for f in self.fits)
+        return tuple(c.effect for c in self.classes)
 
     @cached_property
     def shift(self) -> np.ndarray:

@@ -8,11 +8,11 @@ speaks against effects is measured in two ways, each with its limit: what a name
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
@@ -40,23 +40,6 @@ MOST_SCATTERS = 3.5
 MOST_EFFECTS = 3  #: effects that a flight is named to have, at most; chosen
 BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn; chosen
 TEMPERATURE = 2.0  #: divisor of the evidence in probabilities: the densities' tails are heavier than normal; chosen
-ByClass = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
-
-
-class Against(NamedTuple):
-    """Nats that speak against effects, and those that may where the effects are right.
-
-    of_distance: whether they are the excess of a flight's distance, not the gain of a nameless disturbance.
-    """
-
-    nats: float
-    limit: float
-    of_distance: bool
-
-    @property
-    def is_too_much(self) -> bool:
-        """Whether more speaks against the effects than may."""
-        return self.nats > self.limit
 
 
 @dataclass(frozen=True)
@@ -97,13 +80,8 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     singles = flight.single_effects()
     best, against = _likeliest(flight, singles, library)
     return Inference(
-        classes=tuple(f.effect_class for f in best.fits), evidence=_by_effect(singles), against=against,
+        classes=best.classes, evidence=_by_effect(singles), against=against,
         readings=_readings(best), without_sign=_without_sign(best))
-
-
-def _by_class(library: Library, numbers: np.ndarray) -> ByClass:
-    """Numbers (classes,) by the name and shape of their class."""
-    return {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, numbers, strict=True)}
 
 
 def _readings(best: Hypothesis) -> Mapping[str, Reading]:
@@ -126,28 +104,23 @@ def _without_sign(best: Hypothesis) -> tuple[str, ...]:
 
 def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """What speaks against effects, by the measure that is nearer to its limit or farther beyond."""
-    return max(_nameless(flight, best, _by_class(library, library.nameless_share)),
-               _distance(flight, best, _by_class(library, library.distance_scatter), library),
-               key=lambda a: a.nats / a.limit)
+    return max(_nameless(flight, best, library), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: ByClass) -> Against:
+def _nameless(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """What a nameless disturbance gains beside effects."""
-    share = _largest(best, shares) + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
+    of_classes = library.largest(library.nameless_share, best.classes)
+    share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
     return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
                    of_distance=False)
 
 
-def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: ByClass, library: Library) -> Against:
+def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
-    share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
+    scatter = library.largest(library.distance_scatter, best.classes)
+    share = float(np.hypot(scatter, library.pair_scatter * (len(best.fits) > 1)))
     return Against(library.excess(flight.squared_distance(best)), MOST_SCATTERS * library.scatter(share, best.evidence),
                    of_distance=True)
-
-
-def _largest(hypothesis: Hypothesis, shares: ByClass) -> float:
-    """Largest share of the classes of a hypothesis, 0 for no class."""
-    return max((shares[f.effect_class.name, f.effect_class.shape] for f in hypothesis.fits), default=0.0)
 
 
 def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
@@ -185,14 +158,9 @@ def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis, library: L
     It must gain LEAST_EVIDENCE and what wrong second effects gain beside those classes (`Library.second_share`), and
     explain the flight better than a nameless disturbance in the place of the effect would.
     """
-    share = _largest(best, _by_class(library, library.second_share))
+    share = library.largest(library.second_share, best.classes)
     return max(best.evidence + LEAST_EVIDENCE + share * best.evidence,
                flight.nameless_evidence(best) + NAMELESS_MARGIN)
-
-
-def _choices(library: Library) -> Mapping[str, float]:
-    """Nats that the choice among its classes costs each effect."""
-    return {name: float(np.log(n)) for name, n in Counter(c.effect for c in library.model.classes).items()}
 
 
 def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
@@ -200,7 +168,6 @@ def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
 
     Each has the weight that the choice among the classes of its effects leaves; evidence counts as in probabilities.
     """
-    choices = _choices(library)
     groups: list[list[Hypothesis]] = []
     for h in hypotheses:
         alike = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
@@ -208,7 +175,8 @@ def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
             groups.append([h])
         else:
             alike.append(h)
-    weights = [logsumexp([h.evidence / TEMPERATURE - sum(choices[name] for name in h.effect_names) for h in group])
+    cost = library.choice_cost
+    weights = [logsumexp([h.evidence / TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group])
                for group in groups]
     return max(groups[int(np.argmax(weights))], key=lambda h: h.evidence)
 

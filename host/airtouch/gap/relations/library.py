@@ -2,9 +2,10 @@
 
 import io
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, SupportsIndex
@@ -92,6 +93,20 @@ class Library:
     def effects(self) -> frozenset[str]:
         """Names of the effects of the registry that it has classes of."""
         return frozenset(c.effect for c in self.model.classes)
+
+    def largest(self, numbers: np.ndarray, classes: Iterable[EffectClass]) -> float:
+        """Largest number of some classes, 0 of none. numbers (classes,): one for each class of the library."""
+        return max((float(numbers[self._places[c.name, c.shape]]) for c in classes), default=0.0)
+
+    @cached_property
+    def _places(self) -> Mapping[tuple[str, float | None], int]:
+        """Places of the classes by their name and shape."""
+        return {(c.name, c.shape): i for i, c in enumerate(self.model.classes)}
+
+    @cached_property
+    def choice_cost(self) -> Mapping[str, float]:
+        """Nats that the choice among its classes costs each effect."""
+        return {name: float(np.log(n)) for name, n in Counter(c.effect for c in self.model.classes).items()}
 
     def without(self, names: Iterable[str]) -> "Library":
         """The library without the classes of some effects."""

@@ -54,9 +54,9 @@ class FirstOrder:
 def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder:
     """What effects with these parameters leave of a part of the flights."""
     problem = problem_of(data, part)
-    values, extra_power, _ = problem.modelled(terms)
-    residual, cost = without_offsets(problem, values, extra_power)
-    return Remainder(problem, values, residual, extra_power, problem.likelihood(residual, extra_power), cost)
+    gap, added, _ = problem.modelled(terms)
+    residual, cost = without_offsets(problem, gap, added)
+    return Remainder(problem, gap, residual, added, problem.likelihood(residual, added), cost)
 
 
 def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Term], base: Sequence[Term] = (),
