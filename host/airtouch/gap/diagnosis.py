@@ -28,6 +28,7 @@ from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -37,7 +38,8 @@ from airtouch.vehicle import Vehicle
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
-               "nobody knows how much of the commanded torque is aliases of a faster loop")
+               "nobody knows how much of the commanded torque is aliases of a faster loop. Nor does anybody know how "
+               "the vehicle shakes by itself: no wake is judged, and nominal recorded flights come out as motor_noise")
 PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no wake is judged"
 
 
@@ -204,9 +206,10 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     rank_all: as for `naming.select`.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
-    `naming.gap_closure`. Where they do not, the others are judged without them.
+    `naming.gap_closure`. Where they do not, the others are judged without them. Without nominal flights a wake is no
+    candidate: one that fills a flight looks like a vehicle that shakes by itself.
     """
-    variants = candidates.all_candidates(without)
+    variants = candidates.all_candidates(without if data.study.nominal_count else (*without, OVERHEAD))
     selection = select(data, variants, say, without, rank_all)
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)
