@@ -17,6 +17,9 @@ sys.dont_write_bytecode = False
 os.environ["AIRTOUCH_CACHE"] = ""  # what tests measure is measured, not kept from an earlier run
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
+# What trains a network compiles it first: without optimisation that takes two thirds of the time, and as many steps of
+# training hardly more.
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
 
 #: files that take longest, in this order: begun first, so that no worker is left with one of them at the end
 LONGEST = ("test_blind.py", "test_gap_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
