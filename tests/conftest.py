@@ -50,6 +50,15 @@ def pytest_collection_finish():
     gc.set_threshold(10_000, 20, 20)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_core():
+    """Beside another worker of pytest a diagnosis does not fork: what both processes work out alike is work twice."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "PYTEST_XDIST_WORKER" in os.environ:
+            patch.setattr("airtouch.gap.second_process.spare_core", lambda: False)
+        yield
+
+
 @pytest.fixture(scope="session")
 def flights():
     """The folder of recorded flights; tests that need it skip where it is absent."""
