@@ -54,7 +54,7 @@ def blind_check(tmp_path_factory):
     calibrated, study_in = [], blind_run.study_in
     patch.setattr(blind_run, "study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
     patch.setattr(blind, "make", of_still_flights(blind.make))
-    figures = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
+    figures = blind_run.run(folder, 10, seed=3, workers=2, unknown=1)  # 20 s of a processor a flight
     patch.undo()
     assert len(calibrated) == 1, "a set is calibrated once"
     return folder, figures, calibrated[0]
