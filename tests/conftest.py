@@ -17,6 +17,9 @@ sys.dont_write_bytecode = False
 os.environ["AIRTOUCH_CACHE"] = ""  # what tests measure is measured, not kept from an earlier run
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
+# What trains a network compiles it first: without optimisation that takes two thirds of the time, and as many steps of
+# training hardly more.
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
 
 #: files that take longest, in this order: begun first, so that no worker is left with one of them at the end
 LONGEST = ("test_blind.py", "test_gap_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
@@ -45,6 +48,15 @@ def pytest_collection_finish():
     """What is imported and collected by now stays: the garbage collector need not walk through it again and again."""
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_core():
+    """Beside another worker of pytest a diagnosis does not fork: what both processes work out alike is work twice."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "PYTEST_XDIST_WORKER" in os.environ:
+            patch.setattr("airtouch.gap.second_process.spare_core", lambda: False)
+        yield
 
 
 @pytest.fixture(scope="session")

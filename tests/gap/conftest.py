@@ -1,23 +1,11 @@
 """What several files of the diagnosis' tests share."""
 
-import os
-
 import pytest
 
 import imu_flights
-from airtouch.gap import second_process
 from airtouch.gap.nominal import calibrate
 from gap_flights import VEHICLE, fly
 from shared_fixture import once
-
-
-@pytest.fixture(scope="session", autouse=True)
-def one_core():
-    """Beside another worker of pytest a diagnosis does not fork: what both processes work out alike is work twice."""
-    with pytest.MonkeyPatch.context() as patch:
-        if "PYTEST_XDIST_WORKER" in os.environ:
-            patch.setattr(second_process, "spare_core", lambda: False)
-        yield
 
 
 @pytest.fixture(scope="session")

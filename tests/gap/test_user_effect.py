@@ -8,6 +8,7 @@ import pytest
 
 from airtouch.gap.diagnosis import diagnose, diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
+from airtouch.gap.nominal import apparent
 from airtouch.gap.relations import own_effect
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
@@ -21,7 +22,11 @@ FORCE_N = 0.02
 
 @pytest.fixture(autouse=True)
 def few_flights(monkeypatch):
-    """The replay names these effects: a class of the relations from few flights is enough, for time."""
+    """The replay names these effects: a class of the relations from few flights is enough, for time.
+
+    So are two of the nominal flights to say how the effects scatter.
+    """
+    monkeypatch.setattr(apparent, "FLIGHTS", 2)
     for name, count in (("PAIRS", 6), ("LEAST_PAIRS", 3), ("CALIBRATION", 4)):
         monkeypatch.setattr(own_effect, name, count)
 

@@ -6,8 +6,12 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.apparent import is_recorded
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.floor import Floor
+from airtouch.gap.signatures.scatter import ApparentStrengths, table
+from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.study import Study
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
@@ -36,6 +40,16 @@ def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=Non
         np.tile(np.eye(3), (n, 1, 1)), np.where(resting, GROUND, phase).astype(np.int8), np.ones(n, bool),
         np.zeros(n), np.zeros(n, bool) if lost is None else lost, np.zeros(n, bool))
     return replace(hover, acceleration=force - residual(hover, VEHICLE)[:, :3])
+
+
+def without_fits(monkeypatch):
+    """Flights in which no effect seems to act: none has to be fitted to them, which takes most of a calibration."""
+    still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
+
+    def scatter(study, flights, without=()):
+        return scatter_of([ApparentStrengths(still, still, 0.0)] * len(flights), any(is_recorded(f) for f in flights))
+
+    monkeypatch.setattr(calibrate, "baseline_scatter", scatter)
 
 
 def fly(count, seed, chosen=()):

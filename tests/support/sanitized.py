@@ -20,7 +20,8 @@ SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/k
 SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 
 
-FLAGS = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZERS, *INCLUDES]
+#: -g1: line numbers for what a sanitizer finds; with variables GCC takes twice as long
+FLAGS = ["-std=gnu11", "-O1", "-g1", "-Wall", "-Wextra", "-Werror", *SANITIZERS, *INCLUDES]
 
 
 def build(driver: Path, program: Path) -> Path:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import objects
+import sanitized
 from airtouch import vehicle as vehicles
 from airtouch.detector.shared import vehicle_header
 from airtouch.simulation import scenario
@@ -20,9 +21,10 @@ ROOT, HERE = Path(__file__).parents[3], Path(__file__).parent
 APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels" / "batch"
 INCLUDES = [APP, APP.parent / "core", HERE / "crazyflie", *(ROOT / folder for folder in (
     "firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model", "gap8/app/src"))]
-CORE = [*sorted((APP.parent / "core").glob("app_*.c")),
-        *sorted((ROOT / "firmware/kernels").glob("*.c")), *sorted((ROOT / "firmware/link").glob("*.c")),
-        *sorted((ROOT / "gap8/kernels").glob("*.c")), *sorted((ROOT / "gap8/model").glob("*.c"))]
+CORE = sorted((APP.parent / "core").glob("app_*.c"))
+#: sources that know nothing of the configuration
+PORTABLE = [path for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model")
+            for path in sorted((ROOT / folder).glob("*.c"))]
 #: configuration -> what the compiler is told, sources beside the core's
 BUILDS = {
     "app-config": ([], []),
@@ -50,11 +52,13 @@ def shells(headers, tmp_path_factory):
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     folder = tmp_path_factory.mktemp("shell")
-    command = [compiler, "-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
-               "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCONFIG_PLATFORM_CF2", f"-I{headers}",
-               *(f"-I{i}" for i in INCLUDES)]
-    core, error = objects.compiled(compiler, command[1:], CORE)
-    assert not error, error[:3000]
+    command = [compiler, "-std=gnu11", "-O1", "-g1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
+               *sanitized.SANITIZERS, "-DCONFIG_PLATFORM_CF2", f"-I{headers}", *(f"-I{i}" for i in INCLUDES)]
+    core = []
+    for flags, sources in ((command[1:], CORE), (sanitized.FLAGS, PORTABLE)):
+        made, error = objects.compiled(compiler, flags, sources)
+        assert not error, error[:3000]
+        core += made
     for name, (flags, sources) in BUILDS.items():
         process = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core,
                                   "-lm", "-o", folder / name], capture_output=True, text=True)

@@ -83,7 +83,7 @@ def test_sanitizers_find_nothing_in_any_bytes(compiler, tmp_path):
     if subprocess.run([compiler, *SANITIZERS, probe, "-o", tmp_path / "probe"], capture_output=True).returncode:
         pytest.skip(f"{compiler} has no address and undefined-behaviour sanitizers")
     driver = tmp_path / "driver"
-    build = subprocess.run([compiler, "-std=gnu11", "-O1", "-g", *FIRMWARE_FLAGS[2:], *SANITIZERS, *INCLUDES,
+    build = subprocess.run([compiler, "-std=gnu11", "-O1", "-g1", *FIRMWARE_FLAGS[2:], *SANITIZERS, *INCLUDES,
                             *DRIVEN, Path(__file__).with_name("driver.c"), "-lm", "-o", driver],
                            capture_output=True, text=True)
     assert build.returncode == 0, build.stderr

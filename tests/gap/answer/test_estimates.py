@@ -33,7 +33,7 @@ from hovers import FLOOR, hover
 
 BIAS = np.array([0.3, -0.1, 0.2])  #: m/s^2, of the accelerometer of every made hover
 BIAS_NAMES = ("acc_x", "acc_y", "acc_z")
-REPEATS = 100
+REPEATS = 60  #: flights, each with three intervals: of 180 a tenth too few or too many is beyond chance
 
 
 def within_scatter(held, expected):

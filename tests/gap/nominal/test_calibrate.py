@@ -8,12 +8,9 @@ from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.nominal.apparent import is_recorded
 from airtouch.gap.nominal.calibrate import calibrated
-from airtouch.gap.signatures.scatter import ApparentStrengths, table
-from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.simulation.effects import EFFECTS
-from gap_flights import VEHICLE, fly
+from gap_flights import VEHICLE, fly, without_fits
 
 LAST = 100  #: samples: the landing
 
@@ -23,15 +20,9 @@ def nominal():
     return fly(4, seed=91)
 
 
-@pytest.fixture
-def without_fits(monkeypatch):
-    """Flights in which no effect seems to act, so that none has to be fitted to say how they scatter."""
-    still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
-
-    def scatter(study, flights, without=()):
-        return scatter_of([ApparentStrengths(still, still, 0.0)] * len(flights), any(is_recorded(f) for f in flights))
-
-    monkeypatch.setattr(calibrate, "baseline_scatter", scatter)
+@pytest.fixture(name="without_fits")
+def _without_fits(monkeypatch):
+    without_fits(monkeypatch)
 
 
 def with_a_push(flight, metres_per_second2):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gap8.kernels.conftest import EMULATION, KERNELS, MODEL
+from gap8.kernels.conftest import EMULATION, KERNELS, MODEL, THREADS, sanitized
 from patience import HANG_S
 
 SOURCES = [*sorted(KERNELS.glob("*.c")), *sorted(MODEL.glob("airtouch_[mrg]*.c")), Path(__file__).with_name("team.c")]
@@ -16,12 +16,10 @@ def programs(request, compiler, tmp_path_factory) -> dict[str, Path]:
     """The program, plain and under the sanitizers that work here, by their name."""
     folder = tmp_path_factory.mktemp(request.param)
     emulation = [EMULATION] if request.param == "xpulp" else []
-    paths = {"plain": compiler(SOURCES, folder / "plain", "-pthread", *emulation)}
+    paths = {"plain": compiler(SOURCES, folder / "plain", THREADS, *emulation)}
     for name in ("thread", "address,undefined"):
-        flag = f"-fsanitize={name}"
-        if compiler.has(flag, folder=folder):
-            paths[name] = compiler(SOURCES, folder / name.split(",")[0], "-pthread", "-g", flag,
-                                   "-fno-sanitize-recover=all", *emulation)
+        if compiler.has(*sanitized(name), folder=folder):
+            paths[name] = compiler(SOURCES, folder / name.split(",")[0], *sanitized(name), *emulation)
     return paths
 
 
