@@ -1,6 +1,9 @@
-"""Prints benchmarks against the peers, each in the same run: `make bench`.
+"""Prints how long kernels, detectors and networks take beside their peers, each pair in the same run.
+
+    python tools/bench.py [--flights 20] [--train]    # 2 to 3 min without --train; `make bench` runs it too
 
 Every pair is timed in turn (A B A B ...), after one warm-up; the ratio is the median of the pairs'.
+host/docs/ablations.md has the figures.
 """
 
 import argparse
@@ -16,18 +19,22 @@ from scipy.signal import ShortTimeFFT
 
 from airtouch import kernels, logs
 from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best, paper
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.paper.features import flight_features
 from airtouch.detector.shared.channels import nine_channels
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.kernels.network import run_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 from airtouch.reference.networks.int8_network import quantise
 
+SIMULATED = 8  #: flights at most, where none are recorded; chosen, for time
+ALL = 1000  #: flights: more than there are
+SAME = 1e-3  #: largest relative difference of two band powers that count as one; chosen
 PAIRS = 7  #: alternating timings of both, of which the median ratio is reported; no source: round number
 
 
@@ -47,13 +54,13 @@ def compare(ours: Callable[[], object], peer: Callable[[], object]) -> tuple[flo
 
 
 def load_flights(limit: int) -> list[FlightLog]:
-    """Recorded flights where there are any, else simulated ones."""
+    """At most `limit` recorded flights where there are any, else simulated ones, eight at most."""
     folder = find_flights()
     if folder is not None:
         return [logs.read(file.path) for file in dataset.collect([folder])[:limit]]
     from airtouch.simulation import batch
 
-    return batch.simulate("paper-low", seeds=min(limit, 8))
+    return batch.simulate("paper-low", seeds=min(limit, SIMULATED))
 
 
 def scipy_band_power(x: np.ndarray) -> np.ndarray:
@@ -71,7 +78,8 @@ def bench_band_power(table: Table, flights: list[FlightLog]) -> None:
     ours = kernels.band_power(inputs[0])[DEFAULT.band_window - 1:]
     peer = scipy_band_power(inputs[0].astype(np.float64))
     error = np.abs(ours - peer).max(axis=0) / np.abs(peer).max(axis=0)
-    assert error.max() < 1e-3, f"the two do not compute the same: {error}"
+    if error.max() > SAME:
+        raise AirTouchError(f"the band power of the kernel is not SciPy's: relative error {error.max():.2g}")
     a, b, ratio = compare(lambda: [kernels.band_power(x) for x in inputs],
                           lambda: [scipy_band_power(x) for x in inputs])
     row(table, "band power, 9 channels, a flight", a / len(flights), b / len(flights), ratio,
@@ -126,7 +134,7 @@ def row_of_peers(table: Table, name: str, ours: Callable[[], object], tflite: by
         row(table, name, a / computed, b / len(q), ratio * computed / len(q), peer, f"n = {computed} and {len(q)}")
 
 
-def micro(content: bytes) -> Callable | None:
+def micro(content: bytes) -> Callable:
     """tflite-micro's interpreter as a function."""
     from tflite_micro.python.tflite_micro import runtime
 
@@ -174,19 +182,19 @@ def row(table: Table, name: str, ours: float, peer: float, ratio: float, what: s
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=20, help="how many (default 20)")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flights", type=int, default=20, help="how many at most (default %(default)s)")
     parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
     options = parser.parse_args()
     flights = load_flights(options.flights)
     table = Table(title=f"Benchmarks, median of {PAIRS} pairs, one thread", title_justify="left")
     for name in ("what", "ours", "peer", "faster", "peer is", ""):
         table.add_column(name)
-    bench_band_power(table, flights)
-    bench_pipelines(table, flights)
-    bench_inference(table, flights)
+    benches = [(bench_band_power, flights), (bench_pipelines, flights), (bench_inference, flights)]
     if options.train:
-        bench_training(table, load_flights(1000))
+        benches.append((bench_training, load_flights(ALL)))
+    for bench, given in with_bar(benches, "benchmarks"):
+        bench(table, given)
     Console(width=130).print(table)
 
 

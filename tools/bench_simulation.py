@@ -1,6 +1,6 @@
 """Prints simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
-    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
+    python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]    # a minute
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.
@@ -22,7 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
+from airtouch.logs.files import check_free, write_bytes
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
@@ -111,11 +113,12 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=64, help="of each round (default %(default)s)")
     parser.add_argument("--workers", type=int, default=batch.available_cores(),
                         help="processes (default: one a core)")
-    parser.add_argument("--json", help="write the figures here")
+    parser.add_argument("--json", type=Path, help="write the figures here, in place of what is there")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()
+    check_free(options.json, force=True)
     own, other, rotorpy, crazyflow = [], [], [], []
-    for _ in range(ROUNDS):
+    for _ in with_bar(range(ROUNDS), "rounds"):
         own.append(measure(options.flights, options.workers))
         other.append(measure(options.flights, options.workers, on=False))
         rotorpy.append(rotorpy_rate())
@@ -129,8 +132,7 @@ def main() -> None:
         print("crazyflow is not installed, so it is not compared: python -m venv crazyflow && "
               "crazyflow/bin/pip install crazyflow==0.4.0, then --crazyflow crazyflow/bin/python")
     if options.json:
-        with open(options.json, "w", encoding="utf-8") as file:
-            json.dump(figures, file, indent=1)
+        write_bytes(json.dumps(figures, indent=1).encode(), options.json, force=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@
     python tools/fuzz.py --coverage                       # lines that the corpus reaches, source by source
     python tools/fuzz.py --keep                           # the corpus, made small, becomes the seeds of tests/fuzz
 
+A million inputs of one target take 1 to 8 minutes of processor time, all targets hours.
+
 With clang the engine is libFuzzer, which follows coverage; else a small driver of our own under the C compiler's
 sanitizers, which only mutates the seeds. Everything is under build/fuzz: a corpus that grows from run to run, the
 findings, the logs, and inputs.csv, which says how many inputs each program ran. host/docs/fuzzing.md says what the
@@ -147,7 +149,7 @@ def keep_seeds(name: str, program: Path) -> tuple[int, int]:
 
 
 def print_coverage(names: list[str]) -> None:
-    """Print the share of lines of each source that the corpora reach, and the functions that none does."""
+    """Print the fraction of lines of each source that the corpora reach, and the functions that none does."""
     made_by = engine("libfuzzer")
     profiler, reporter = (shutil.which(name) for name in ("llvm-profdata", "llvm-cov"))
     if made_by is None or profiler is None or reporter is None:
@@ -185,6 +187,8 @@ def main() -> None:
     made_by = engine(options.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
+    if options.keep and made_by.name != "libfuzzer":
+        raise SystemExit("--keep needs clang with libFuzzer, which makes a corpus small: apt-get install clang")
     print(f"compiling {', '.join(names)}", file=sys.stderr, flush=True)
     programs = build(names, made_by, flags=LONG)
     if options.replay:

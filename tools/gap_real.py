@@ -12,6 +12,10 @@ condition, neural-swarm's and CrazyPAD's against the nominal flights of the same
 
 nominal: every nominal flight of a group against the others of it, the baseline flights of the other rows too. It runs
 only where --rows names it.
+
+    python tools/gap_real.py [FLIGHTS] --rows swarm --most-baseline 2    # what few baseline flights cost
+
+--most-baseline: each flight against so many of its baseline flights at most, the first of them.
 """
 
 import argparse
@@ -20,6 +24,7 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -102,9 +107,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
     parser.add_argument("--partner", action="store_true",
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
+    parser.add_argument("--most-baseline", type=int, metavar="N",
+                        help="most baseline flights of each, the first of them (default: all)")
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
+    if args.most_baseline is not None and args.most_baseline < 0:
+        parser.error("--most-baseline must be 0 or more")
     for data_set in {data_set for row in args.rows for data_set in DATA_SETS[row]}:
         check_data_set(args.flights / data_set)
     check_free(args.keep, force=True)
@@ -115,6 +124,7 @@ def main(arguments: list[str] | None = None) -> int:
         cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
     if args.partner:
         cases = with_partners(cases, args.flights)
+    cases = [replace(c, baseline=c.baseline[:args.most_baseline]) for c in cases]
     answers = diagnoses(cases, args.keep, args.jobs)
     print_table(answers, args.flights)
     wrong = [c["flight"] for c in answers if answer(c) != c["truth"]]

@@ -5,7 +5,8 @@
 
 A group is a few modules and the tests that are there for them. mutmut works on a copy in build/mutate, where what is
 done is not done again; `--force` begins anew. A sample is drawn by a seed from all mutants; without one each is
-run. Needs `pip install airtouch[mutate]`.
+run. Each mutant runs those of its group's tests that reach it, until one fails: a sample of 60 does so
+sixty times. Needs `pip install airtouch[mutate]`.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from airtouch.cli.shared.flights import data_folder
@@ -24,7 +26,7 @@ from airtouch.gap.sealed.intervals import wilson
 
 ROOT = Path(__file__).parents[1]  #: of the checkout
 BUILD = ROOT / "build" / "mutate"  #: where mutated copies lie
-LEAST = 0.85  #: share of the mutants that tests must notice; no source: round number
+LEAST = 0.85  #: fraction of the mutants that tests must notice; no source: round number
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def results(place: Path) -> dict[str, int | None]:
 
 
 def table(codes: dict[str, int | None]) -> float:
-    """Print a line for each module and one for all. Returns the share of all that is noticed."""
+    """Print a line for each module and one for all. Returns the fraction of all that is noticed."""
     by_module: dict[str, Counter] = {}
     for mutant, code in codes.items():
         if code is not None:
@@ -125,7 +127,7 @@ def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run or show the mutants of the groups; the exit code is 1 if a group's share noticed is below LEAST."""
+    """Run or show the mutants of the groups; 1 where the fraction noticed of one is below LEAST."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
     parser.add_argument("--sample", type=int, help="mutants of each group")
@@ -135,10 +137,14 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     if unknown := set(args.groups) - set(GROUPS):
         parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
+    if not args.show and find_spec("mutmut") is None:
+        parser.error("mutmut is not installed: pip install 'airtouch[mutate]', or run it by make mutate")
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:
-            print_mutants(BUILD / name, results(BUILD / name))
+            if not (codes := results(BUILD / name)):
+                parser.error(f"no mutants of {name} yet: leave out --show first")
+            print_mutants(BUILD / name, codes)
             continue
         place = stage(name, args.force)
         if args.sample:

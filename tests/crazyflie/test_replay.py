@@ -53,7 +53,7 @@ def test_the_command_prints_what_evaluate_prints(flight):
     scored = CliRunner().invoke(airtouch, ["evaluate", str(flight), "--speed", "0.3"])
     assert result.exit_code == scored.exit_code == 0
     row = next(line for line in scored.output.splitlines() if "│ best" in line)
-    assert row in result.output and "felt at" in result.output
+    assert row in result.output and "detected at" in result.output
 
 
 def test_pieces_of_one_row_give_the_same(flight):

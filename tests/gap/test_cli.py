@@ -95,7 +95,7 @@ def test_each_flight_alone_with_an_effect_of_the_users_own(folder, tmp_path):
     mine.write_text(MADE_UP_PULL)
     left_out = [word for name in EFFECTS if name != "mass" for word in ("--without", name)]
     try:
-        result = run("diagnose", f"{folder}/real_*", "--each", "--effects-file", mine, "--json", out, *left_out)
+        result = run("diagnose", f"{folder}/real_*", "--each", "--effect-file", mine, "--json", out, *left_out)
     finally:
         unregister("made_up_pull")
     assert result.exit_code == 0, result.output

@@ -48,7 +48,22 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
     monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(shrink=SimpleNamespace(
         before=1.4, share=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
     loop = SimpleNamespace(changes_loop=lambda active: True)
-    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop))
+    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
     selection, _ = diagnosis.selection_and_gap(data, ())
     assert [s.name for s in selection.named_steps] == names
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"
+
+
+@pytest.mark.parametrize(("nominal", "a_candidate"), [(0, False), (1, True), (4, True)])
+def test_a_wake_is_no_candidate_without_nominal_flights(monkeypatch, nominal, a_candidate):
+    """As a vehicle that shakes by itself looks like one in a wake that fills the flight."""
+    seen = []
+    nothing = PartOfSelection([], SimpleNamespace(terms=()), {}, {})
+    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, *_: seen.append(set(candidates)) or nothing)
+    monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(shrink=SimpleNamespace(
+        before=1.0, share=Quantity(0.0))))
+    study = SimpleNamespace(simulated=False, loop=None, nominal_count=nominal)
+    diagnosis.selection_and_gap(SimpleNamespace(study=study), ("mass",))
+    (candidates,) = seen
+    assert ("downwash" in candidates) is a_candidate
+    assert "mass" not in candidates and {"motor_noise", "gust", "ground_effect"} <= candidates

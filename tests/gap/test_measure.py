@@ -1,6 +1,7 @@
 """Measuring the gap of whole flights: what is injected is found, with few channels too."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,13 @@ import pytest
 import short_flights
 from airtouch import logs, vehicle
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measurement import measure
+from airtouch.gap.measurement import Measurement, measure
+from airtouch.gap.result import BASELINE, GapMap
+from airtouch.gap.where.rotor_speeds import RotorSpeed
 from airtouch.gap.where.summary import significant
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog
 from airtouch.logs.segments import KINDS
+from made_diagnosis import cell
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")
 
@@ -39,9 +43,9 @@ def test_json_holds_the_largest_cells_and_the_whole_map(sweeps):
     assert {"where", "map", "gap", "floor_from", "cannot", "notes"} <= set(table)
     assert {"flights", "vehicle", "spectra", "left_out"} <= set(table)
     assert len(table["where"]) >= 10 and len(table["flights"]) == 3
-    for cell in table["where"]:
-        assert {"channel", "band_hz", "phase", "gap", "floor", "unit", "low", "high", "words"} <= set(cell)
-        assert cell["low"] <= cell["gap"] <= cell["high"] and cell["floor"] > 0.0
+    for row in table["where"]:
+        assert {"channel", "band_hz", "phase", "gap", "floor", "unit", "low", "high", "words"} <= set(row)
+        assert row["low"] <= row["gap"] <= row["high"] and row["floor"] > 0.0
     assert table["gap"]["before"] > 1.0
 
 
@@ -136,3 +140,20 @@ def test_a_baseline_flight_unlike_the_others_is_no_part_of_the_floor(sweeps):
 
 def renamed(log, name):
     return FlightLog(log.columns, {**log.meta, "source": name})
+
+
+def test_a_measurement_in_two_sentences():
+    """Where most of the gap lies, and how large all of it is; the calibrated vehicle is told where there is one."""
+    largest = cell("force_z", "hover", 1.0)
+    gap = Measurement("x", GapMap((largest,), BASELINE, ()), (largest,), {"before": 2.34, "floor": 1.0}, ("a.csv",))
+    assert gap.sentences == ("Most of the gap lies in hover, 0-0.5 Hz, lift: 1 m/s^2, 10 times the floor.",
+                             "Overall it is 2.3 times the floor.")
+    calibrated = replace(gap, where=(), gap={**gap.gap, "calibrated": 1.2})
+    assert calibrated.sentences == (
+        "No gap stands out of the floor.",
+        "Overall it is 2.3 times the floor, 1.2 times with the vehicle calibrated on the baseline flights.")
+
+
+def test_speeds_of_a_rotor_are_told_with_their_range():
+    speed = RotorSpeed(2, 19600.4, 20000.0, 0.96, 0.95, 0.972, 6)
+    assert speed.in_words() == "rotor 2: 19600 rpm logged, 0.960 of the model's (0.950 to 0.972 over 6 flights)"

@@ -67,7 +67,7 @@ def test_report_is_one_file_with_the_figures(tmp_path):
 
 def test_words_say_misses_and_false_edges():
     flight = flight_shown()
-    assert in_words(flight.score) == ("entry at 2.00 s found 0.10 s late (0.020 m); exit at 4.00 s missed; "
+    assert in_words(flight.score) == ("entry at 2.00 s detected 0.10 s late (0.020 m); exit at 4.00 s missed; "
                                       "1 false edges.")
     sentence = answer("paper", summarise([flight.score]))
     assert "1 missed (50%)" in sentence and "1 false (10.0 a minute)" in sentence and "0.020 m" in sentence

@@ -1,5 +1,7 @@
 """The plots of a gap report: their panes, lines and labels, before they are made a PNG."""
 
+import re
+import unicodedata
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,12 +44,12 @@ def test_signal_has_measured_and_models_above_and_their_differences_below(drawn)
     assert {name: y[0] for name, y in lines(above).items()} == {"measured": 5.0, "model": 3.0, "model with effect": 4.5}
     assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
     assert "floor" in below.get_legend_handles_labels()[1]
-    assert above.get_ylabel() == "forward force\nm/s^2" and below.get_xlabel() == "time, s"
+    assert above.get_ylabel() == "forward force\nm/s²" and below.get_xlabel() == "time, s"
 
 
 def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):
     (only,) = drawn(gap_figures.signals, signal(measured=False, after=False)).axes
-    assert set(lines(only)) == {"gap before"} and only.get_ylabel() == "measured - model\nm/s^2"
+    assert set(lines(only)) == {"gap before"} and only.get_ylabel() == "measured - model\nm/s²"
 
 
 def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
@@ -69,12 +71,23 @@ def test_spectra_have_a_pane_for_each_channel(drawn, after):
              for name, unit in (("force_x", "m/s^2"), ("torque_z", "rad/s^2"))]
     figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
     assert [(ax.get_title(loc="left"), ax.get_ylabel()) for ax in figure.axes] == [
-        ("forward force", "(m/s^2)²/Hz"), ("yaw torque", "(rad/s^2)²/Hz")]
+        ("forward force", "(m/s²)²/Hz"), ("yaw torque", "(rad/s²)²/Hz")]
     expected = {"floor": 1.0, "before": 4.0} | ({"after": 2.0} if after else {})
     for ax in figure.axes:
         assert {name: y[0] for name, y in lines(ax).items()} == expected
     assert figure.axes[-1].get_xlabel() == "frequency, Hz"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(expected)
+
+
+def test_powers_are_labelled_in_plain_text(drawn):
+    """Without formulas, whose parser takes a second to begin."""
+    power = np.geomspace(1e-12, 1e3, 51)
+    (ax,) = drawn(gap_figures.spectra, FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    for y, label in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True):
+        sign, digits = re.fullmatch("10(⁻?)(.+)", label.get_text()).groups()
+        exponent = int("".join(str(unicodedata.digit(c)) for c in digits))
+        assert (-exponent if sign else exponent) == round(np.log10(y))
+    assert len(ax.get_yticks()) > 2
 
 
 @pytest.mark.parametrize("nominal", [{}, {"roll": np.ones(5), "yaw": np.ones(5)}])

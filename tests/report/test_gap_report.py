@@ -10,11 +10,12 @@ import pytest
 import airtouch
 import made_diagnosis
 from airtouch.errors import AirTouchError
-from airtouch.gap.answer import advice, words
+from airtouch.gap.answer import advice
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Rejected
+from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Rejected, Shrink
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -44,11 +45,11 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
     path, result = tmp_path / "gap.html", of_flights(pushed_flights)
     gap_report.write_diagnosis(path, result, command="airtouch gap diagnose <x>")
     text, page = checked(path)
-    sentences = words.sentences(result)
-    assert result.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in sentences[0]
-    assert "imu bias (probability 93%)" in sentences[1] and "takes away 90% (80% to 95%)" in sentences[2]
-    assert [text.index(s) for s in sentences] == sorted(text.index(s) for s in sentences)
-    order = [text.index(s) for s in (sentences[2], "What to do next", "The largest cells", "still be the wrong one")]
+    said = sentences(result)
+    assert result.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in said[0]
+    assert "imu bias (probability 93%)" in said[1] and "takes away 90% (80% to 95%)" in said[2]
+    assert [text.index(s) for s in said] == sorted(text.index(s) for s in said)
+    order = [text.index(s) for s in (said[2], "What to do next", "The largest cells", "still be the wrong one")]
     assert order == sorted(order)
     for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
                  "no velocity",
@@ -64,11 +65,28 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_fligh
     path, result = tmp_path / "gap.html", of_flights(pushed_flights)
     gap_report.write_diagnosis(path, result, command="x")
     source = path.read_text()
-    for s in (*words.sentences(result), result.advice):
+    for s in (*sentences(result), result.advice):
         assert source.count(s.replace("<", "&lt;").replace(">", "&gt;")) == 1, s
     assert source.count('<td class="headline"') == 1 and source.count('<tr class="headline"') == 1
     title = re.search(r'<td class="headline"[^>]*title="([^"]*)"', source).group(1)
     assert title.startswith(gap_tables.in_words(result.headline))
+
+
+def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
+    """Sentence, JSON and page have one share and one before and after; the calibrated arm is not told again."""
+    result = of_flights(pushed_flights)
+    result = replace(result, arms={"declared": Shrink(5.0, 2.0, Quantity(0.7)),
+                                   "calibrated": Shrink(4.0, 1.3, result.shrink)})
+    fields = result.plain()
+    assert fields["shrink"] == fields["ranking"][0]["shrink"] and fields["gap"]["before"] == 4.0
+    assert "from 4 to 1.3 times the floor" in sentences(result)[2]
+    rows = gap_tables.how_far_rows(result)
+    assert [r["name"] for r in rows] == ["imu_bias", "wrong effect: wind", "imu_bias, vehicle as declared"]
+    # the row that starts from another gap says why
+    assert [r["why"] for r in rows] == ["", "", gap_tables.OTHER_START]
+    page = tmp_path / "gap.html"
+    gap_report.write_diagnosis(page, result, command="x")
+    assert page.read_text().count(gap_tables.OTHER_START) == 1
 
 
 def test_phases_are_folded_by_importance(tmp_path):
@@ -121,7 +139,7 @@ def test_the_report_computes_nothing():
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
         allowed = ("measurement", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
-                   "answer.words", "signals.channels", "second_process")
+                   "answer.sentences", "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)
         assert not re.search(r"\b(residual|calibrate|ready|shrink_of|gap_map)\(", source)

@@ -5,7 +5,7 @@ import numpy as np
 from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import LearnedModel
-from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.library import Library, NominalDistance
 
 Q = 100  #: coordinates
 KNOTS = np.log([0.5, 5.0, 50.0])
@@ -17,8 +17,10 @@ def library():
     classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
                                 np.zeros(0)) for i, n in enumerate(NAMES))
     model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
+    none = np.zeros(len(NAMES))
     return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
-                   (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), 0.0)
+                   NominalDistance(float(Q), np.sqrt(2.0 * Q)), nameless_share=none, second_share=none,
+                   distance_scatter=none, pair_scatter=0.0)
 
 
 def noise(seed=1):

@@ -1,6 +1,9 @@
 """The diagnosis on a few recorded flights of each kind, and that the check of them can fail."""
 
 import re
+from pathlib import Path
+
+import pytest
 
 from tools import gap_real
 from tools.diagnosis.recordings import cases
@@ -21,6 +24,23 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, caps
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
     assert gap_real.main([str(flights), "--quick"]) == 1
     assert "wrong, more than" in capsys.readouterr().err
+
+
+def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(flights, monkeypatch):
+    seen = []
+
+    def blind(case):
+        seen.append(case)
+        return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
+                "effects": [], "verdict": "none"}
+
+    monkeypatch.setattr(gap_real, "diagnose_case", blind)
+    monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+    assert gap_real.main([str(flights), "--rows", "nominal", "--most-baseline", "3"]) == 0
+    whole = {c.flight: c.baseline for c in cases.nominal(flights, "build")}
+    assert {c.flight: c.baseline for c in seen} == {flight: baseline[:3] for flight, baseline in whole.items()}
+    with pytest.raises(SystemExit):
+        gap_real.main([str(flights), "--most-baseline", "-1"])
 
 
 def test_nominal_flights_are_held_against_others_of_their_group(flights):

@@ -1,4 +1,4 @@
-"""Every script and every module of tools that is run starts, and says what it does and what each option means."""
+"""Every script and every module of tools that is run starts, and says what it does and what each argument means."""
 
 import subprocess
 import sys
@@ -19,8 +19,8 @@ from pathlib import Path
 bare = []
 def noting(text, parameters):
     def text_of(self, *rest):
-        bare.extend(p.opts[-1] if hasattr(p, "opts") else p.option_strings[-1] for p in getattr(self, parameters)
-                    if (getattr(p, "option_strings", 0) or isinstance(p, click.Option)) and not p.help)
+        bare.extend(p.opts[-1] if hasattr(p, "opts") else (p.option_strings or [p.dest])[-1]
+                    for p in getattr(self, parameters) if not isinstance(p, click.Argument) and not p.help)
         return text(self, *rest)
     return text_of
 argparse.ArgumentParser.format_help = noting(argparse.ArgumentParser.format_help, "_actions")
@@ -41,7 +41,7 @@ for path in sys.argv[1:]:
 """
 
 
-def test_every_script_and_every_option_has_a_help_text():
+def test_every_script_and_every_argument_has_a_help_text():
     run = subprocess.run([sys.executable, "-c", RUN, *SCRIPTS, *MODULES], capture_output=True, text=True,
                          cwd=TOOLS.parent)
     answers = dict(line.split(" ", 1) for line in run.stdout.splitlines())

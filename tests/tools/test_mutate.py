@@ -26,3 +26,10 @@ def test_a_group_that_is_none_is_named(capsys):
     with pytest.raises(SystemExit):
         mutate.main(["scores"])
     assert "no group scores; there are reference, int8, score, selection" in capsys.readouterr().err
+
+
+def test_what_is_shown_must_have_been_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(mutate, "BUILD", tmp_path)
+    with pytest.raises(SystemExit):
+        mutate.main(["score", "--show"])
+    assert "no mutants of score yet: leave out --show first" in capsys.readouterr().err

@@ -116,7 +116,7 @@ def understood_by_tool(arguments: list[str], path: Path, typed: bool, monkeypatc
     One that is mentioned without any only exists.
     """
     source = path.read_text("utf-8")
-    assert re.search(r"argparse|import click|folder_and_part", source), f"{path} has no --help"
+    assert re.search(r"argparse|import click|folder_and_part|import .*\bparser\b", source), f"{path} has no --help"
     if not any(arguments) and not typed:
         return
 

@@ -4,7 +4,9 @@
 
 Prints one JSON object: by integrator, the rate a wall second and a second of CPU time. Runs where
 `pip install crazyflow==0.4.0` was done (1.2 GB, so not among AirTouch's packages);
-`tools/bench_simulation.py` calls it. The first round of each integrator, not counted, pays for compilation.
+`tools/bench_simulation.py` calls it. The first round of each integrator, not counted, pays for compilation. Four
+rounds of 640 simulated seconds with each of two integrators: 3 s and the compilation, at the rates in
+host/docs/simulation-checks.md.
 """
 
 import argparse

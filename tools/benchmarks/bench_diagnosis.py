@@ -1,6 +1,6 @@
 """Prints the seconds that `airtouch gap diagnose` takes for a packaged flight of 25 s and four baseline flights.
 
-    python tools/benchmarks/bench_diagnosis.py [--runs 5]
+    python tools/benchmarks/bench_diagnosis.py [--runs 5]    # a minute a run
 
 JSON and report are written too. Each run is a process of its own, on all processors and on one in turn, after one
 warm-up that compiles: with the first flight against a baseline, and with a further one, for which the baseline's
@@ -17,6 +17,7 @@ import time
 from importlib import resources
 from pathlib import Path
 
+from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.nominal.kept_scatter import VARIABLE
 
@@ -43,17 +44,17 @@ def main() -> None:
     runs = parser.parse_args().runs
     if runs < 1:
         parser.error("--runs must be at least 1")
-    every = os.sched_getaffinity(0)
+    free = os.sched_getaffinity(0)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         cache_folder = str(out / "cache")
         rows = {f"{flight} flight, {name}": (processors, cache)
                 for flight, cache in (("first", ""), ("further", cache_folder))
-                for name, processors in ((f"{len(every)} processors", every), ("1 processor", {min(every)}))}
+                for name, processors in ((f"{len(free)} processors", free), ("1 processor", {min(free)}))}
         print("warming up: the first time compiles", file=sys.stderr, flush=True)
-        seconds(every, out, cache_folder)
+        seconds(free, out, cache_folder)
         rounds = [{row: seconds(processors, out, cache) for row, (processors, cache) in rows.items()}
-                  for _ in range(runs)]
+                  for _ in with_bar(range(runs), "runs")]
     for row in rows:
         column = [times[row] for times in rounds]
         print(f"{row}: {statistics.median(column):.1f} s, {min(column):.1f} to {max(column):.1f} s in {runs} runs")

@@ -1,6 +1,6 @@
 """Prints how well a classifier tells one day's flights from another day's of the same drone: the yardstick of a twin.
 
-    python tools/calibration/days_apart.py ../shared/flights/airtouch [--fewest 7]
+    python tools/calibration/days_apart.py ../shared/flights/airtouch [--fewest 7]    # 40 s a row
 
 The classifier is that of `airtouch twin`. Prints a Markdown table: each day with --fewest flights or more against each
 other one, and, for comparison, two random halves of all flights, which differ in nothing; AUROC of each phase by
@@ -52,14 +52,14 @@ def line(title: str, one: Sequence[FlightData], other: Sequence[FlightData]) -> 
 def main() -> None:
     """One line for each pair of days."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights of one drone")
     parser.add_argument("--fewest", type=int, default=MIN_FLIGHTS, help="flights of a day (default %(default)s)")
     options = parser.parse_args()
     days = read_days(options.folders)
     large = {day: flights for day, flights in sorted(days.items()) if len(flights) >= options.fewest}
     if len(large) < 2:
-        raise SystemExit(f"two days with {options.fewest} flights or more are needed, here: " +
-                         (", ".join(f"{day} {len(flights)}" for day, flights in sorted(days.items())) or "none"))
+        raise AirTouchError(f"two days with {options.fewest} flights or more are needed, see --fewest; here: " +
+                            (", ".join(f"{day} {len(flights)}" for day, flights in sorted(days.items())) or "none"))
     print(f"| | flights | {' | '.join(PHASES)} |\n|---|---|{'---|' * len(PHASES)}", flush=True)
     pooled = [flight for flights in days.values() for flight in flights]
     order = np.random.default_rng(0).permutation(len(pooled))

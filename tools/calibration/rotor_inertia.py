@@ -1,6 +1,6 @@
 """Prints the moment of inertia of a rotor, from how much a change of the rotors' speeds turns the vehicle in yaw.
 
-    python tools/calibration/rotor_inertia.py ../shared/flights/imrclab/brushed_jana04.csv.gz [--vehicle crazyflie-2.1]
+    python tools/calibration/rotor_inertia.py ../shared/flights/imrclab/brushed_jana04.csv.gz    # 4 s a flight
 
 A rotor that speeds up pushes the body the other way round. With D = w2 + w4 - w1 - w3, rotor speeds (rad/s) of the
 rotors that turn one way less those of the others, the yaw acceleration is (2 w k yaw D + I dD/dt) / Jz: w mean speed,
@@ -90,7 +90,7 @@ def report(log: FlightLog, craft: Vehicle) -> str:
 def main() -> None:
     """Print a line for each flight."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("flights", type=Path, nargs="+")
+    parser.add_argument("flights", type=Path, nargs="+", help="logs with rotor speeds")
     parser.add_argument("--vehicle", default="crazyflie-2.1", help="name or file: mass and Jz (default %(default)s)")
     options = parser.parse_args()
     craft = vehicle.load(options.vehicle)

@@ -1,7 +1,7 @@
 """Chooses the `best` detector's decoder settings from cross-validated models.
 
     airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
-    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...
+    python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...    # a minute a folder of 87 flights
 
 Each flight is decoded from the logits of the model that never saw it, once for each folder; with --silence SENSOR from
 the log without that sensor. Prints the settings that are best over all folds, and an honest figure for choosing them:
@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
 
 from airtouch import kernels, logs
 from airtouch.cli.shared import scores as show_scores
 from airtouch.cli.shared.flights import need_flights
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.recipe import ROW_STRIDE
@@ -29,6 +29,7 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.edges import Edge
+from airtouch.logs.files import check_free
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
 
@@ -82,7 +83,7 @@ def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[He
     if absent := {score["file"] for entry in entries for score in entry["per_flight"]} - set(files):
         raise AirTouchError(f"{folder}: no {min(absent)}, which {out} was made of; set AIRTOUCH_FLIGHTS to its folder")
     flights = []
-    for entry in track(entries, "logits"):
+    for entry in with_bar(entries, "logits"):
         model = best.load(out / entry["model"])
         flights += [held_out_flight(files[score["file"]], entry["fold"], model, silent)
                     for score in entry["per_flight"]]
@@ -109,7 +110,7 @@ def score(flight: HeldOutFlight, config: DecoderConfig, lag: float) -> FlightSco
 
 
 def figures(flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
-    """Mean error of the edges found, share missed, false a minute."""
+    """Mean error of the detected edges, fraction missed, false a minute."""
     errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, outcomes_of, strict=True)])
     edges = sum(len(f.edges) for f in flights)
     late = np.concatenate([d - lag for d, _ in outcomes_of])
@@ -166,18 +167,19 @@ def main() -> None:
     """Search, then print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
-    parser.add_argument("--count", type=int, default=1000, help="settings tried")
+    parser.add_argument("--count", type=int, default=1000, help="settings tried (default %(default)s)")
     parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
     parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
                         help="decode the flights without this sensor")
     parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/detectors/sensor_figures.py")
     options = parser.parse_args()
+    check_free(options.json, force=True)
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
     if not flights:
         raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
     settings = candidates(options.count, np.random.default_rng(0), options.hold)
-    results = [outcomes(flights, config) for config in track(settings, "settings")]
+    results = [outcomes(flights, config) for config in with_bar(settings, "settings")]
     print_figures("as shipped", flights, outcomes(flights, best.DECODER))
     print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
     winner = cheapest(flights, results)

@@ -1,6 +1,6 @@
 """Prints what the down range reads at platform edges, and what the firmware's height control makes of it.
 
-    python tools/detectors/edge_readings.py FOLDER --fold 0 --fold 1 --fold 2 [--twin FOLDER]    # 10 s without --twin
+    python tools/detectors/edge_readings.py FOLDER --fold 0 --fold 1 --fold 2 [--twin FOLDER]    # 15 s without --twin
 
 For recorded flights, and with --twin for the same courses flown by that twin:
 - the one reading in which an edge passes: where between the two distances it lies;
@@ -161,7 +161,7 @@ def print_tables(name: str, passes: Passes) -> None:
 def main() -> None:
     """Recorded flights, then the twin's."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, help="of recorded flights, with a manifest.csv")
     parser.add_argument("--fold", type=int, action="append", default=[],
                         help="only flights of this fold; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")

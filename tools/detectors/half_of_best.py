@@ -1,6 +1,6 @@
 """Prints in how many flights `best` finds the same edges when it computes at the other half of the samples.
 
-    python tools/detectors/half_of_best.py [FOLDER]
+    python tools/detectors/half_of_best.py [FOLDER]    # 12 s
 
 `best` computes at every second sample; in a log without its first sample it computes at the others. The app counts
 samples from the moment that its battery was plugged in, so it may compute at either half. Also printed: the same count
@@ -8,18 +8,19 @@ where a flight's heading is turned by 90 degrees. Folds 0 to 2, clean flights; h
 """
 
 import argparse
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from airtouch import logs
 from airtouch.cli.shared.flights import check_data_set, data_folder
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
+from airtouch.detector.evaluation.data.dataset import collect
+from airtouch.detector.evaluation.data.folds import BUILD_FOLDS
 from airtouch.errors import in_one_line
 from airtouch.logs.flight_log import ACC_WORLD, FlightLog
 
-FOLDS = ("0", "1", "2")  #: of the manifest, on which numbers may be chosen
 CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same; no source: round number
 
 
@@ -47,11 +48,9 @@ def main() -> None:
                         default=data_folder("airtouch"))
     folder = parser.parse_args().folder
     check_data_set(folder)
-    with open(folder / "manifest.csv") as file:
-        chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
     halves, headings = [], []
-    for name in chosen:
-        log = logs.read(folder / name)
+    for file in with_bar([f for f in collect([folder]) if f.condition.fold in BUILD_FOLDS], "flights"):
+        log = logs.read(file.path)
         edges = best.run(log).edges
         halves.append(same(edges, best.run(without_first_sample(log)).edges, 1))
         if log.has(*ACC_WORLD):

@@ -2,7 +2,8 @@
 
     python tools/detectors/high_edges.py FOLDER... --fold 0 --fold 1 --fold 2 --model MODEL.npz... [--twin FOLDER]
 
-Without --model and --twin it takes 10 s. Prints tables of the flights over one platform, by class of height:
+It takes 10 s without --model and --twin, 30 s with two models. Prints tables of the flights over one platform, by
+class of height:
 1. the "over" logit over the platform (median), and its change where one channel is muted (held at 0); each flight by
    the --model that was not trained on it, so the models of a cross-validation can be given together;
 2. the same logit where the air before the entry, the platform, or both are replaced by the flight's own hover: how
@@ -124,7 +125,7 @@ def head(first: str, names: Sequence[str]) -> str:
 def main() -> None:
     """Print the tables, by class of height."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
     parser.add_argument("--model", type=Path, action="append", default=[], help="a `best` model; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
@@ -147,16 +148,13 @@ def main() -> None:
 
 
 def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
-    """Logs and courses by class of height. Ends the program where a flight is not usable."""
+    """Logs and courses by class of height. Raises AirTouchError where a flight is not usable."""
     usable, left_out = adapt_report.readable(listed)
     if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
+        raise AirTouchError(left_out[0][1])
     groups: Groups = {name: [] for name in CLASSES}
     for flight in usable:
-        try:
-            path = course(flight.log, SPEED_MPS)
-        except AirTouchError as error:
-            raise SystemExit(str(error)) from None
+        path = course(flight.log, SPEED_MPS)
         name = height_class(path.clearance_m)
         if name:
             groups[name].append((flight.log, path))

@@ -6,8 +6,12 @@
 
 Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
 other groups, and a network trained on the same K alone. Prints a Markdown table: means over all draws and seeds, 95 %
-intervals by bootstrap over flights, and missed edges by height. --help explains the options. host/docs/twin.md has the
-table of the authors' flights, host/docs/results.md that of another month.
+intervals by bootstrap over flights, and missed edges by height. host/docs/twin.md has the table of the authors'
+flights, host/docs/results.md that of another month.
+
+By default it trains `best` 160 times: two groups, four K, five draws and two seeds, each once with 300 steps from
+--start and once with 1,000 alone. With --twin the former have 2,500 steps, with --beside 400 (`adapt.STEPS`). What
+--out holds is not trained again, so a run that was ended goes on.
 """
 
 import argparse
@@ -18,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
@@ -25,6 +30,7 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import one_a_flight, summarise
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.twin import adapt
 from labelled.training import Group, Training, recorded_beside, scores_of, twin_flights
@@ -84,7 +90,7 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--start", type=Path, action="append", default=[],
                         help="model to go on from, one for all groups or one for each in their order, which knows no "
                              "flight of its group; the rows without it if left out")
@@ -111,22 +117,22 @@ def arguments() -> argparse.Namespace:
 
 
 def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
-    """Ends the program, with one line, where options do not fit each other or the groups."""
+    """Raise AirTouchError where options do not fit each other or the groups."""
     if len(options.start) not in (0, 1, len(groups)):
-        raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for "
-                         "each")
+        raise AirTouchError(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one "
+                            "for each")
     if len(options.twin) not in (0, len(options.start)):
-        raise SystemExit(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for each, "
-                         "or none")
+        raise AirTouchError(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for "
+                            "each, or none")
     if options.unlabelled and not (options.twin or options.beside):
-        raise SystemExit("--unlabelled learns beside other flights: give --twin or --beside")
+        raise AirTouchError("--unlabelled learns beside other flights: give --twin or --beside")
     if options.beside and (options.twin or not options.start):
-        raise SystemExit("--beside goes on from a model: give --start, and no --twin")
+        raise AirTouchError("--beside goes on from a model: give --start, and no --twin")
 
 
 def groups_of(options: argparse.Namespace, listed: Sequence[FlightFile],
               readable: dict[Path, FlightLog]) -> list[Group]:
-    """The groups of all flights. Ends the program, with one line, where the options do not fit them."""
+    """The groups of all flights. Raises AirTouchError where the options do not fit them."""
     names = sorted({group_of(file, options.by) for file in listed})
     check(options, names)
     models = [best.load(path) for path in options.start]
@@ -157,19 +163,18 @@ def rows_of(options: argparse.Namespace) -> Iterable[tuple[str, str, int]]:
 def main() -> None:
     """Print each row as soon as its last draw is done."""
     options = arguments()
-    options.out.mkdir(parents=True, exist_ok=True)
+    make_folder(options.out)
     listed = dataset.collect(options.folders, options.speed)
-    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
+    readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     groups = groups_of(options, listed, readable)
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "
           "| false before / over / behind |\n|---|---|---|---|---|---|---|---|---|", flush=True)
     for title, kind, count in rows_of(options):
         draws = [(0, 0)] if kind == "start" else [(draw, seed) for draw in range(options.draws)
                                                   for seed in range(options.seeds)]
-        scores = [score for draw, seed in draws for group in groups
-                  for score in scores_of(Training(kind, count, draw, seed), group, readable, options)]
+        trainings = [(Training(kind, count, draw, seed), group) for draw, seed in draws for group in groups]
+        scores = [score for training, group in with_bar(trainings, title)
+                  for score in scores_of(training, group, readable, options)]
         print(line(title, scores, len(draws)), flush=True)
 
 

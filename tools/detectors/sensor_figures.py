@@ -6,8 +6,9 @@
     python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
         rates=out/rates.json=folds acceleration=out/november.json="another month"
 
-`out/folds` and `out/any` are what `airtouch crossval` kept, the second with --any-sensor. All figures are of flights
-that neither the weights nor the decoder's settings have seen; the text after the second = says which.
+The last command only reads files, in a second. `out/folds` and `out/any` are what `airtouch crossval` kept, the
+second with --any-sensor. All figures are of flights that neither the weights nor the decoder's settings have seen; the
+text after the second = says which.
 """
 
 import argparse
@@ -46,7 +47,7 @@ def main() -> None:
         parser.error(f"{odd[0]} is not NAME=JSON=WHERE")
     content = {name: figures(Path(path), where) for name, path, where in (pair.split("=") for pair in options.pairs)}
     if set(content) != {"all", *sensors.SENSORS}:
-        raise SystemExit(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
+        raise AirTouchError(f"figures of {', '.join(content)}; needed: all, {', '.join(sensors.SENSORS)}")
     write_bytes((json.dumps(content, indent=1) + "\n").encode(), options.out, force=True)
     print(f"written: {options.out}")
 

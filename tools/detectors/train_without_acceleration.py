@@ -7,6 +7,8 @@ The twin's edges are laid over the flights' free air as `airtouch adapt` does, b
 long as the recorded ones: a detector of recorded passes alone misses shorter ones of another month. Acceleration is
 left out of all flights; recorded and simulated flights have half of the crops each. --hold-out: not trained on the
 flights of this fold of the manifest, for a cross-validation, whose figures are in host/docs/results.md.
+
+One training of 2,500 steps (`adapt.STEPS`), after the twin's flights are simulated.
 """
 
 import argparse
@@ -14,8 +16,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airtouch import vehicle
+from airtouch.cli.shared.progress import Bar
 from airtouch.detector import best
 from airtouch.detector.best import free_air
+from airtouch.detector.best.fit_settings import Progress
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
@@ -32,7 +36,7 @@ ABSENT = ("acceleration",)  #: sensors that the detector does without
 
 
 def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightLog], least: float,
-        seed: int) -> BestModel:
+        seed: int, progress: Progress | None = None) -> BestModel:
     """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
     scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
     twin_flights, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
@@ -42,13 +46,13 @@ def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightL
     weights = [len(simulated) / len(recorded)] * len(recorded) + [1.0] * len(simulated)
     return best.fit([*recorded, *simulated], seed, pseudo_labels=[*own, *twin_flights.edges], emphasis=weights,
                     free_air=air, decoder=adapt.DECODER, steps=adapt.STEPS["scratch"], command=COMMAND,
-                    lag_of=(recorded, own))
+                    lag_of=(recorded, own), progress=progress)
 
 
 def main() -> None:
     """Read, train, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights with edges")
     parser.add_argument("--twin", type=Path, required=True, help="folder of `airtouch twin`")
     parser.add_argument("--free-air", type=Path, action="append", default=[], help="folder of flights without edges")
     parser.add_argument("--hold-out", type=int, metavar="FOLD", help="train on no flight of this fold")
@@ -59,12 +63,11 @@ def main() -> None:
     options = parser.parse_args()
     check_free(options.out, options.force)
     listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]
-    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
+    readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     air = free_air.read(options.free_air) if options.free_air else []
     flights = [adapt.LoadedFlight(f, readable[f.path]) for f in listed]
-    model = fit(flights, options.twin, air, options.least, options.seed)
+    with Bar("training") as bar:
+        model = fit(flights, options.twin, air, options.least, options.seed, lambda _, *done: bar(*done))
     model.save(options.out, options.force)
     print(f"written: {options.out}")
 

@@ -12,13 +12,13 @@ the estimated velocity (`hover_balance.ANSWER`), on the building part: all but e
 
 import argparse
 import itertools
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set
+from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.balance.hover_hypotheses import hypotheses
@@ -48,7 +48,7 @@ def cases(folder: Path, store: Path | None) -> list[dict]:
     case_of = {c["file"]: c for c in json_lines.read(store)}
     logs = {k: read(folder / r["file"]) for k, r in enumerate(rows) if family(r["condition"]) == "normal"}
     vehicle = vehicles.load(VEHICLE)
-    for i, row in enumerate(rows):
+    for i, row in enumerate(with_bar(rows, "diagnosing")):
         if row["file"] not in case_of:
             answer = diagnose([read(folder / row["file"])], vehicle, [logs[k] for k in baseline(rows, i)]).plain()
             case = {"file": row["file"], "drone": row["drone"], "condition": row["condition"],
@@ -56,8 +56,6 @@ def cases(folder: Path, store: Path | None) -> list[dict]:
                     "ranking": {r["name"]: r["probability"] for r in answer["ranking"]}}
             case_of[row["file"]] = case
             json_lines.append(store, [case])
-        print(f"\r{i + 1}/{len(rows)}", end="", file=sys.stderr)
-    print(file=sys.stderr)
     return [case_of[row["file"]] for row in rows]
 
 

@@ -134,7 +134,7 @@ MEASURES: dict[str, Callable] = {
 
 
 def standardised(model: Any) -> Any:
-    """A classifier or regression that is given standardised numbers."""
+    """A classifier or regression on standardised numbers."""
     return scikit("pipeline").make_pipeline(scikit("preprocessing").StandardScaler(), model)
 
 

@@ -9,6 +9,7 @@ host/docs/gap-real.md.
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -63,11 +64,12 @@ def main() -> None:
     vehicle = vehicles.load(VEHICLE)
     fan, calm = (list(ready_flights([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
+    print(f"calibrating on {len(calm)} calm flights", file=sys.stderr, flush=True)
     study, _ = calibrate.calibrated(vehicle, calm)
     print("| flight | roll, yaw torque of the commands, rad/s^2 | far blocks | from, s | highest power over floor |")
     print("|---|---|---|---|---|")
     for flight in sorted((*calm, *fan), key=lambda one: Path(one.name).name):
-        print(row(flight, study, vehicle))
+        print(row(flight, study, vehicle), flush=True)
 
 
 if __name__ == "__main__":

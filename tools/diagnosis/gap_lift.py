@@ -17,6 +17,7 @@ from scipy.signal import lfilter
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set
+from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.logs import read
@@ -57,12 +58,12 @@ def main() -> None:
     folder = parser.parse_args().flights / "neuralswarm"
     check_data_set(folder)
     ratios: dict[str, list[float]] = {}
-    for row in csv.DictReader((folder / "manifest.csv").open()):
-        if row["truth"] == "ground_effect":
-            vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
-            flight = ready(read(folder / "flights" / row["file"]), vehicle)
-            ratios.setdefault(f"day {row['day']}, {row['vehicle']}", []).append(
-                regressed_lift(flight, vehicle, STANDING_Z_M[row["cf"]], CURVE[row["vehicle"]]))
+    rows = [r for r in csv.DictReader((folder / "manifest.csv").open()) if r["truth"] == "ground_effect"]
+    for row in with_bar(rows, "flights"):
+        vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
+        flight = ready(read(folder / "flights" / row["file"]), vehicle)
+        ratios.setdefault(f"day {row['day']}, {row['vehicle']}", []).append(
+            regressed_lift(flight, vehicle, STANDING_Z_M[row["cf"]], CURVE[row["vehicle"]]))
     for name, each in sorted(ratios.items()):
         print(f"{name}: within {CLOSE:.0%} in {sum(abs(x - 1.0) < CLOSE for x in each)} of {len(each)}, "
               f"median {np.median(each):.2f}, standard deviation {np.std(each, ddof=1):.2f}")

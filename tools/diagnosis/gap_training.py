@@ -39,6 +39,7 @@ from airtouch.detector.evaluation.summary import one_a_flight, summarise
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.extras import need
 from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
@@ -65,19 +66,18 @@ def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
     if not store.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
-        over, before = zip(*filter(None, map(pieces, _evenly_spaced(close, MOST_PASSES))), strict=True)
+        cuts = [pair for pair in map(pieces, evenly_spaced(close, MOST_PASSES)) if pair is not None]
+        if not cuts:
+            raise AirTouchError(f"{len(close)} flights have the height `low` in the manifest, none with a platform and "
+                                "the free air before it: give other folds with --groups")
+        over, before = zip(*cuts, strict=True)
         craft = vehicle.load(VEHICLE)
-        whole, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
+        whole, near = diagnose(evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
         calibration = near.calibrated[1] if near.calibrated else None
         write_bytes(json.dumps({"all": whole.plain(), "close": near.plain(), "calibration": [
             [a.effect.name, dict(a.values)] for a in (calibration.active if calibration else ())]}, indent=1).encode(),
             store, force=True)
     return json.loads(store.read_text())
-
-
-def _evenly_spaced(flights: list[FlightLog], most: int) -> list[FlightLog]:
-    """At most `most` of the flights, evenly spaced."""
-    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, most).astype(int))]
 
 
 def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:

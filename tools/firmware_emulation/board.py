@@ -1,7 +1,7 @@
 """A Crazyflie's STM32 in QEMU, with the image of build.py in it: frames to and from the board of hardware/.
 
 Its time is that of its instructions: SHIFT says how long one takes. It waits for the desktop wherever it listens, so a
-run depends on what it is told and on nothing else.
+run depends on its inputs alone.
 """
 
 import os

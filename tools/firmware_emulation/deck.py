@@ -45,7 +45,7 @@ def frame(packet: bytes) -> bytes:
 class Deck:
     """`Deck(board, faults)` answers what the board sends; `turn(step)` is called before each step of the app.
 
-    sent: packets of the app that came over the UART. `step_packets()`: what a step of the app that has ended was given.
+    sent: packets of the app that came over the UART. `step_packets()`: what the last step of the app received.
     """
 
     board: Board
@@ -75,7 +75,7 @@ class Deck:
         self._begins = False
 
     def step_packets(self) -> list[bytes]:
-        """The packets that the step which has just ended was given."""
+        """The packets that the last step received."""
         now, self._arrived, self._next = self._arrived, self._next, []
         return now
 

@@ -102,7 +102,7 @@ def radio_packets(setpoints: np.ndarray, volts: float, step: int, wait: int,
 
 
 def sensor_block(readings: np.ndarray, rest: np.ndarray) -> bytes:
-    """What the board's sensors are given. rest (2,): parts of counts of the flow that are still owed."""
+    """Readings for the board's sensors, as bytes. rest (2,): parts of counts of the flow that are still owed."""
     gyro = np.clip(np.round(readings[at.GYRO:at.GYRO + 6] / GYRO_LSB), -32768, 32767).astype("<i2")
     acc = np.clip(np.round(readings[at.ACC:at.ACC + 6] / ACC_LSB), -32768, 32767).astype("<i2")
     down = readings[at.RANGE]

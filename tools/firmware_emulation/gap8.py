@@ -42,8 +42,8 @@ COUNTERS = ("answers", "lag", "lost", "dropped", "timeouts", "resets")
 
 @dataclass
 class Linked(Replay):
-    """A replay, with the packets that came over the UART, those that were other than the desktop's and those
-    that were taken and had not come out at the end, and what the log says of the link."""
+    """A replay, with the packets that came over the UART, those that differ from the desktop's, those
+    that were still in queues at the end, and the state of the link by the log."""
 
     packets: int = 0
     other_packets: int = 0
@@ -55,7 +55,7 @@ class Linked(Replay):
 
 @dataclass
 class _Step:
-    """What the board had in a step: its row, its log after it, and the packets that it was given."""
+    """What the board had in a step: its row, its log after it, and the packets that it received."""
 
     row: np.ndarray
     values: dict[str, float]
@@ -113,7 +113,7 @@ def _follow(result: Linked, board_steps: list[_Step], sent: list[bytes]) -> None
 
 
 def report(elf: Path, log: FlightLog, steps: int) -> bool:
-    """Fly every case, print; whether no step and no packet differed, and the wrong byte was told."""
+    """Fly every case, print; whether no step and no packet differed, and the wrong byte was reported."""
     well = True
     for what, faults in CASES.items():
         result = replay(elf, log, steps, faults)

@@ -29,7 +29,7 @@ TIMING_HEALTH = 128 | 256  #: late, stalled
 
 @dataclass
 class Replay:
-    """What came out: steps compared, those that differ with the first difference, edges (step, kind), and costs.
+    """What a replay gives: steps compared, those that differ with the first difference, edges (step, kind), and costs.
 
     prob_off: largest difference of `prob` over itself. It goes through the C library's expf, whose last bit is not that
     of the desktop's; everything else is compared to the bit.

@@ -1,6 +1,6 @@
 """Prints the instructions of the nine-channel step beside nine 256-point real FFTs of CMSIS-DSP, both emulated.
 
-    python -m tools.instruction_counts.compare_fft [--sdist cmsisdsp-1.10.3.tar.gz]
+    python -m tools.instruction_counts.compare_fft [--sdist cmsisdsp-1.10.3.tar.gz]    # 20 s
 
 The FFT's sources are those in the source distribution of PyPI's `cmsisdsp` (Apache-2.0), which pip downloads
 once to build/. They are compiled as Arm means it (-O2 and -O3, multiply-adds fused where the compiler likes),

@@ -1,7 +1,7 @@
 """Prints instructions, flash, RAM and stack of every kernel of the STM32, counted in the emulator.
 
-    python -m tools.instruction_counts.count                        the table, beside its budget
-    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too (manifest.csv there)
+    python -m tools.instruction_counts.count                        the table, beside its budget; 16 s
+    python -m tools.instruction_counts.count --flights FOLDER       over recorded flights too; 2 min
     python -m tools.instruction_counts.count --optimise=-Os         as the Crazyflie firmware compiles by default
     python -m tools.instruction_counts.count --toml                 limits for budget.toml beside this file, 3 % above
 
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.cli.shared.flights import check_data_set
 from airtouch.detector import best
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.errors import in_one_line
@@ -32,7 +33,7 @@ MARGIN = 1.03  #: a new budget over the measured cost
 
 
 def kernel_inputs(code: FlightCode, flight: np.ndarray) -> dict[str, np.ndarray]:
-    """What each kernel is given in a flight (n,) of edgeSample_t."""
+    """Input of each kernel in a flight (n,) of edgeSample_t."""
     events = code.fly("edge_pipeline", flight)
     channels = code.fly("motion_channels", flight).output
     first = best.load(None).int8.layers[0]
@@ -110,13 +111,15 @@ def main() -> None:
     parser.add_argument("--flights", type=Path, metavar="FOLDER", help="count over its clean flights too")
     parser.add_argument("--toml", action="store_true", help="print limits for budget.toml instead of the table")
     options = parser.parse_args()
+    if options.flights:
+        check_data_set(options.flights)
     code = FlightCode(compile_flight_code(options.core, optimise=options.optimise, compiler=options.compiler))
     costs = measure(code)
     if options.toml:
         _toml(options.core, costs)
         return
     chosen = options.compiler or compilers(options.core)[0]
-    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a made-up flight of 15 s")
+    print(f"{options.core}, {chosen}, {options.optimise}: instructions a step, over a synthetic flight of 15 s")
     _table(costs, budget.load(options.core) if options.core == "cortex-m4" and options.optimise == "-O2" else {})
     if options.flights:
         _flights(code, options.flights)

@@ -39,7 +39,7 @@ STREAM_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel by its step in flight_code.c: what it is given and gives, its sources and its state."""
+    """A kernel by its step in flight_code.c: types of its input and output, sources and state."""
 
     step: str
     takes: np.dtype
@@ -76,7 +76,7 @@ KERNELS = {
 
 @dataclass(frozen=True)
 class Steps:
-    """A flight through a kernel: what it gave (n, ...), whether a step computed its output, instructions a step."""
+    """A flight through a kernel: outputs (n, ...), whether a step computed its output, instructions of each step."""
 
     output: np.ndarray
     ready: np.ndarray

@@ -2,8 +2,8 @@
 
     python -m tools.instruction_counts.gap8_figures [FLIGHTS] [--out out/gap8] [--counts]
 
-Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept
-in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
+Costs come from emulators, 45 s in all. Accuracy and edge error come from five folds by flight; folds that are done are
+kept in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
 """
 
 import json
@@ -38,7 +38,7 @@ RESAMPLES = 2000  #: bootstrap samples over flights; no source: round number
 
 @dataclass(frozen=True)
 class Row:
-    """A network: detector and what its fit is given; shipped: whether its shipped model is what is counted."""
+    """A network: detector and arguments of its fit; shipped: whether its shipped model is counted."""
 
     name: str
     detector: str

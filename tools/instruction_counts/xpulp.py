@@ -23,7 +23,7 @@ from unicorn import unicorn_const as uc_const
 
 from .machine import RETURN, STACK_TOP, EmulationError, Machine
 
-BARRIER = RETURN + 16    #: a function that does nothing; what a team is given as its barrier
+BARRIER = RETURN + 16    #: a function that does nothing; the barrier of a team
 BARRIER_CYCLES = 20      #: two instructions and the event unit, rounded up
 _CORE_STACK = 4096       #: bytes of stack of each core
 #: registers x0 to x31

@@ -1,6 +1,6 @@
-"""Write host/docs/api.md: every public function of `airtouch` and `airtouch.gap`, from its signature and docstring.
+"""Writes host/docs/api.md: every public function of `airtouch` and `airtouch.gap`, from its signature and docstring.
 
-    python tools/pages/api_page.py
+    python tools/pages/api_page.py    # under a second
 """
 
 import argparse
@@ -12,6 +12,7 @@ from typing import Any
 
 import airtouch
 import airtouch.gap
+from airtouch.logs.files import write_bytes
 
 PAGE = Path(__file__).parents[2] / "host/docs/api.md"
 HEAD = """# API
@@ -58,7 +59,8 @@ def page() -> str:
 def main() -> None:
     """Write the page."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    PAGE.write_text(page(), "utf-8")
+    write_bytes(page().encode(), PAGE, force=True)
+    print(f"written: {PAGE}")
 
 
 if __name__ == "__main__":

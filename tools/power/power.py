@@ -2,9 +2,9 @@
 
     python tools/power/power.py measure run.csv                       # stages named in the log's own column
     python tools/power/power.py measure baseline=a.csv FC-FE=b.csv CCS-FF=c.csv filter=d.csv network=e.csv
-    python tools/power/power.py estimate                              # no meter: from counted instructions
+    python tools/power/power.py estimate                              # no meter: from counted instructions, 2 s
 
-A log has time, bus voltage and current in any order, told by the header (time_ms, bus_V, current_mA); without
+A log has time, bus voltage and current in any order, which the header names (time_ms, bus_V, current_mA); without
 one they are milliseconds, volts, milliamperes, as tools/power/ina219_logger.ino writes them. Each stage is
 switched on beside those before it, so its power is what it adds. See host/docs/power.md.
 """

@@ -37,8 +37,8 @@ EFFECTS = ("mass:fraction=0.12", "com_offset:x=0.002m", "wind:x=0.4m/s", "motor_
 def flown(scene: str, count: int, seed: int, effect: str = "") -> list[FlightLog]:
     """So many flights that end well, without what the simulator alone knows."""
     pairs = [effects.parse(effect)] if effect else []
-    every = batch.flights(scene, range(3 * count), vehicle=VEHICLE, effects=pairs, seed=seed, workers=1)
-    return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
+    flights = batch.flights(scene, range(3 * count), vehicle=VEHICLE, effects=pairs, seed=seed, workers=1)
+    return [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
 
 
 def answers(task: tuple[str, int, int]) -> list[tuple[str, str, float]]:

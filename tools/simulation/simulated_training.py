@@ -3,8 +3,9 @@
     python tools/simulation/simulated_training.py --out out/simulated [--flights 90] [--steps 1000]
         [--detector best] [--without none --without ground_effect ...]
 
-A row that is in --out already, for the same flights, settings and simulator sources, is not done again.
-Prints the table of host/docs/simulation-checks.md.
+By default 24 trainings, `best` and `paper` with all effects and with each of the scenario's eleven off. A row that is
+in --out already, for the same flights, settings and simulator sources, is not done again. Prints the table of
+host/docs/simulation-checks.md.
 """
 
 import argparse
@@ -16,13 +17,13 @@ from typing import Any
 
 import airtouch.simulation
 from airtouch import vehicle as vehicles
-from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.summary import summarise
-from airtouch.errors import in_one_line
-from airtouch.logs.files import write_bytes
+from airtouch.errors import AirTouchError, in_one_line
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.simulation import scenario
 
 ALL = "none"  #: of --without: no effect is off
@@ -61,7 +62,7 @@ def row(detector: str, without: str, options: argparse.Namespace,
     model = module.fit(flights, seed=options.seed, command="tools/simulation/simulated_training.py", **own)
     scores, left_out = evaluate.evaluate(files, module, model)
     if left_out:
-        raise SystemExit(f"not scored: {left_out[0][1]}")
+        raise AirTouchError(f"not scored: {left_out[0][1]}")
     figures = {**summarise(scores), "trained": description, "lag_s": module.lag_s(model), "options": own,
              "seconds": round(time.monotonic() - started)}
     write_bytes(json.dumps(figures, indent=1).encode(), path, force=True)
@@ -97,11 +98,8 @@ def main() -> None:
                         help="only these rows; none is all effects on")
     parser.add_argument("--seed", type=int, default=0, help="of flights and training (default %(default)s)")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
-    folder = find_flights()
-    if folder is None:
-        raise SystemExit("no recorded flights: set AIRTOUCH_FLIGHTS")
-    files = dataset.collect([folder])
+    make_folder(options.out)
+    files = dataset.collect([need_flights()])
     started = False
     for detector in options.detector or ("best", "paper"):
         for without in options.without or (ALL, *effects_of(options.scenario)):

@@ -3,11 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
-from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.controls import control, shrink_by_vehicle
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
@@ -16,6 +14,7 @@ from airtouch.gap.answer.shrink import Gap, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
 from airtouch.gap.naming import gap_closure
@@ -29,6 +28,7 @@ from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -38,7 +38,8 @@ from airtouch.vehicle import Vehicle
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
-               "nobody knows how much of the commanded torque is aliases of a faster loop")
+               "nobody knows how much of the commanded torque is aliases of a faster loop. Nor does anybody know how "
+               "the vehicle shakes by itself: no wake is judged, and nominal recorded flights come out as motor_noise")
 PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no wake is judged"
 
 
@@ -152,7 +153,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=arms(comparison.declared, judged, selection, result) if is_effect else {},
+        arms=shrink_by_vehicle(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -186,7 +187,7 @@ def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
     """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
     seconds = sum(len(f) for f in flights) * PERIOD_S
     keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
-    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
+    return evenly_spaced(flights, keep)
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
@@ -205,9 +206,10 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     rank_all: as for `naming.select`.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
-    `naming.gap_closure`. Where they do not, the others are judged without them.
+    `naming.gap_closure`. Where they do not, the others are judged without them. Without nominal flights a wake is no
+    candidate: one that fills a flight looks like a vehicle that shakes by itself.
     """
-    variants = candidates.all_candidates(without)
+    variants = candidates.all_candidates(without if data.study.nominal_count else (*without, OVERHEAD))
     selection = select(data, variants, say, without, rank_all)
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)

@@ -54,6 +54,15 @@ class Measurement:
         """The cell that the answer speaks of, the first of `where`; None where no cell stands out."""
         return self.where[0] if self.where else None
 
+    @property
+    def sentences(self) -> tuple[str, str]:
+        """Where most of the gap lies, and how large all of it is."""
+        where = f"Most of the gap lies {in_words(self.headline)}." if self.headline else \
+            "No gap stands out of the floor."
+        calibrated = f", {self.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights." \
+            if "calibrated" in self.gap else "."
+        return where, f"Overall it is {self.gap['before']:.2g} times the floor{calibrated}"
+
     def plain(self) -> dict[str, Any]:
         """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
         return rounded({

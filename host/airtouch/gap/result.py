@@ -147,10 +147,14 @@ class GapMap:
 
 @dataclass(frozen=True)
 class Rejected:
-    """An effect that is not named though it gains much, and in words what it fails by."""
+    """An effect that is not named though it gains much, and why, in words."""
 
     name: str
-    fails: str
+    why: str
+
+    def plain(self) -> dict[str, str]:
+        """JSON-ready."""
+        return {"name": self.name, "fails": self.why}
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ class OpenCell:
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready."""
-        return asdict(self)
+        return {**asdict(self), "nearest": [r.plain() for r in self.nearest]}
 
 
 @dataclass(frozen=True)
@@ -195,7 +199,8 @@ class Diagnosis:
 
     verdict: "effect", "none" or "unknown"; shrink: share of the gap that the named effects take away, None where none
     is named; control: the same with a deliberately wrong effect, None where none was wrong; arms: shrink with the
-    vehicle as declared and as calibrated. Terminal, report and JSON show this and compute nothing of their own.
+    vehicle as declared and as calibrated (`answer.controls.shrink_by_vehicle`). Terminal, report and JSON show this and
+    compute nothing of their own.
     """
 
     verdict: str

@@ -59,7 +59,7 @@ def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: M
         if curve.edges:
             axes.step(curve.distance_m, curve.share, where="post", label=f"{name} ({curve.edges})",
                       **((styles or {}).get(name, {})))
-    axes.set(xlim=(0, 0.4), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges")
+    axes.set(xlim=(0, 0.4), ylim=(0, 1), xlabel="distance error, m", ylabel="fraction of true edges")
     axes.grid(alpha=0.25)
     if legend:
         axes.legend(fontsize=7, frameon=False, loc="lower right")

@@ -90,7 +90,7 @@ def picture(score: Mapping[str, Any]) -> bytes:
 
 
 def _draw_confusion(axes: Axes, table: Mapping[str, Mapping[str, int]]) -> None:
-    """Flights by true effect, a row each, and first answer; shaded by their share of the row."""
+    """Flights by true effect, a row each, and first answer; shaded by their fraction of the row."""
     true = list(table)
     answers = sorted({a for v in table.values() for a in v} | set(true))
     counts = np.array([[table[t].get(a, 0) for a in answers] for t in true], float).reshape(len(true), len(answers))
@@ -115,5 +115,5 @@ def _draw_reliability(axes: Axes, points: Sequence[Mapping[str, float]]) -> None
         axes.annotate(f"{b['n']}", (b["probability"], b["value"]), xytext=(5, -9), textcoords="offset points",
                       fontsize=7, color=GREY)
     axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="probability of the first answer",
-             ylabel="share that was right, 95 % interval")
+             ylabel="fraction that was right, 95 % interval")
     axes.set_title("reliability (numbers: flights)", loc="left")

@@ -50,7 +50,7 @@ def answer(name: str, table: Mapping[str, Any]) -> str:
         return (f"{name}: {table['detections']} edges detected on {table['flights']} flights; "
                 "there is no true edge to compare with.")
     error = table["mean_abs_error_m"]
-    errors = "none was found" if error is None else f"the edges found are {error:.3f} m off on average"
+    errors = "none was detected" if error is None else f"the edges detected are {error:.3f} m off on average"
     return (f"{name} on {table['flights']} flights with {table['edges']} edges: "
             f"{table['missed_count']} missed ({table['missed']:.0%}), {table['false_count']} false "
             f"({table['false_per_minute']:.1f} a minute), {errors}.")
@@ -65,7 +65,7 @@ def in_words(score: FlightScore) -> str:
         else:
             metres = "" if edge.error_m is None else f" ({abs(edge.error_m):.3f} m)"
             side = "early" if edge.error_s > 0 else "late"
-            parts.append(f"{edge.kind} at {edge.true_sample / SAMPLE_RATE_HZ:.2f} s found "
+            parts.append(f"{edge.kind} at {edge.true_sample / SAMPLE_RATE_HZ:.2f} s detected "
                          f"{abs(edge.error_s):.2f} s {side}{metres}")
     false = score.note if score.false is None else f"{len(score.false)} false edges"
     return "; ".join([*parts, false]) + "."

@@ -72,7 +72,7 @@ def flight(
 
 
 def reliability(curves: Mapping[str, Reliability]) -> bytes:
-    """PNG of reliability diagrams: share of samples truly over a platform against the stated probability."""
+    """PNG of reliability diagrams: fraction of samples truly over a platform against the stated probability."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
@@ -82,14 +82,14 @@ def reliability(curves: Mapping[str, Reliability]) -> bytes:
                 ax.plot(curve.stated, curve.truly, color=colour_of(name), lw=1, alpha=0.6)
                 ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name),
                            label=f"{name}, ECE {curve.ece:.3f}")
-        ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="share truly over",
-               title="Reliability; a dot's area is its share of the samples")
+        ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="fraction truly over",
+               title="Reliability; a dot's area is its fraction of the samples")
         ax.legend(loc="upper left", frameon=False)
         return png(figure)
 
 
 def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
-    """PNG of hit curves, one a detector: share of all true edges detected within a distance."""
+    """PNG of hit curves, one a detector: fraction of all true edges detected within a distance."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
@@ -97,8 +97,8 @@ def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
             if curve.edges:
                 ax.step(curve.distance_m, curve.share, where="post", color=colour_of(name),
                         label=f"{name}, {curve.edges} edges")
-        ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges",
-               title="Edges found within a distance")
+        ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="fraction of true edges",
+               title="Edges detected within a distance")
         ax.grid(alpha=0.25)
         ax.legend(loc="lower right", frameon=False)
         return png(figure)

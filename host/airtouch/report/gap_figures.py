@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
@@ -20,6 +20,8 @@ SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` fo
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
 BELOW_IN, RIGHT_IN = 0.5, 0.15  #: inch, room below the lowest pane and to the right of all
+TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: colour behind the curves of each phase that is shaded
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
@@ -35,13 +37,13 @@ def signals(signal: Signal) -> bytes:
             if signal.after is not None:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
                              label="model with effect")
-            axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{signal.unit}")
+            axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{_unit(signal.unit)}")
             limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
         axes[-1].axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
         axes[-1].plot(signal.time_s, signal.before, color=BEFORE, lw=1.0, label="gap before")
         if signal.after is not None:
             axes[-1].plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
-        axes[-1].set(ylabel=f"measured - model\n{signal.unit}", xlabel="time, s")
+        axes[-1].set(ylabel=f"measured - model\n{_unit(signal.unit)}", xlabel="time, s")
         limit(axes[-1], signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
@@ -61,8 +63,8 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
                                                 ("after", spectrum.after, AFTER, 1.3)):
                 if power is not None:
                     ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), color=colour, lw=width, label=label)
-            ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left")
-            ax.set_ylabel(f"({spectrum.unit})²/Hz")
+            ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left", y=TITLE_AT)
+            ax.set_ylabel(f"({_unit(spectrum.unit)})²/Hz")
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
@@ -78,7 +80,7 @@ def commands(curves: MeanSpectra) -> bytes:
             if name in curves.nominal:
                 ax.loglog(f, curves.nominal[name], color=FLOOR, lw=1.6, label="baseline flights")
             ax.loglog(f, flown, color=BLUE, lw=1.2, label="these flights")
-            ax.set_title(f"{name} command", loc="left")
+            ax.set_title(f"{name} command", loc="left", y=TITLE_AT)
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
@@ -110,8 +112,19 @@ def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     for ax in axes:
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
         ax.yaxis.set_minor_formatter(NullFormatter())
     axes[-1].set_xlabel("frequency, Hz")
+
+
+def power_of_ten(x: float, _place: int | None = None) -> str:
+    """The label of a tick of a log axis: 10⁻³. That of matplotlib needs its parser of formulas, a second to begin."""
+    return "10" + f"{round(np.log10(x))}".translate(SUPERSCRIPT)
+
+
+def _unit(unit: str) -> str:
+    """A unit as an axis shows it: rad/s²."""
+    return unit.replace("^2", "²")
 
 
 def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:

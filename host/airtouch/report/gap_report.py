@@ -1,8 +1,8 @@
 """The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement.
 
 Nothing is fitted, replayed or averaged here. The answer, its figures and its headline stand in the diagnosis; of the
-map's cells `gap.where.summary` says which stay over the floor and sums them up by phase; `gap.answer.words` has the
-sentences. This module chooses how many of each are shown, and lays them out.
+map's cells `gap.where.summary` says which stay over the floor and sums them up by phase; `gap.answer.sentences`
+and `gap.answer.words` have the words. This module chooses how many of each are shown, and lays them out.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,11 +16,13 @@ from airtouch.extras import lacking
 from airtouch.gap.answer import words
 from airtouch.gap.answer.advice import ADD_AN_EFFECT
 from airtouch.gap.answer.pictures import Pictures
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell_words import remaining_in_words
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables
 from airtouch.report.html_page import data_url, rendered
@@ -38,10 +40,10 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
     """
     page = _page(
         title="Gap between flights and simulator", headline=measurement.headline,
-        answers=(words.measured_in_words(measurement.headline), words.overall_in_words(measurement.gap)),
+        answers=measurement.sentences,
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
         calibration=gap_tables.parameter_rows(measurement.calibration),
-        lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),
+        lists=[("Rotor speeds in the air", [r.in_words() for r in measurement.rotors]),
                ("What these logs cannot say", measurement.cannot), ("Notes", _notes(measurement.notes, pictures)),
                ("Left out", measurement.left_out)],
         flights=_flights(measurement.flights, measurement.vehicle, measurement.baseline), command=command)
@@ -56,7 +58,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     left = summary.remaining(cells)
     page = _page(
-        title="Gap between flights and simulator: diagnosis", answers=words.sentences(diagnosis),
+        title="Gap between flights and simulator: diagnosis", answers=sentences(diagnosis),
         headline=diagnosis.headline, cells=cells, floor_from=diagnosis.map.floor_from if diagnosis.map else "",
         where=diagnosis.where, steps=diagnosis.next, anchor=ANCHOR, effects=gap_tables.effect_rows(diagnosis),
         ranking=gap_tables.ranking_rows(diagnosis),
@@ -64,7 +66,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
-        remaining=words.remaining_in_words(left[:gap_tables.MOST_REMAINING]), remaining_count=len(left),
+        remaining=remaining_in_words(left[:gap_tables.MOST_REMAINING]), remaining_count=len(left),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),

@@ -6,7 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.advice import MISSIONS, collect, steps
+from airtouch.gap.answer.advice import MISSIONS, collect, steps, switched_on
+from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
+from airtouch.simulation import effects as registry
+from airtouch.simulation.effects import EFFECTS
 from made_diagnosis import VEHICLE, cell, diagnosis
 
 WITH_GYRO = [SimpleNamespace(rates=())]
@@ -32,7 +36,7 @@ def test_none_asks_for_nothing_to_be_added():
 @pytest.mark.parametrize("phase", sorted(MISSIONS))
 def test_an_open_gap_is_flown_again_in_its_phase(phase):
     again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))
-    assert again.command == collect(MISSIONS[phase]) and "--effects-file" in own.command
+    assert again.command == collect(MISSIONS[phase]) and "--effect-file" in own.command
 
 
 def test_an_open_gap_at_landing_is_flown_again_as_it_was():
@@ -45,3 +49,18 @@ def test_effects_that_look_alike_come_first_and_what_is_missing_last():
     alike, switch_on, baseline, gyro = steps(answer, [SimpleNamespace(rates=None)])
     assert alike.text.startswith("To tell mass from thrust_coefficient: ")
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
+
+
+def test_advised_commands_are_valid():
+    """Every effect's command is taken by `simulate` as it stands, and every mission advised can be loaded."""
+    from airtouch.crazyflie import mission
+
+    for name, effect in EFFECTS.items():
+        values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high
+                                   and not p.integer else p.default, unit=p.unit) for p in effect.parameters}
+        line = switched_on([NamedEffect(name, values)], VEHICLE.name)
+        parsed_effect = registry.parse(line.split("--effect ")[1].strip("'"))
+        expected = {k: q.value for k, q in values.items()}
+        assert parsed_effect[0] == name and parsed_effect[1] == pytest.approx(expected, rel=1e-3)
+    for name in (*MISSIONS.values(), *(c.mission for c in (*ALIKE, *CONFUSED) if c.mission), MISSION):
+        assert mission.load(name).legs

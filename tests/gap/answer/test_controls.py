@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.controls import arms, control
+from airtouch.gap.answer.controls import control, shrink_by_vehicle
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.signatures.signature import WRONG
 from hovers import DOWN, FLOOR, hover, select_from
@@ -36,7 +36,7 @@ def test_the_vehicle_as_declared_is_an_arm_of_its_own(pushed):
     """Against the same study it closes as much; against none there is one arm."""
     data, selection, gap = pushed
     answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
-    assert arms(None, data.flights, selection, answer) == {"declared": gap.shrink}
-    both = arms(FLOOR, data.flights, selection, answer)
+    assert shrink_by_vehicle(None, data.flights, selection, answer) == {"declared": gap.shrink}
+    both = shrink_by_vehicle(FLOOR, data.flights, selection, answer)
     assert both["calibrated"] == gap.shrink
     assert both["declared"].share.value == pytest.approx(gap.shrink.share.value, abs=0.02)

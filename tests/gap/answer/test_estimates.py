@@ -22,7 +22,7 @@ from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.evidence.clock import CORRELATION_S, clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters, strength_variance
-from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail_scale
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import halves
@@ -49,7 +49,7 @@ def true_over_fitted_variance():
     exponential energies e. The windows: squared and half overlapping they weight samples by 1 - sin^2 / 2.
     """
     freedom = REPLAY_FREEDOM
-    (scale,) = tail(np.array([freedom]))
+    (scale,) = tail_scale(np.array([freedom]))
 
     def mean(f):
         return quad(lambda e: np.exp(-e) * f(e), 0.0, np.inf)[0]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.probabilities import LEAD, MOST_UNKNOWN, probabilities
+from airtouch.gap.answer.probabilities import LEAST_LEAD, MOST_UNKNOWN, probabilities
 from airtouch.gap.naming.policy import TEMPERATURE, policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.signatures.candidates import terms
@@ -51,10 +51,22 @@ def test_unknown_stays_below_none_where_that_is_the_answer(named):
     assert chance["unknown"] / chance["none"] == pytest.approx(MOST_UNKNOWN)
 
 
-@pytest.mark.parametrize(("other", "behind"), [(60.0, LEAD), (50.0 - 0.5 * LEAD, LEAD), (40.0, 10.0)])
+@pytest.mark.parametrize(("other", "behind"), [(60.0, LEAST_LEAD), (50.0 - 0.5 * LEAST_LEAD, LEAST_LEAD), (40.0, 10.0)])
 def test_the_effect_named_first_leads_by_its_gain_and_by_lead_at_least(other, behind):
     chance = probabilities(selection({"wind": other, "mass": 50.0}, ("mass",)), "mass")
     assert chance["mass"] / chance["wind"] == pytest.approx(np.exp(behind / TEMPERATURE))
+
+
+def test_what_has_the_evidence_that_it_needs_stays_ahead_of_what_has_not():
+    """Odds of 1/e beside none, however far behind the first effect; one of n that lacks evidence has 1/n at most.
+
+    Mass gains most by far, of which little counts as evidence.
+    """
+    of_gains = selection({"mass": 900.0, "wind": LEAST, "gust": LEAST - 1e-9}, ("mass",))
+    mass = replace(of_gains.single_effects["mass"], evidence=LEAST + 1.0)
+    chance = probabilities(replace(of_gains, single_effects={**of_gains.single_effects, "mass": mass}), "mass")
+    assert chance["wind"] / chance["none"] == pytest.approx(np.exp(-1.0))
+    assert chance["gust"] / chance["none"] == pytest.approx(1.0 / 3.0)
 
 
 def test_what_is_missing_counts_in_full():

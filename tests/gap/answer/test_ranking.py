@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.ranking import AT_FLOOR, ranking_of, verdict_of
+from airtouch.gap.answer.ranking import AT_FLOOR, TOLD_APART, alike_of, ranking_of, verdict_of
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
-from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
@@ -80,3 +81,23 @@ def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
     assert probabilities == sorted(probabilities, reverse=True)
     assert [bool(r.why) for r in ranking] == [False] + [True] * (len(ranking) - 1)
     assert ranking[0].shrink.value == (0.8 if verdict == "effect" else 0.0), "of one effect named: that of the answer"
+
+
+def gaining(**gains):
+    """Candidates that were fitted in full and gain so many nats."""
+    return {n: replace(candidate("wind"), name=n, gain=g, full=True) for n, g in gains.items()}
+
+
+@pytest.mark.parametrize("named", [("mass",), ("mass", "wind"), ("wind", "mass")])
+def test_effects_are_alike_by_what_each_gains_alone(named):
+    """Of two that are named the first is weighed by its own gain, not by that of both."""
+    near = gaining(gust=200.0 - 0.9 * TOLD_APART, mass=200.0, wind=200.0 - 1.1 * TOLD_APART)
+    steps = tuple(replace(s, leave_one_out_gain=near[s.name].gain) for s in selection(named).steps)
+    assert alike_of(replace(selection(named), single_effects=near, steps=steps)) == (("gust", "mass"),)
+
+
+def test_names_of_one_thing_are_alike_whatever_they_gain():
+    """Of the relations of signals too, whose candidates are not fitted."""
+    far = gaining(mass=200.0, thrust_coefficient=2.0)
+    assert alike_of(replace(selection(), single_effects=far)) == (("mass", "thrust_coefficient"),)
+    assert alike_of(selection(())) == ()

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.ranking import alike_of
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.evidence.cells import REST_VIEW, cell_numbers
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
@@ -18,7 +18,7 @@ from airtouch.gap.naming.records import (
     TakenBack,
 )
 from airtouch.gap.naming.unknown import is_explained
-from airtouch.gap.relations.inference import LEAST_EVIDENCE, Against
+from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.signals.channels import COLUMN
 from hovers import FLOOR
 
@@ -98,13 +98,6 @@ def test_reason_of_a_second_named_effect():
     assert why_not(related, "wind", "effect") == "named beside mass: the probability is that it acts alone"
 
 
-def test_effects_are_alike_by_what_each_gains_alone():
-    """Of two that are named the first is weighed by its own gain, not by that of both."""
-    near = {"gust": judged("gust", 198.0), "mass": judged("mass", 200.0), "wind": judged("wind", 40.0)}
-    for named in (("mass",), ("mass", "wind"), ("wind", "mass")):
-        assert alike_of(replace(selection(named), single_effects=near)) == (("gust", "mass"),)
-
-
 def test_reasons_where_nothing_is_named():
     nothing = selection((), beside=40.0)
     assert not is_explained(nothing)
@@ -129,4 +122,4 @@ def test_reason_of_the_best_effect_where_the_answer_is_unknown():
 
 def test_the_three_that_gain_most_are_nearest():
     assert [n.name for n in nearest(selection(()))] == ["mass", "wind", "gust"]
-    assert all(n.fails for n in nearest(selection(())))
+    assert all(n.why for n in nearest(selection(())))

@@ -67,7 +67,7 @@ def test_the_floor_of_a_jitter_is_never_that_of_perfect_times():
 def counts_of(data, part):
     """Number of values (CELLS,) in each cell of a part."""
     problem = problem_of(data, part)
-    return np.bincount(problem.flat.cells, problem.elements.known, CELLS)
+    return np.bincount(problem.flat.cells, problem.elements.valid, CELLS)
 
 
 def test_cells_stand_out_that_have_enough_values():

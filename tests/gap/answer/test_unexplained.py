@@ -1,4 +1,4 @@
-"""What stays open: the seconds and the signals that a gap of known shape follows."""
+"""What stays open: cells and seconds of a gap of known shape."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.unexplained import followed_signals, ratios_of_blocks, unexplained, worst_stretch
+from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst_stretch
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import COLUMN, COUNT, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.logs.segments import KINDS
-from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
 from made_diagnosis import cell
 
@@ -82,34 +81,6 @@ def test_at_most_five_cells_are_reported():
     cells = [cell("force_x", phase, 1.0, band_hz=band) for band in ((0.5, 2.0), (2.0, 6.0))
              for phase in ("hover", "cruise", "landing")]
     assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
-
-
-def test_signal_that_the_power_follows_is_named():
-    """A gap that grows with time; the height, which does not change, and signals of the made hover say nothing."""
-    growing = hover(np.linspace(0.1, 3.0, 4000))
-    assert followed_signals(STUDY, [(growing, ratio_of(growing))]) == ["time"]
-    steady = hover(1.0)
-    assert not followed_signals(STUDY, [(steady, ratio_of(steady))])
-
-
-def test_a_signal_that_one_flight_lacks_is_not_named():
-    """Height that goes with the gap in two flights, of which one log has none."""
-    climbing = np.linspace(0.1, 3.0, 4000)[::-1]
-    pair = []
-    for with_height in (True, False):
-        one = hover(climbing)
-        if with_height:
-            one.log.columns["z_m"] = climbing
-        one.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = climbing[:, None]
-        pair.append((one, ratio_of(one)))
-    assert "height" in followed_signals(STUDY, pair[:1])
-    assert "height" not in followed_signals(STUDY, pair)
-
-
-@pytest.mark.parametrize(("seconds", "names"), [(19.2, []), (21.8, ["time"])])
-def test_fewer_than_eight_separate_blocks_are_not_tested(seconds, names):
-    one = flight(seconds)
-    assert followed_signals(STUDY, [(one, np.arange(1.0, len(starts(one, AIR)) + 1.0))]) == names
 
 
 def selection():

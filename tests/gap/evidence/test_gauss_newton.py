@@ -1,4 +1,4 @@
-"""The fit of mean effects: against SciPy's minimum of the same posterior; its slopes; where it begins."""
+"""The fit of mean effects: against SciPy's minimum of the same posterior, its curvature, and where it begins."""
 
 from dataclasses import replace
 
@@ -8,10 +8,8 @@ from scipy.optimize import minimize
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import PRIOR_UNITS
-from airtouch.gap.evidence.gauss_newton import CLOSE, COMMAND_PRIOR, Posterior, gauss_newton, start_of
-from airtouch.gap.evidence.least_squares import limits
+from airtouch.gap.evidence.gauss_newton import COMMAND_PRIOR, NEAR_NEUTRAL, Posterior, gauss_newton, start_of
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.slopes import FAR, SpectraSlopes, active_at
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR, hover
@@ -31,14 +29,14 @@ def problem():
 
 
 def posterior_of(problem, spread):
-    return Posterior(problem, [BIAS], 0.0, spread, wide=False)
+    return Posterior(problem, [BIAS], 0.0, spread, uncertain_floor=False)
 
 
 @pytest.mark.parametrize("spread", [PRIOR_UNITS, 0.5])
 def test_fit_ends_where_the_posterior_of_parameters_and_offsets_is_highest(problem, spread):
     """A narrow prior holds the parameters back, and the offsets take what is left."""
     posterior, k = posterior_of(problem, spread), len(BIAS.free)
-    result = gauss_newton(posterior, np.full(k, CLOSE))
+    result = gauss_newton(posterior, np.full(k, NEAR_NEUTRAL))
 
     def cost(both):
         return posterior.at(both[:k], both[k:]).cost
@@ -52,7 +50,7 @@ def test_fit_ends_where_the_posterior_of_parameters_and_offsets_is_highest(probl
 def test_covariance_is_the_inverse_curvature_of_the_posterior(problem):
     """By second differences in the first parameter, all else at its best: the profile of the posterior."""
     posterior, k = posterior_of(problem, PRIOR_UNITS), len(BIAS.free)
-    result = gauss_newton(posterior, np.full(k, CLOSE))
+    result = gauss_newton(posterior, np.full(k, NEAR_NEUTRAL))
     step = np.sqrt(result.covariance[0, 0])
 
     def profile(first):
@@ -64,45 +62,24 @@ def test_covariance_is_the_inverse_curvature_of_the_posterior(problem):
     assert 1.0 / curvature == pytest.approx(result.covariance[0, 0], rel=0.15)
 
 
-def test_slopes_of_a_linear_effect_are_its_differences(problem):
-    slopes = SpectraSlopes(problem, [BIAS], limits([BIAS])[1])
-    x = np.zeros(len(BIAS.free))
-    slopes.take(x)
-    for i, column in enumerate(slopes.columns):
-        one = x.copy()
-        one[i] = 1.0
-        change = problem.values(active_at([BIAS], one)) - problem.values(active_at([BIAS], x))
-        np.testing.assert_allclose(column, change, atol=1e-6 * np.abs(change).max())
-    assert not slopes.nonlinear.any() and not np.array(slopes.torque_powers).any()
-
-
-def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(problem):
-    slopes = SpectraSlopes(problem, [BIAS], limits([BIAS])[1])
-    slopes.take(np.zeros(len(BIAS.free)))
-    for moved, anew in ((0.9 * FAR, False), (1.1 * FAR, True)):
-        before = slopes.columns[0]
-        slopes.take(np.full(len(BIAS.free), moved))
-        assert (slopes.columns[0] is not before) is anew and np.all(slopes.at == moved * anew)
-
-
 def test_fit_begins_close_to_neutral_or_at_what_is_known(problem):
     known = np.array([np.nan, 2.0, np.nan, -1.0, np.nan, 0.0])
-    np.testing.assert_array_equal(start_of(problem, [BIAS], None), np.full(6, CLOSE))
-    np.testing.assert_array_equal(start_of(problem, [BIAS], known), [CLOSE, 2.0, CLOSE, -1.0, CLOSE, 0.0])
+    np.testing.assert_array_equal(start_of(problem, [BIAS], None), np.full(6, NEAR_NEUTRAL))
+    np.testing.assert_array_equal(start_of(problem, [BIAS], known), np.where(np.isnan(known), NEAR_NEUTRAL, known))
 
 
 def test_without_effects_and_offsets_nothing_is_fitted():
     data = Data(FLOOR, [hover(1, length_s=8.0)])
     problem = problem_of(data, whole_of(data))
-    result = gauss_newton(Posterior(problem, [], 0.0, PRIOR_UNITS, wide=False), np.zeros(0))
+    result = gauss_newton(Posterior(problem, [], 0.0, PRIOR_UNITS, uncertain_floor=False), np.zeros(0))
     assert not len(result.x) and result.values is problem.elements.base
 
 
 def test_prior_of_what_only_the_commands_show_is_narrow(problem):
     """Of effects of the loop, beside one that shows in the replay."""
     gain = next(t for t in terms("controller_gain") if t.signature.loop_only)
-    wide = Posterior(problem, [BIAS, gain], 0.0, PRIOR_UNITS, wide=False).prior
-    narrow = Posterior(problem, [BIAS, gain], 0.0, 0.1, wide=False).prior
+    wide = Posterior(problem, [BIAS, gain], 0.0, PRIOR_UNITS, uncertain_floor=False).prior
+    narrow = Posterior(problem, [BIAS, gain], 0.0, 0.1, uncertain_floor=False).prior
     k, n = len(BIAS.free), len(BIAS.free) + len(gain.free)
     assert (wide[:k] == PRIOR_UNITS).all() and (wide[k:n] == COMMAND_PRIOR).all() and (narrow[:n] == 0.1).all()
     np.testing.assert_array_equal(wide[n:], [o.spread for o in problem.offsets])

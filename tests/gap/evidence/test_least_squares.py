@@ -104,7 +104,7 @@ def test_weights_are_those_of_the_likelihoods_slope(problem):
         up, down = (problem.likelihood(values + sign * 1e-5 * column, added) for sign in (1.0, -1.0))
         assert 2.0 * (weights @ (column.conj() * values).real) == pytest.approx(-(up - down) / 2e-5, rel=1e-4, abs=1e-2)
     unknown = replace(problem, flat=replace(problem.flat, elements=replace(
-        problem.elements, known=np.arange(len(values)) % 2 == 0)))
+        problem.elements, valid=np.arange(len(values)) % 2 == 0)))
     np.testing.assert_array_equal(weights_of(unknown, values, added)[1::2], 0.0)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airtouch.gap.evidence.likelihood import Likelihood, tail, tailed
+from airtouch.gap.evidence.likelihood import Likelihood, minus_log_likelihood, tail_scale
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, log_likelihood
 
 
@@ -14,9 +14,10 @@ def test_the_sum_is_numpys(decades):
     power = 10.0 ** rng.uniform(*decades, 3000)
     size = power * rng.exponential(3.0, 3000) ** 4
     exponents = np.repeat([13.0, 7.0, 13.0], 1000)
-    known = rng.random(3000) > 0.1
-    expected = np.where(known, np.log(power) + exponents * np.log1p(size / power / 12.0), 0.0).sum()
-    assert tailed(size, power, np.full(3000, 12.0), exponents, known) == pytest.approx(expected, rel=1e-14)
+    valid = rng.random(3000) > 0.1
+    expected = np.where(valid, np.log(power) + exponents * np.log1p(size / power / 12.0), 0.0).sum()
+    total = minus_log_likelihood(size, power, np.full(3000, 12.0), exponents, valid)
+    assert total == pytest.approx(expected, rel=1e-14)
 
 
 def test_with_the_tails_of_commands_it_is_the_law_that_corrects_their_floor():
@@ -25,27 +26,27 @@ def test_with_the_tails_of_commands_it_is_the_law_that_corrects_their_floor():
     expected = rng.uniform(0.5, 2.0, (50, 3))
     power = expected * rng.exponential(size=(8, 50, 3))
     nu, each = np.full(power.size, COMMAND_FREEDOM), np.broadcast_to(expected, power.shape).ravel()
-    total = tailed(power.ravel(), each, nu, nu + 1.0, np.ones(power.size, bool))
+    total = minus_log_likelihood(power.ravel(), each, nu, nu + 1.0, np.ones(power.size, bool))
     assert log_likelihood(power, expected) == pytest.approx(-total, rel=1e-12)
 
 
 def test_no_value_gives_nothing():
-    assert tailed(*np.zeros((4, 0)), np.zeros(0, bool)) == 0.0
+    assert minus_log_likelihood(*np.zeros((4, 0)), np.zeros(0, bool)) == 0.0
 
 
 @pytest.fixture
 def law():
     """Values (200,), some of them unknown, and their likelihood."""
     rng = np.random.default_rng(3)
-    power, freedom, known = rng.uniform(0.5, 2.0, 200), np.repeat([12.0, 6.0], 100), rng.random(200) > 0.2
+    power, freedom, valid = rng.uniform(0.5, 2.0, 200), np.repeat([12.0, 6.0], 100), rng.random(200) > 0.2
     values = np.sqrt(power / 2.0) * (rng.normal(size=200) + 1j * rng.normal(size=200))
-    return Likelihood(power, freedom, tail(freedom), known), values
+    return Likelihood(power, freedom, tail_scale(freedom), valid), values
 
 
 def test_the_likelihood_of_all_values_is_the_sum_of_that_of_each(law):
     likelihood, values = law
     each = likelihood.per_value(values, 0.3)
-    assert likelihood(values, 0.3) == pytest.approx(each.sum()) and not each[~likelihood.known].any()
+    assert likelihood(values, 0.3) == pytest.approx(each.sum()) and not each[~likelihood.valid].any()
 
 
 @pytest.mark.parametrize("x", [0.0, 0.7, 20.0])
@@ -62,7 +63,7 @@ def test_its_slope_by_the_power_is_that_of_small_changes(law):
     slope, curvature = likelihood.power_slopes(values, added, 150)
     step = [likelihood.per_value(values, added + sign * small) for sign in (1.0, -1.0)]
     np.testing.assert_allclose(slope, ((step[0] - step[1]) / (2.0 * small))[:150], atol=1e-6)
-    assert len(slope) == len(curvature) == 150 and (curvature[likelihood.known[:150]] > 0.0).all()
+    assert len(slope) == len(curvature) == 150 and (curvature[likelihood.valid[:150]] > 0.0).all()
 
 
 def expected_curvature(likelihood, density, power):
@@ -93,13 +94,13 @@ def test_its_curvature_by_the_power_is_that_expected_without_tails(freedom, of_e
     assert curvature == pytest.approx(expected_curvature(hardly_any, exponential, power), rel=1e-3)
     with_tails = expected_curvature(law(freedom), lambda over: (1.0 + over / freedom) ** -(freedom + 1.0), power)
     assert with_tails / curvature == pytest.approx(freedom / (freedom + 2.0), rel=1e-3)
-    scaled = expected_curvature(law(tail(nu)[0]), exponential, power)
+    scaled = expected_curvature(law(tail_scale(nu)[0]), exponential, power)
     assert scaled / curvature == pytest.approx(of_exponential, abs=0.005)
 
 
 @pytest.mark.parametrize("freedom", [2.0, 6.0, 12.0])
 def test_tails_are_scaled_so_that_the_expected_power_is_the_likeliest(freedom):
     """Of exponential power e of mean 1, by quadrature."""
-    scale, = tail(np.array([freedom]))
+    scale, = tail_scale(np.array([freedom]))
     mean, _ = quad(lambda e: np.exp(-e) * (freedom + 1.0) * e / (scale + e), 0.0, np.inf)
     assert mean == pytest.approx(1.0, abs=1e-6)

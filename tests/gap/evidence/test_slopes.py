@@ -1,16 +1,16 @@
-"""Slopes of the spectra by effects of the loop, of which nothing is linear: against differences of the likelihood."""
+"""Slopes of the spectra: of a linear effect, its differences; of effects of the loop, those of the likelihood."""
 
 import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.least_squares import limits
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
+from airtouch.gap.evidence.slopes import FAR, active_at, slopes_at
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import fly
+from hovers import FLOOR, hover
 
-LAG, MASS = terms("motor_lag")[0], terms("mass")[0]
+LAG, MASS, BIAS = (terms(name)[0] for name in ("motor_lag", "mass", "imu_bias"))
 MEAN = [LAG, MASS]
 AT = np.array([*np.full(len(LAG.free), 1.0), 0.3])
 
@@ -23,9 +23,7 @@ def problem(study):
 
 @pytest.fixture
 def slopes(problem):
-    slopes = SpectraSlopes(problem, MEAN, limits(MEAN)[1])
-    slopes.take(AT)
-    return slopes
+    return slopes_at(problem, MEAN, AT)
 
 
 def central(function, which, step=0.01):
@@ -41,34 +39,60 @@ def test_slopes_of_the_loop_are_its_differences(problem, slopes):
     def log_ratio(x):
         return np.log(problem.data.study.loop.ratio(active_at(MEAN, x)))
 
-    for kept, function in ((slopes.torque_powers, torque_power), (slopes.rises, log_ratio)):
+    lag, mass = slopes.by_parameter[0], slopes.by_parameter[-1]
+    for slope, function in ((lag.torque_power, torque_power), (lag.rise, log_ratio)):
         expected = central(function, 0)
         assert np.abs(expected).max() > 0.0
-        assert np.abs(kept[0] - expected).max() < 0.1 * np.abs(expected).max()
-    assert slopes.nonlinear[0] and not slopes.nonlinear[-1]
+        assert np.abs(slope - expected).max() < 0.1 * np.abs(expected).max()
+    assert lag.nonlinear and not mass.nonlinear
 
 
 def test_slopes_of_the_loop_are_taken_anew_wherever_the_fit_stands(slopes):
-    before = list(slopes.columns)
-    slopes.take(AT + 0.01)
-    assert [now is then for now, then in zip(slopes.columns, before, strict=True)] == (~slopes.nonlinear).tolist()
-    np.testing.assert_array_equal(slopes.at, AT)
+    moved = slopes.moved_to(AT + 0.01)
+    for now, then in zip(moved.by_parameter, slopes.by_parameter, strict=True):
+        assert (now is then) is not then.nonlinear
+    np.testing.assert_array_equal(moved.at, AT)
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, wide):
+@pytest.mark.parametrize("uncertain_floor", [False, True])
+def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, uncertain_floor):
     """The gap stays as it is: only the power that is expected of it changes."""
     values = problem.values(active_at(MEAN, AT))
 
     def level(x):
-        power, cost = problem.loop_power(active_at(MEAN, x), wide)
-        return problem.likelihood(values, power) - cost
+        of_loop = problem.loop_power(active_at(MEAN, x), uncertain_floor)
+        return problem.likelihood(values, of_loop.power) - of_loop.cost
 
-    added, _ = problem.loop_power(active_at(MEAN, AT), wide)
-    gradient, information = slopes.power_equations(AT, values, added, wide)
+    added = problem.loop_power(active_at(MEAN, AT), uncertain_floor).power
+    gradient, information = slopes.power_equations(AT, values, added, uncertain_floor)
     for i in range(len(AT)):
         expected = central(level, i)
         assert gradient[i] == pytest.approx(expected, rel=0.03)
     assert abs(central(level, 0)) > 1.0
     np.testing.assert_allclose(information, information.T, rtol=1e-9)
     assert np.linalg.eigvalsh(information).min() > -1e-9 * information.max()
+
+
+@pytest.fixture(scope="module")
+def still():
+    """A hover without a loop."""
+    data = Data(FLOOR, [hover(1, length_s=12.0)])
+    return problem_of(data, whole_of(data))
+
+
+def test_slopes_of_a_linear_effect_are_its_differences(still):
+    x = np.zeros(len(BIAS.free))
+    for i, slope in enumerate(slopes_at(still, [BIAS], x).by_parameter):
+        one = x.copy()
+        one[i] = 1.0
+        change = still.values(active_at([BIAS], one)) - still.values(active_at([BIAS], x))
+        np.testing.assert_allclose(slope.column, change, atol=1e-6 * np.abs(change).max())
+        assert not slope.nonlinear and not slope.torque_power.any()
+
+
+def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(still):
+    begun = slopes_at(still, [BIAS], np.zeros(len(BIAS.free)))
+    for distance, anew in ((0.9 * FAR, False), (1.1 * FAR, True)):
+        moved = begun.moved_to(np.full(len(BIAS.free), distance))
+        assert (moved.by_parameter[0] is not begun.by_parameter[0]) is anew and np.all(moved.at == distance * anew)
+    assert begun.moved_to(begun.at, anew=True).by_parameter[0] is not begun.by_parameter[0]

@@ -53,7 +53,7 @@ def test_that_part_of_the_floor_grows_which_the_loop_makes(part, grown, added):
     channel, base = layout.channels(), layout.gather(data.base)
     is_torque = (channel >= TORQUE.start) & (channel < TORQUE.stop)
     flat = SimpleNamespace(
-        layout=layout, replay_count=len(base), elements=SimpleNamespace(base=base, known=np.isfinite(base)),
+        layout=layout, replay_count=len(base), elements=SimpleNamespace(base=base, valid=np.isfinite(base)),
         noise=np.random.default_rng(2).uniform(1.0, 2.0, len(base)), is_torque=is_torque)
     floor = FLOOR.floor.power[AIR][:, TORQUE]
     one = np.ones((2, *floor.shape))

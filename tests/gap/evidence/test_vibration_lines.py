@@ -2,14 +2,20 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
+from scipy.stats import lomax
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.evidence import vibration_lines
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.spectra import AIR, frequencies
 from gap_flights import flight as made_flight
+from imu_flights import FASTER, fly
 
 VEHICLE = vehicles.load()
+ASSUMED = 2.1e-8  #: thrust over speed squared of a vehicle that declares none, N s^2/rad^2
 
 
 def test_lines_of_steady_rotors_lie_at_their_fold_with_their_power():
@@ -44,3 +50,30 @@ def test_a_spread_keeps_the_power_and_has_its_width():
     near = np.abs(f - 25.0) < 12.0
     spread = np.sqrt(((f - middle) ** 2 * wide[0])[near].sum() / wide[0, near].sum())
     assert middle == pytest.approx(25.0, abs=0.3) and spread == pytest.approx(3.0, rel=0.1)
+
+
+def test_lines_of_rotors_that_turn_at_another_speed_are_found_where_they_are(study):
+    """Thrust over speed squared is not declared, so that the fold lies anywhere. Hover is where thrust is weight."""
+    flights = fly(1, {"vibration": {"amplitude": 1.0, "gyro": 0.05}}, seed=46, vehicle=FASTER)
+    own, assumed = (np.sqrt(VEHICLE.mass_kg * VEHICLE.gravity_mps2 / 4.0 / k) / (2.0 * np.pi)
+                    for k in (FASTER.thrust_per_speed2, ASSUMED))
+    assert vibration_lines.lines(Data(study, flights)).shift * frequencies(AIR)[1] \
+        == pytest.approx(own - assumed, abs=1.2)
+
+
+@pytest.mark.parametrize("strength", [0.1, 3.0])
+def test_the_strength_of_lines_is_the_likeliest(strength):
+    """Against SciPy's optimum, of powers drawn with lines in one bin of four by the law of the tails: Lomax's."""
+    rng, freedom = np.random.default_rng(6), REPLAY_FREEDOM
+    shape = np.where(np.arange(64) % 4 == 0, rng.uniform(0.5, 2.0, 64), 0.0) * np.ones((20, 1))
+    over = (1.0 + strength * shape) * freedom * rng.pareto(freedom, shape.shape)
+
+    def gain(x):
+        with_lines, without = (lomax.logpdf(over, freedom, scale=freedom * p) for p in (1.0 + x * shape, 1.0))
+        return (with_lines - without).sum()
+
+    best = minimize_scalar(lambda log_x: -gain(np.exp(log_x)), bounds=(-6.0, 3.0), method="bounded")
+    gained, found = vibration_lines._best_strength(over, shape)
+    finest = vibration_lines.FINER[1] / vibration_lines.FINER[0]
+    assert abs(np.log(found) - best.x) < np.log(finest), "the next of the strengths that are tried"
+    assert gained == pytest.approx(gain(found), rel=1e-9)

@@ -63,3 +63,12 @@ def test_directions_are_those_that_shifts_have():
     """Shifts along one way have one direction, however many are asked for."""
     axes = directions([5.0 * np.tile(np.eye(4)[2], (6, 1))], 3, 9.0 * np.tile(np.eye(4)[0], (6, 1)), 3)
     assert np.abs(axes) == pytest.approx(np.eye(4)[:, [0, 2]])
+
+
+def test_directions_hold_the_shifts_of_every_class_whatever_their_length():
+    rng = np.random.default_rng(4)
+    nameless = 50.0 * rng.normal(size=(100, 1)) * np.eye(8)[0]
+    strong, weak = (s * rng.normal(size=(100, 1)) * np.eye(8)[i] for s, i in ((1000.0, 1), (10.0, 2)))
+    axes = directions([strong, weak], 1, nameless, 1)
+    assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.norm(axes, axis=1) == pytest.approx([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)

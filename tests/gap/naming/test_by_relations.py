@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import select
 from airtouch.gap.naming.by_relations import matching, selection_by_relations
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.unknown import is_explained
-from airtouch.gap.relations.inference import Against, Inference
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import all_candidates
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, with_a_push
 

@@ -71,7 +71,8 @@ def test_certainty_refund_is_given_back_once(flying):
     latency = judging.PricedVariant("sensor_latency", all_candidates()["sensor_latency"][0], 0.0)
     late = judging.cross_validated(on, latency, None)
     both = judging.cross_validated(on, judging.PricedVariant("imu_noise", all_candidates()["imu_noise"][0], 0.5), late)
-    sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
+    sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, uncertain) for k in (0, 1))
+                    for uncertain in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
     assert sure - unsure > 5.0 and late.charges.certainty_refund == 0.0 and both.charges.choice_cost == 0.5
     assert both.charges.certainty_refund == pytest.approx(sure - unsure)
@@ -86,8 +87,8 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     on = judging.trial_of(data)
     gain = next(t for t in terms("controller_gain") if "height" in t.free)
     chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
-    certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
-                              for train, test in TWO_FOLDS) for wide in (False, True))
+    certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, uncertain_floor)
+                              for train, test in TWO_FOLDS) for uncertain_floor in (False, True))
     assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
     vibration = judging.PricedVariant("vibration", (terms("vibration")[0],), 0.0)
     both = judging.cross_validated(on, vibration, chosen)

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import UnknownLimit, policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, OverPrediction, Selection, Step
 from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
-from airtouch.gap.relations.inference import Against
 from hovers import FLOOR
 
 LEAST = 20.0  #: nats that may be left beside effects that gain little

@@ -74,7 +74,7 @@ def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_a_passing_effe
     burst = ((t >= FROM_S) & (t < FROM_S + 2.0)) * np.random.default_rng(4).normal(size=len(t))
     acceleration = nominal_flight.acceleration + burst[:, None] * [0.0, 0.0, 0.5]
     data = Data(calm, [replace(nominal_flight, acceleration=acceleration)])
-    level = [judge(data, whole_of(data), (), wide) for wide in (False, True)]
+    level = [judge(data, whole_of(data), (), uncertain_floor) for uncertain_floor in (False, True)]
     assert level[1] - level[0] > 100.0  # else this flight tests nothing
     assert gates.passing_effects(data)["gust"].gain < 12.0  # it pushes sideways, the burst upwards
 
@@ -153,17 +153,6 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
     assert (first.channel, first.flight) == ("force_y", nominal_flight.name)
     assert FROM_S - 2.0 < first.from_s < first.to_s < TO_S + 2.0
     assert first.over_floor > 3.0
-
-
-def test_words_say_when_and_what_is_open():
-    from airtouch.gap.answer import words
-    from airtouch.gap.result import NamedEffect, OpenCell, Quantity
-    assert words.effect_in_words(NamedEffect("wind", {"x": Quantity(0.3, unit="m/s")}, (("a/b.csv", 2.0, 5.04),))) \
-        == "wind: x 0.3 m/s; acts from 2.0 to 5.0 s of b.csv"
-    cell = OpenCell("force_z", (0.5, 2.0), "cruise", "a/b.csv", from_s=12.0, to_s=18.4, over_floor=6.08,
-                    follows=("height", "speed"))
-    assert words.open_in_words(cell) \
-        == "lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of b.csv; follows height and speed"
 
 
 def test_no_effect_passes_in_take_off_and_landing(study, nominal_flight):

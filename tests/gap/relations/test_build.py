@@ -1,11 +1,23 @@
-"""What a library is learned by, on draws of a known covariance."""
+"""What a library is learned by, on draws of a known covariance; and a small library, learned from few flights."""
 
 import numpy as np
 import pytest
 
-from airtouch.gap.features.feature_space import Standard, directions
+from airtouch.gap.features import flight_features
+from airtouch.gap.features.feature_space import Standard
+from airtouch.gap.relations import build, calibration, learning
 from airtouch.gap.relations.build import CLEAR_NAMELESS, PairedFlights, Whitening, _beyond_noise, _scatter_of_nameless
-from airtouch.gap.relations.learning import drawings
+from airtouch.gap.relations.inference import infer
+from airtouch.gap.relations.learning import Scene, drawings, fly
+from airtouch.simulation.effects import activate
+from gap_flights import VEHICLE
+
+#: begins of the names of 28 features that show a mass and noise: 50 nominal flights tell their covariance
+FEW_FEATURES = ("roll power force", "climb power force", "force x follows one", "force y follows one",
+                "force z follows one", "force z follows thrust")
+SCENE = Scene("hover", VEHICLE)
+NOT_LEARNED_FROM = 7_000_000  #: number of the first flight that is judged
+JUDGED = 6  #: flights with each effect
 
 
 def test_whitened_flights_have_covariance_one():
@@ -44,10 +56,49 @@ def test_effects_of_a_pair_are_of_the_upper_half_of_their_strengths():
     assert 0.01 <= min(strengths) < 0.011 and 0.09 < max(strengths) <= 0.1
 
 
-def test_directions_hold_the_shifts_of_every_class_whatever_their_length():
-    rng = np.random.default_rng(4)
-    nameless = 50.0 * rng.normal(size=(100, 1)) * np.eye(8)[0]
-    strong, weak = (s * rng.normal(size=(100, 1)) * np.eye(8)[i] for s, i in ((1000.0, 1), (10.0, 2)))
-    axes = directions([strong, weak], 1, nameless, 1)
-    assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.norm(axes, axis=1) == pytest.approx([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
+@pytest.fixture(scope="module")
+def infer_new_flights():
+    """A function: what a library of two effects, learned from some 170 hovers, infers in new flights with effects.
+
+    But for the counts, the features and the effects all is as in the whole library.
+    """
+    declared, whole = flight_features.declared_features(), learning.features
+    few = [i for i, f in enumerate(declared) if f.name.startswith(FEW_FEATURES)]
+    counts = {
+        build: {"NOMINAL_FLIGHTS": 50, "NAMELESS_FLIGHTS": 10, "FLIGHTS_OF_TWO": 4, "PER_KNOT": 4,
+                "WEAKEST_FLIGHTS": 1},
+        calibration: {"NOMINAL_FLIGHTS": 12, "CLASS_FLIGHTS": 10, "WITH_SECOND": 2, "FLIGHTS_OF_TWO": 3, "TRIED": 1,
+                      "LEAST_FLIGHTS": 4}}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(flight_features, "declared_features", lambda: tuple(declared[i] for i in few))
+        patch.setattr(learning, "features", lambda flight, vehicle: whole(flight, vehicle)[few])
+        for module, numbers in counts.items():
+            patch.setattr(module, "all_drawings", lambda: [d for e in ("mass", "imu_noise") for d in drawings(e)])
+            for name, number in numbers.items():
+                patch.setattr(module, name, number)
+        library = build.build(SCENE)
+
+        def inferences(effects):
+            new = [fly(SCENE, NOT_LEARNED_FROM + i, activate(effects)) for i in range(JUDGED)]
+            return [infer(library, library.coordinates(flight[None])) for flight in new]
+
+        yield inferences
+
+
+@pytest.mark.parametrize("effects", [{"mass": {"fraction": 0.1}}, {"imu_noise": {"factor": 1.5}}])
+def test_an_effect_that_a_library_was_built_with_is_named_and_sized(infer_new_flights, effects):
+    found = infer_new_flights(effects)
+    ((name, ((parameter, true),)),) = ((name, values.items()) for name, values in effects.items())
+    assert [[c.name for c in one.classes] for one in found] == [[name]] * JUDGED
+    assert sum(one.against.is_too_much for one in found) <= 1
+    for value, deviation in (one.readings[name][parameter] for one in found):
+        assert value == pytest.approx(true, rel=0.3) and abs(value - true) < 3.0 * deviation
+
+
+def test_a_library_built_of_few_flights_names_nothing_in_nominal_ones(infer_new_flights):
+    found = infer_new_flights({})
+    assert not any(one.classes for one in found) and sum(one.against.is_too_much for one in found) <= 1
+
+
+def test_an_effect_that_a_library_was_built_without_is_left(infer_new_flights):
+    assert all(one.against.is_too_much for one in infer_new_flights({"wind": {}}))

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
+from airtouch.gap.relations.library import NominalDistance
 from airtouch.gap.relations.readout import Readout
 from axis_library import NAMES, Q, library, noise
 
@@ -87,7 +89,7 @@ def test_scatter_between_flights_averages_out():
 def test_what_may_stand_beside_a_mass(other, effect, may):
     """Another name of it may not, another parameter of the same effect may if each has a class of its own."""
     mass = FlightHypotheses(noise() + 45.0 * np.eye(Q)[0], library().model).with_class(library().model.classes[0])
-    assert inference.may_stand_beside(replace(mass.fits[0].of, name=other, effect=effect), mass) is may
+    assert inference.may_stand_beside(replace(mass.fits[0].effect_class, name=other, effect=effect), mass) is may
 
 
 def test_no_more_effects_are_named_than_a_flight_may_have(monkeypatch):
@@ -107,7 +109,7 @@ def test_a_second_effect_needs_a_share_of_the_firsts_evidence():
 def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_two_effects(monkeypatch):
     """The distance says nothing here: nominal flights scatter widely."""
     monkeypatch.setattr(inference, "NAMELESS_MARGIN", -np.inf)
-    wide = replace(library(), distance=(float(Q), 1e6))
+    wide = replace(library(), distance=NominalDistance(float(Q), 1e6))
     for true, share in (((45.0,), 0.01), ((45.0, 30.0), 0.02)):
         values = noise(4) + sum(size * np.eye(Q)[i] for i, size in enumerate(true))
         values[60:] *= 2.5
@@ -148,7 +150,7 @@ def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
 def test_probabilities_are_those_of_half_the_evidence():
     """Tails are heavier than normal ones; what has the least evidence of an effect is as likely as none."""
     evidence = {"mass": inference.LEAST_EVIDENCE, "wind": inference.LEAST_EVIDENCE - 4.0}
-    chance = inference.Inference((), evidence, inference.Against(0.0, 1.0, False)).probabilities()
+    chance = inference.Inference((), evidence, Against(0.0, 1.0, False)).probabilities()
     assert chance["mass"] == pytest.approx(chance["none"])
     assert chance["wind"] == pytest.approx(chance["mass"] * np.exp(-2.0))
 

@@ -6,7 +6,7 @@ import pytest
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals import command_floor_correction
-from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SPREAD, WIDE, correction_of
+from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SPREAD, UNCERTAIN_FACTOR, correction_of
 
 BLOCKS = 3
 STEP = np.linspace(-0.004, 0.004, len(AXES))  # nepers by which the floor is off, by axis
@@ -26,14 +26,14 @@ def tables(factor):
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.6])
-@pytest.mark.parametrize("wide", [False, True])
-def test_a_level_is_shrunk_as_a_normal_mean_with_a_normal_prior(level_alone, factor, wide):
+@pytest.mark.parametrize("uncertain_floor", [False, True])
+def test_a_level_is_shrunk_as_a_normal_mean_with_a_normal_prior(level_alone, factor, uncertain_floor):
     """A small step d, seen with information k under a prior of variance v, is taken for d k v / (1 + k v)."""
     floor, ratio = tables(factor)
-    correction = correction_of(np.tile(floor * ratio * np.exp(STEP), (BLOCKS, 1, 1)), floor, ratio, wide)
+    correction = correction_of(np.tile(floor * ratio * np.exp(STEP), (BLOCKS, 1, 1)), floor, ratio, uncertain_floor)
     values = 0.5 * BLOCKS * len(floor)  # half overlapping blocks hold every sample twice
     of_tails = values * COMMAND_FREEDOM / (COMMAND_FREEDOM + 1.0)  # information of a Student-like value about its power
-    variance = (SPREAD[0] * (WIDE if wide else 1.0)) ** 2 + (COMMAND_DOUBT * np.log(factor)) ** 2
+    variance = (SPREAD[0] * (UNCERTAIN_FACTOR if uncertain_floor else 1.0)) ** 2 + (COMMAND_DOUBT * np.log(factor)) ** 2
     level = STEP * of_tails * variance / (1.0 + of_tails * variance)
     np.testing.assert_allclose(correction.log_power, np.broadcast_to(level, floor.shape), rtol=0.01, atol=1e-9)
     occam = 0.5 * len(AXES) * np.log1p(values * variance)

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
-from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SHAPES, SPREAD, WIDE
+from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SHAPES, SPREAD, UNCERTAIN_FACTOR
 from airtouch.gap.signals.command_view import CommandElements, CommandView, view_of
 from airtouch.gap.signals.spectra import AIR
 from airtouch.simulation.effects import activate
@@ -58,18 +58,18 @@ def shapes():
     return np.cos(np.pi * np.arange(SHAPES)[:, None] * place)
 
 
-def deviations(ratio, wide):
+def deviations(ratio, uncertain_floor):
     """Standard deviation (SHAPES,) of the amounts of the shapes before any flight."""
-    known = np.array([SPREAD[0], *[SPREAD[1]] * (SHAPES - 1)]) * (WIDE if wide else 1.0)
+    known = np.array([SPREAD[0], *[SPREAD[1]] * (SHAPES - 1)]) * (UNCERTAIN_FACTOR if uncertain_floor else 1.0)
     return np.sqrt(known ** 2 + COMMAND_DOUBT ** 2 * np.mean(np.log(ratio) ** 2))
 
 
-def best_correction(power, ratio, wide):
+def best_correction(power, ratio, uncertain_floor):
     """Correction (bins, axes) of highest posterior for a flight, and that log posterior less the log of a volume.
 
     The volume is that of the prior over that of the posterior, by the information of exponential powers.
     """
-    spread, log_power, level = deviations(ratio, wide), np.zeros(TABLE), 0.0
+    spread, log_power, level = deviations(ratio, uncertain_floor), np.zeros(TABLE), 0.0
     for axis in range(len(AXES)):
         expected = FLOOR[:, axis] * ratio[:, axis]
 
@@ -85,13 +85,13 @@ def best_correction(power, ratio, wide):
     return log_power, level
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_the_power_is_floor_times_ratio_times_the_correction_of_highest_posterior(powers, wide):
+@pytest.mark.parametrize("uncertain_floor", [False, True])
+def test_the_power_is_floor_times_ratio_times_the_correction_of_highest_posterior(powers, uncertain_floor):
     ratio, begin = MadeLoop.ratio([0.8, -0.5]), 0
-    expected, cost = made_view(powers).power([0.8, -0.5], wide)
+    expected, cost = made_view(powers).power([0.8, -0.5], uncertain_floor)
     likelihood = level = 0.0
     for power in powers:
-        log_power, of_flight = best_correction(power, ratio, wide)
+        log_power, of_flight = best_correction(power, ratio, uncertain_floor)
         own = expected[begin:begin + power.size].reshape(power.shape)
         np.testing.assert_array_equal(own, np.broadcast_to(own[0], own.shape))  # the same in every block
         np.testing.assert_allclose(np.log(own[0] / (FLOOR * ratio)), log_power, atol=3e-3)
@@ -112,24 +112,25 @@ def test_a_flight_on_the_floor_needs_no_correction_and_costs_the_volume_alone():
     assert cost == pytest.approx(0.5 * len(AXES) * np.linalg.slogdet(covariance)[1])
 
 
-@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("uncertain_floor", [False, True])
 @pytest.mark.parametrize("x", [(0.0, 0.0), (0.8, -0.5), (-1.0, 1.5)])
-def test_the_gradient_is_that_of_the_log_likelihood(powers, x, wide):
+def test_the_gradient_is_that_of_the_log_likelihood(powers, x, uncertain_floor):
     """By differences of the log likelihood as it is written above."""
-    gradient, _ = made_view(powers).slopes(x, RISES, wide)
+    gradient, _ = made_view(powers).slopes(x, RISES, uncertain_floor)
     step = 0.02
     for i in range(len(x)):
-        up, down = (sum(best_correction(p, MadeLoop.ratio(x + sign * step * np.eye(2)[i]), wide)[1] for p in powers)
+        up, down = (sum(best_correction(p, MadeLoop.ratio(x + sign * step * np.eye(2)[i]), uncertain_floor)[1]
+                        for p in powers)
                     for sign in (1.0, -1.0))
         assert gradient[i] == pytest.approx((up - down) / (2.0 * step), rel=0.01, abs=0.1)
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_the_information_is_that_of_powers_whose_floor_has_a_normal_prior(powers, wide):
+@pytest.mark.parametrize("uncertain_floor", [False, True])
+def test_the_information_is_that_of_powers_whose_floor_has_a_normal_prior(powers, uncertain_floor):
     """Rises seen with a variance of 1 / weight in each bin, and that of the shapes' prior beside it."""
     x = (0.8, -0.5)
-    _, information = made_view(powers).slopes(x, RISES, wide)
-    spread, expected = deviations(MadeLoop.ratio(x), wide), np.zeros((2, 2))
+    _, information = made_view(powers).slopes(x, RISES, uncertain_floor)
+    spread, expected = deviations(MadeLoop.ratio(x), uncertain_floor), np.zeros((2, 2))
     for n in BLOCKS:
         covariance = np.eye(len(F)) / (0.5 * n) + shapes().T @ np.diag(spread ** 2) @ shapes()
         expected += np.einsum("ifa,fg,jga->ij", RISES, np.linalg.inv(covariance), RISES)

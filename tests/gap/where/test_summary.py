@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from airtouch.gap.answer import advice, words
+from airtouch.gap.answer import advice
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.result import BASELINE, Cell, GapMap, NamedEffect
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
@@ -15,9 +16,9 @@ def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
     headline = summary.headline(cells)
     assert (headline.channel, headline.phase) == ("force_y", "hover")
     answer = diagnosis(cells, "unknown", ())
-    sentences = words.sentences(answer)
-    assert sentences[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the "
-                            "floor, and it stands out in 4 of 5 phases in the air.")
+    where, _, _ = sentences(answer)
+    assert where == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, "
+                     "and it stands out in 4 of 5 phases in the air.")
     texts = [s.text for s in advice.steps(replace(answer, indistinguishable=()), [])]
     assert "more time in hover" in texts[0] and not any("take-off" in t for t in texts)
 
@@ -42,9 +43,9 @@ def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():
 def test_headline_of_named_effects_is_where_they_take_most():
     cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
     result = diagnosis(cells, effects=(NamedEffect("ground_effect", {}),))
-    assert result.headline is cells[1] and "lift" in words.sentences(result)[0]
+    assert result.headline is cells[1] and "lift" in sentences(result)[0]
     assert ("1 of 2 cells still stand out, mostly in hover in roll torque at 0-0.5 Hz "
-            "(18 times the floor, as before)") in words.answer(result)
+            "(18 times the floor, as before)") in sentences(result)[2]
 
 
 def test_a_cell_without_an_interval_may_stand_out_and_is_not_significant():
@@ -54,3 +55,10 @@ def test_a_cell_without_an_interval_may_stand_out_and_is_not_significant():
     assert summary.stands_out(unknown) and not summary.significant(unknown)
     inside = cell("force_z", "hover", 0.13)  # its lower end is 0.117, the floor's upper end 0.12
     assert not summary.stands_out(inside) and not summary.significant(inside)
+
+
+def test_cells_of_the_ground_that_got_worse_are_counted_in_its_phase():
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
+             cell("force_y", "ground", 2.6, after=8.8)]
+    ground = next(p for p in summary.phases(cells) if p.name == "ground")
+    assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)

@@ -7,6 +7,7 @@ import pytest
 
 from airtouch import logs
 from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
 from airtouch.simulation.flight import fly
 from airtouch.twin.recorded import missions
 from skips import needs
@@ -50,5 +51,5 @@ def test_a_day_of_shaking_rotors_is_far_and_a_day_like_the_other_is_not(tmp_path
 
 def test_one_day_is_refused(tmp_path, monkeypatch, capsys):
     folder = write(tmp_path / "flights", ["1"], {})
-    with pytest.raises(SystemExit, match=r"two days with 4 flights.*1 1"):
+    with pytest.raises(AirTouchError, match=r"two days with 4 flights.*1 1"):
         table(monkeypatch, capsys, folder)

@@ -71,7 +71,7 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
     run(monkeypatch, *call, "--beside", beside)
     assert [count for count, _ in fits] == [4, 4] and all(o["start"] is not None for _, o in fits)
     assert all(o["emphasis"] == [3.0, 1.0, 1.0, 1.0] for _, o in fits)
-    with pytest.raises(SystemExit, match="no --twin"):
+    with pytest.raises(AirTouchError, match="no --twin"):
         run(monkeypatch, *call, "--beside", beside, "--twin", tmp_path)
 
 
@@ -105,7 +105,7 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     logs.write(made_flight(21), beside / "g.csv")
     run(monkeypatch, *call, "--speed", 0.3, "--beside", beside)
     assert all(x is not None for x in begun[4:]) and len(begun) == 8, "the given model's, beside other flights"
-    with pytest.raises(SystemExit, match="give --twin or --beside"):
+    with pytest.raises(AirTouchError, match="give --twin or --beside"):
         run(monkeypatch, *call)
 
 
@@ -117,7 +117,7 @@ def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
 
 def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
-    with pytest.raises(SystemExit, match="2 twins for 1 models"):
+    with pytest.raises(AirTouchError, match="2 twins for 1 models"):
         run(monkeypatch, house, "--start", tmp_path / "start.npz", "--twin", "a", "--twin", "b", "--by", "day",
             "--out", tmp_path / "out")
 

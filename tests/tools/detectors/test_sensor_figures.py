@@ -50,6 +50,6 @@ def test_each_sensor_has_its_figures(score, tmp_path, monkeypatch):
     content = json.loads((tmp_path / "out.json").read_text())
     assert {name: entry["of"] for name, entry in content.items()} == {
         name: f"{name} flights" for name in ("all", *sensors.SENSORS)}
-    with pytest.raises(SystemExit, match="needed: all"):
+    with pytest.raises(AirTouchError, match="needed: all"):
         write(monkeypatch, tmp_path / "other.json", *pairs[1:])
     assert not (tmp_path / "other.json").exists()

@@ -101,3 +101,9 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
     assert np.abs(swing).max() > 1e-4
     assert force(reported) - force({**reported, "turbulence": 0.0}) == pytest.approx(swing, abs=1e-9)
     assert reported["strength"] == max(mean, 0.25 / 3.0)
+
+
+def test_without_a_low_pass_there_is_nothing_to_diagnose(tmp_path):
+    file = FlightFile(Path("high.csv"), Condition(height="h80", fold=0))
+    with pytest.raises(AirTouchError, match="0 flights have the height `low`"):
+        gap_training.diagnoses({file: None}, tmp_path / "diagnosis.json")

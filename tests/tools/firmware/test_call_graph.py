@@ -1,7 +1,10 @@
 """The deepest chain of calls in synthetic call graphs whose frames are known."""
 
+import sys
+
 import pytest
 
+from tools.firmware import stack
 from tools.firmware.call_graph import deepest
 
 
@@ -41,3 +44,10 @@ def test_a_function_that_calls_itself_is_named_and_counted_once(build):
 def test_a_build_without_the_function_ends_it(build):
     with pytest.raises(SystemExit, match="fcallgraph-info"):
         deepest(build, "appMain")
+
+
+def test_the_script_prints_the_chain_and_what_is_not_counted(build, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["stack.py", str(build), "main"])
+    stack.main()
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("136 bytes: main > two > three") and second == "not counted: memcpy"

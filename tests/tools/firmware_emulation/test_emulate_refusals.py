@@ -11,7 +11,7 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.logs import write
-from tools.firmware_emulation import build, height
+from tools.firmware_emulation import build, height, missions
 from tools.firmware_emulation.__main__ import main
 from tools.firmware_emulation.replay import rows
 
@@ -155,7 +155,7 @@ def test_a_compiler_that_refuses_is_one_line(monkeypatch, tmp_path):
 def test_a_kept_flight_that_is_damaged_is_named(tmp_path):
     elf = tmp_path / "board.elf"
     elf.touch()
-    case = height.cases("flat")[0]
+    case = missions.cases("flat")[0]
     path = height.kept_at(tmp_path, elf, case, 1, 0)
     path.write_text("{")
     with pytest.raises(AirTouchError, match="is damaged: delete it, and it is flown again"):

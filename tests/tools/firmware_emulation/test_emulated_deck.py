@@ -7,14 +7,14 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.kernels.app_core import AppCore
 from airtouch.simulation.scenario import draw_flight
-from tools.firmware_emulation import gap8, height
+from tools.firmware_emulation import gap8, missions
 from tools.firmware_emulation.deck import CLEAR, Deck, Faults, frame
 from tools.firmware_emulation.plant import FLOW, Plant
 
 
 def counts_of_flow(x, distance, top):
     """Forward counts of the optical flow, sum of 0.2 s at 0.3 m/s, so far above what lies below x."""
-    plan = draw_flight(height.mission(height.CASES[0]), 1, 0)
+    plan = draw_flight(missions.mission(missions.CASES[0]), 1, 0)
     plant = Plant(plan, vehicles.load("crazyflie-2.1-flow"), 1, 0, [])
     drone = plant.stepper.plant[0]
     drone["flow_noise"] = 0.0

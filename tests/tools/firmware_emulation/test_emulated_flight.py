@@ -16,7 +16,7 @@ from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight
 from airtouch.simulation.sensors import log_row
-from tools.firmware_emulation import build, compare, flight, height, side_by_side
+from tools.firmware_emulation import build, compare, flight, height, missions, side_by_side
 from tools.firmware_emulation import plant as at
 from tools.firmware_emulation.plant import Plant
 
@@ -189,10 +189,10 @@ def test_a_case_that_is_not_there_is_refused(tmp_path):
 
 def test_a_ramp_is_not_why_the_drone_comes_back_beside_its_start():
     """The mission flies velocities, so what sensors and wind are off by adds up: as much over a flat floor."""
-    missions = [height.mission(next(case for case in height.CASES if case.name.startswith(name)))
-                for name in ("flat floor", "ramp")]
-    flat, ramp = (np.array([side_by_side.own_loop(mission, compare.vehicle(), seed)[-1, log_row.POSITION]
-                            for seed in range(1, 7)]) for mission in missions)
+    scenes = [missions.mission(next(case for case in missions.CASES if case.name.startswith(name)))
+              for name in ("flat floor", "ramp")]
+    flat, ramp = (np.array([side_by_side.own_loop(scene, compare.vehicle(), seed)[-1, log_row.POSITION]
+                            for seed in range(1, 7)]) for scene in scenes)
     assert side_by_side.rms([flat]) > 0.2 and np.abs(ramp - flat).max() < 0.1
 
 
@@ -248,9 +248,9 @@ def test_the_firmware_flies_and_the_app_changes_no_command(image):
 
 @pytest.mark.slow
 def test_the_height_is_kept_over_a_platform_where_it_is_asked_for(image):
-    case = height.CASES[0]
-    low, high = height.height_range(flight.fly(image, height.mission(case), compare.vehicle(), 1,
+    case = missions.CASES[0]
+    low, high = height.height_range(flight.fly(image, missions.mission(case), compare.vehicle(), 1,
                                        parameters={"atHeight.enable": 1}))
     assert 0.7 < low < high < 0.95
-    stock = flight.fly(image, height.mission(case), compare.vehicle(), 1)
+    stock = flight.fly(image, missions.mission(case), compare.vehicle(), 1)
     assert height.height_range(stock)[1] > 1.2, "the shipped firmware climbs"

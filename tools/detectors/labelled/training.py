@@ -34,7 +34,6 @@ def draw_flights(pool: Sequence[adapt.LoadedFlight], count: int, draw: int) -> l
     return [pool[i] for i in np.random.default_rng(draw).permutation(len(pool))[:count]]
 
 
-
 def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
     """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
     for file in held:
@@ -44,30 +43,24 @@ def held_out_scores(model: BestModel, held: Sequence[FlightFile], readable: dict
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
-
 def twin_flights(folder: Path, pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Edges of the twin in this folder, laid over the free air of these flights."""
     craft = vehicle.load(str(folder / files.VEHICLE))
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
 
 
-
 def recorded_beside(folders: Sequence[Path], speed: float | None,
                     pool: Sequence[adapt.LoadedFlight]) -> adapt.SimulatedFlights:
     """Flights of other folders to learn beside the pool's, without the sensors that the pool lacks."""
     listed = dataset.collect(folders, speed)
-    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    if left_out:
-        raise AirTouchError(f"not usable: {left_out[0][1]}")
+    readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     absent = adapt.absent_sensors(pool)
     return adapt.SimulatedFlights([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
-
 
 
 def digest(settings: Sequence[Any]) -> str:
     """Short hash of the settings of a training, for a file's name."""
     return hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:12]
-
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,6 @@ class Group:
     pool: list[adapt.LoadedFlight]
     start: BestModel | None
     beside: adapt.SimulatedFlights | None
-
 
 
 @dataclass(frozen=True)
@@ -105,7 +97,6 @@ class Training:
         return {"start": 0, "alone": options.alone_steps}.get(self.row, options.steps)
 
 
-
 def scores_of(training: Training, group: Group, readable: dict[Path, FlightLog],
               options: argparse.Namespace) -> list[FlightScore]:
     """Scores of one training on the group's held-out flights, from the file of an earlier run if there is one."""
@@ -120,7 +111,6 @@ def scores_of(training: Training, group: Group, readable: dict[Path, FlightLog],
     return scores
 
 
-
 def settings_of(training: Training, group: Group, options: argparse.Namespace) -> list[Any]:
     """All that a training depends on, for the names of its files."""
     row = training.row
@@ -131,7 +121,6 @@ def settings_of(training: Training, group: Group, options: argparse.Namespace) -
         settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
                      [training_set.flight_hash(log) for log in group.beside.logs]]
     return settings
-
 
 
 def model_of(training: Training, group: Group, file: Path, options: argparse.Namespace) -> BestModel:
@@ -147,7 +136,6 @@ def model_of(training: Training, group: Group, file: Path, options: argparse.Nam
     if training.row == "alone":
         return best.fit([f.log for f in sample], seed=training.seed, steps=training.steps(options), command=COMMAND)
     return learn(group, sample, training.seed, file, training.row == "unlabelled", options)
-
 
 
 def learn(group: Group, sample: Sequence[adapt.LoadedFlight], seed: int, file: Path, unlabelled: bool,

@@ -6,6 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from airtouch.detector.evaluation.data.dataset import collect
+from airtouch.detector.evaluation.data.folds import BUILD_DAYS, BUILD_FOLDS, still_air
+
 from . import peers as peer_flights
 from . import swarm_cuts
 from .authors import VEHICLE as AUTHORS_VEHICLE
@@ -16,8 +19,6 @@ from .crazypad.labels import baseline, building, family, manifest
 OTHERS = 5  #: most baseline flights of one; as tools/calibration/nominal_scatter.py, whose table the diagnosis uses
 PER_GROUP = 4  #: flights tested of a day and condition; no source: enough for a count, few enough for time
 LEAST_GROUP = 3  #: nominal flights of a group, for each to have two others
-#: the authors' folds and neural-swarm's days of the part "build" (host/docs/looks.md)
-BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")
 
 
 @dataclass(frozen=True)
@@ -117,14 +118,10 @@ def peers(folder: Path, part: str) -> Iterator[Case]:
                        str(own / row["file"]), tuple(map(str, peer_flights.baseline(own, row))))
 
 
-def _calm_groups(folder: Path, part: str) -> dict[tuple[str, ...], list[str]]:
+def _calm_groups(folder: Path, part: str) -> dict[tuple[str, str, str], list[str]]:
     """Clean flights of the authors in still air: (day, height, angle) -> files."""
-    groups: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
-    for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
-        if r["use"] == "clean" and r["wind"] == "none" and _in_part(part, r["fold"] in BUILD_FOLDS):
-            group = r["file"].split("_")[2][:4], r["height"], r["angle_deg"]
-            groups[group].append(str(folder / "airtouch" / r["file"]))
-    return groups
+    files = [file for file in collect([folder / "airtouch"]) if _in_part(part, file.condition.fold in BUILD_FOLDS)]
+    return {group: [str(file.path) for file in members] for group, members in still_air(files).items()}
 
 
 def _in_part(part: str, build: bool) -> bool:

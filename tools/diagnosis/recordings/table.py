@@ -32,7 +32,7 @@ def answer(case: dict) -> str:
 
 
 def counts(cases: list[dict]) -> dict[tuple[str, str], Counter[str]]:
-    """(row, truth) -> how often each answer was given. A row of neural-swarm's and of nominal flights has a condition.
+    """(row, truth) -> count of each answer. A row of neural-swarm's and of nominal flights has a condition.
 
     Of the peers, whose flights each have an effect of their own, answers that are right count together as "right".
     """
@@ -46,10 +46,10 @@ def counts(cases: list[dict]) -> dict[tuple[str, str], Counter[str]]:
 
 
 def line(row: str, truth: str, answers: Counter[str]) -> str:
-    """A line of the table: hits, their share with its 95 % interval, every answer, the most frequent first."""
+    """A line of the table: hits, their fraction with its 95 % interval, all answers, the most frequent first."""
     hits = answers["right" if row == "peers" else truth]
-    every = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]))
-    return f"| {row} | {truth} | {share_text(hits, answers.total())} | {every} |"
+    counted = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]))
+    return f"| {row} | {truth} | {share_text(hits, answers.total())} | {counted} |"
 
 
 def print_table(cases: list[dict], folder: Path) -> None:

@@ -20,7 +20,7 @@ from airtouch.errors import AirTouchError
     "airtouch gap diagnose real --baseline nominal --each"))
 @inputs_and_outputs
 @click.option("--without", multiple=True, metavar="EFFECT", help="Exclude a candidate; may be repeated.")
-@click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
+@click.option("--effect-file", "--effects-file", "effect_files", multiple=True, metavar="FILE",
               help="Python file with effects of your own; may be repeated.")
 @click.option("--partner", multiple=True, metavar="LOG",
               help="Log of another vehicle in the air with REAL, of one clock and frame; may be repeated.")

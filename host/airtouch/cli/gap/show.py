@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from airtouch.gap.answer import words
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
@@ -52,15 +53,16 @@ def measurement(screen: Console, result: Measurement) -> None:
         screen.print(cell_table(result.where, "Largest cells of the gap", screen.width))
     else:
         screen.print("No cell of the gap stands out of its floor.")
-    screen.print(words.overall_in_words(result.gap))
-    remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in result.rotors])
+    _, overall = result.sentences
+    screen.print(overall)
+    remarks(screen, "Rotor speeds in the air", [r.in_words() for r in result.rotors])
     remarks(screen, "What these logs cannot say", result.cannot)
     remarks(screen, "Notes", result.notes)
 
 
 def diagnosis(screen: Console, result: Diagnosis) -> None:
     """Print a diagnosis: sentences, effects, ranking, largest cells and next steps."""
-    for sentence in words.sentences(result):
+    for sentence in sentences(result):
         screen.print(sentence)
     for effect in result.effects:
         screen.print("  " + words.effect_in_words(effect))

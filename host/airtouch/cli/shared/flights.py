@@ -3,8 +3,6 @@
 import os
 from pathlib import Path
 
-import click
-
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import MANIFEST
 
@@ -25,10 +23,10 @@ def find_flights() -> Path | None:
 
 
 def need_flights(folder: Path | None = None) -> Path:
-    """The given folder, else that of `find_flights`. Raises a usage error if there is none."""
+    """The given folder, else that of `find_flights`. Raises AirTouchError if there is none."""
     chosen = folder or find_flights()
     if chosen is None:
-        raise click.UsageError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")
+        raise AirTouchError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")
     return chosen
 
 

@@ -1,4 +1,9 @@
-"""A progress bar that several commands share."""
+"""A progress bar that several commands and the scripts of tools share."""
+
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+_T = TypeVar("_T")
 
 
 class Bar:
@@ -26,3 +31,12 @@ class Bar:
 
     def __call__(self, done: int, total: int, note: str = "") -> None:
         self.progress.update(self.task, completed=done, total=total, note=note)
+
+
+def with_bar(items: Sequence[_T], name: str) -> Iterator[_T]:
+    """The items one after another, with a bar on stderr of how many are done."""
+    with Bar(name) as bar:
+        for done, item in enumerate(items):
+            bar(done, len(items))
+            yield item
+        bar(len(items), len(items))

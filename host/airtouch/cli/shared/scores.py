@@ -13,7 +13,7 @@ from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
 CAPTION = ("second line: 95 % interval, bootstrap by flight. A miss has no detection within 1.5 s; a detection serves "
-           "one edge, the others are false. Hits: share of all true edges.")
+           "one edge, the others are false. Hits: fraction of all true edges.")
 WIDE = 150  #: columns of a terminal on which a row of figures fits
 SUMMARY_WIDTH, NAME_WIDTH = 17, 22  #: columns of a summary, and of the figures' names, where they stand side by side
 SIDE_BY_SIDE = [{"s": "mean |error|, s"}.get(name, name) for name in ("flights", "edges", *COLUMNS)]

@@ -134,4 +134,4 @@ class Board:
 def edge_line(edge: ReportedEdge) -> str:
     """A detected edge as one line of text."""
     place = f", x {edge.x_m:+.2f} m, y {edge.y_m:+.2f} m" if np.isfinite(edge.x_m) else ""
-    return f"{edge.kind} felt at {edge.at_s:.2f} s{place} (P {edge.probability:.2f})"
+    return f"{edge.kind} detected at {edge.at_s:.2f} s{place} (P {edge.probability:.2f})"

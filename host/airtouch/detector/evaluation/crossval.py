@@ -159,6 +159,14 @@ def readable_flights(files: Sequence[FlightFile], spare: int = 0,
     return logs, left_out
 
 
+def all_readable(files: Sequence[FlightFile], spare: int = 0) -> dict[Path, FlightLog]:
+    """The logs by path. Raises AirTouchError, with the first reason, where one cannot be used (`readable_flights`)."""
+    logs, left_out = readable_flights(files, spare)
+    if left_out:
+        raise AirTouchError(f"{left_out[0][1]} ({len(left_out)} of {len(files)} flights cannot be used: take them out)")
+    return logs
+
+
 def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, seed: int,
                   options: dict[str, Any]) -> Any:
     """The fold's model, from `path` if that exists; else trained now, and saved there if such a model has a file."""

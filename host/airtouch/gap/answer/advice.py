@@ -83,6 +83,6 @@ def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
             "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
     next_steps.append(NextStep(
         "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
-        f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effects-file mine.py",
+        f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effect-file mine.py",
         ADD_AN_EFFECT))
     return next_steps

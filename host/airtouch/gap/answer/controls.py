@@ -26,9 +26,11 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
     return Control(name, shrink_of(data, selection.halves, Candidate(name, fits[0].terms, 0.0, fits), gap))
 
 
-def arms(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
-         ) -> dict[str, Shrink]:
-    """The shrink with the vehicle as calibrated and as its file declares it; the latter alone without baseline.
+def shrink_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
+                      ) -> dict[str, Shrink]:
+    """The shrink with the vehicle as its file declares it ("declared") and as calibrated on a baseline ("calibrated").
+
+    The effects named are fitted anew beside the declared vehicle. Without a baseline the answer's own is "declared".
 
     declared: the study of the vehicle as declared, None where the answer is held against that already; judged: the
     flights that the answer comes from; answer: names an effect.

@@ -17,8 +17,8 @@ from airtouch.gap.signatures.term import Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
 RESTARTS = 12  #: of a fit of several parameters, at most; chosen
-#: least strength of an effect, by which its random part is divided; chosen, far below any that is named
-LEAST_STRENGTH = 1e-6
+#: strength of an effect by which its random part is divided at least; chosen, far below any that is named
+LEAST_DIVISOR = 1e-6
 
 
 def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
@@ -94,7 +94,7 @@ def with_random_part(effect: NamedEffect, part: Term) -> NamedEffect:
     (amount,) = part.signature.free  # the strength
     own, of_mean = part.values[amount], effect.parameters[amount]
     limits = {p.name: p.high for p in part.effect.parameters}
-    strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), LEAST_STRENGTH)
+    strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), LEAST_DIVISOR)
     raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
     return NamedEffect(effect.name, {**effect.parameters, amount: raised, **scaled}, effect.seconds)

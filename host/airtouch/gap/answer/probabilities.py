@@ -8,8 +8,12 @@ from airtouch.gap.naming.policy import TEMPERATURE
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import against_over_limit
 
-LEAD = 1.0  #: nats that others lie behind the effect that is named first, at least; chosen, so that it leads the list
-#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAD
+#: nats that others lie behind the effect that is named first, at least; chosen, so that it leads the list
+LEAST_LEAD = 1.0
+#: score, at least, of a candidate with the evidence that it needs, however far it is behind the first effect named;
+#: chosen: odds of 1/e beside `none`, as one of n candidates without that evidence has 1/n at most
+LEAST_SCORE = -TEMPERATURE
+#: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAST_LEAD
 MOST_UNKNOWN = 0.9
 
 
@@ -46,22 +50,19 @@ def _weights(selection: Selection) -> np.ndarray:
 
 
 def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
-    """Score of every single candidate beside 0 for `none`, nats; those that could be named keep the order of gains.
+    """Score of every single candidate beside 0 for `none`, nats.
 
-    The first effect named leads them by LEAD at least.
+    Those with the evidence that they need keep the order of their gains: the first effect named leads them by
+    LEAST_LEAD at least, and none has less than LEAST_SCORE.
     """
     single_effects = selection.single_effects
     out = [_beside_none(single_effects[n].evidence, selection.least_nats[n], len(names)) for n in names]
     if not selection.named_steps or selection.named_steps[0].name not in names:
         return out
     first = names.index(selection.named_steps[0].name)
-
-    def beside_first(i: int) -> float:
-        """Score of a candidate that could be named, or of the first effect itself."""
-        behind = max(single_effects[names[first]].gain - single_effects[names[i]].gain, LEAD) if i != first else 0.0
-        return max(out[first] - behind, -TEMPERATURE)
-
-    return [beside_first(i) if score >= 0.0 else score for i, score in enumerate(out)]
+    leads = [max(single_effects[names[first]].gain - single_effects[n].gain, LEAST_LEAD) for n in names]
+    return [max(out[first] - leads[i], LEAST_SCORE) if score >= 0.0 and i != first else score
+            for i, score in enumerate(out)]
 
 
 def _beside_none(evidence: float, least: float, many: int) -> float:

@@ -12,8 +12,8 @@ from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
 AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
-#: nats of held-out log likelihood; two candidates that differ by less cannot be told apart: odds of 20, chosen
-CLOSE = 3.0
+#: nats of held-out log likelihood by which two candidates differ that can be told apart; chosen: odds of 20
+TOLD_APART = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
@@ -38,7 +38,7 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 
 
 def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
-    """Whether there is no gap, and nothing that would be outside it or within calmer bands; see `verdict_of`."""
+    """Whether rule 1 of `verdict_of` holds, but for the relations of signals: no gap, where a gap could show."""
     hypothesis = selection.named_hypothesis
     outside_the_gap = hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms)
     if gap.shrink.before > AT_FLOOR or outside_the_gap:
@@ -74,7 +74,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     groups = []
     first = selection.single_effects[selection.named_steps[0].name]
     same = [n for n, c in selection.single_effects.items() if (c.full or selection.inference is not None)
-            and selection.gained(first) - selection.gained(c) < CLOSE]
+            and selection.gained(first) - selection.gained(c) < TOLD_APART]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named_steps:

@@ -60,15 +60,15 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
     """What an effect lacks to be named by the relations of the signals, in nats."""
-    gain = inference.evidence[name]
-    first = [s.name for s in selection.named_steps]
-    if name in first:
+    gain, named = inference.evidence[name], [s.name for s in selection.named_steps]
+    if name in named:
         return _against_in_words(selection)
     if gain < LEAST_EVIDENCE:
         return f"the relations of the signals gain {gain:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
-    if not first:
+    if not named:
         return f"the relations of the signals gain {gain:.1f} nats by it, and more by a model without names"
-    return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
+    first = named[0]
+    return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first]:.0f} by {first}"
 
 
 def _against_in_words(selection: Selection) -> str:
@@ -77,7 +77,7 @@ def _against_in_words(selection: Selection) -> str:
     if worst is not None and over_prediction_ratio(selection) == against_over_limit(selection):
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")
-    return _left(selection, "a model without names gains {} nats beside it", "it")
+    return _remainder_in_words(selection, "a model without names gains {} nats beside it", "it")
 
 
 def cell_in_words(cell: int) -> str:
@@ -86,17 +86,18 @@ def cell_in_words(cell: int) -> str:
     return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
-def _left(selection: Selection, gains: str, off: str) -> str:
-    """What is left, in words, with its limit; gains: the words for the gain of the nameless model.
+def _remainder_in_words(selection: Selection, nameless_gains: str, named: str) -> str:
+    """What the effects named leave, in words, with its limit.
 
-    off: the effects from which the flight lies off, "" for none, where the relations of signals measured a distance.
+    nameless_gains: what is said of the nameless model, with {} for its nats; named: the effects, "" for none, for what
+    is said of the distance from them where the relations of signals measured one.
     """
     remainder = against(selection)
     nats = f"{max(remainder.nats, 0.0):.0f}"
     if remainder.of_distance:
-        farther = f"from {off} than nominal flights from none" if off else "off than nominal flights"
+        farther = f"from {named} than nominal flights from none" if named else "off than nominal flights"
         return f"the flight lies {nats} nats farther {farther}, up to {remainder.limit:.0f} may be chance"
-    return f"{gains.format(nats)}, up to {remainder.limit:.0f} may be left"
+    return f"{nameless_gains.format(nats)}, up to {remainder.limit:.0f} may be left"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:
@@ -114,13 +115,13 @@ def _why_not_unknown(selection: Selection) -> str:
     if not is_explained(selection):
         return AT_ITS_FLOOR
     names = " and ".join(s.name for s in selection.named_steps)
-    return _left(selection, "a model without names adds {} nats", names)
+    return _remainder_in_words(selection, "a model without names adds {} nats", names)
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.named_hypothesis is None:
-        return _left(selection, "a model without names gains {} nats", "")
+        return _remainder_in_words(selection, "a model without names gains {} nats", "")
     first = selection.named_steps[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.named_hypothesis.gain
     return f"{first} gains {gain:.0f} nats over it"

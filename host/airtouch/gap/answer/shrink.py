@@ -14,7 +14,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, left_over
+from airtouch.gap.evidence.fit import CELL_GAIN, LeftOver, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
@@ -24,7 +24,7 @@ from airtouch.gap.signatures.term import Term
 
 #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen. The error is that of
 #: exponential energies of mean 1, of which OVERLAP_WEIGHT of all are independent
-SURE = 4.0
+STANDARD_ERRORS = 4.0
 MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
 FEWEST_VALUES = 12  #: values that a cell needs; chosen
 DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
@@ -132,9 +132,9 @@ def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[T
                cells: Sequence[np.ndarray]) -> float:
     """Distance of the cells' energy from the floor, above or below, summed over their values."""
     total, count = np.zeros(CELLS), np.zeros(CELLS)
-    for groups, energies in _held_out(data, parts, terms, cells):
-        total += np.bincount(groups, energies, CELLS)
-        count += np.bincount(groups, minlength=CELLS)
+    for cell, energies in _held_out(data, parts, terms, cells):
+        total += np.bincount(cell, energies, CELLS)
+        count += np.bincount(cell, minlength=CELLS)
     return float(np.abs(total - count).sum())
 
 
@@ -151,23 +151,30 @@ def _energies(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
 
 def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """For each half, group (n,) and energy (n,) over the floor of its values in the cells.
+    """For each half, cell number (n,) and energy (n,) over the floor of its values in the cells.
 
     The energy is what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
-        problem, values, power = left_over(data, parts[half], terms[1 - half])
-        use = problem.elements.known & cells[half][problem.flat.cells]
-        yield problem.flat.cells[use], np.minimum(squared(values[use]) / power[use], LARGEST)
+        left = left_over(data, parts[half], terms[1 - half])
+        cell = left.problem.flat.cells
+        use = left.problem.elements.valid & cells[half][cell]
+        yield cell[use], _energy(left)[use]
 
 
 def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
-    problem, values, power = left_over(data, part, ())
-    energy = np.minimum(squared(values) / power, LARGEST)
-    count = np.bincount(problem.flat.cells, problem.elements.known, CELLS)
-    mean = np.bincount(problem.flat.cells, energy * problem.elements.known, CELLS) / np.maximum(count, 1)
-    out = mean > 1.0 + SURE * np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1))) + MARGIN
+    left = left_over(data, part, ())
+    cell, valid = left.problem.flat.cells, left.problem.elements.valid
+    count = np.bincount(cell, valid, CELLS)
+    mean = np.bincount(cell, _energy(left) * valid, CELLS) / np.maximum(count, 1)
+    error = np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1)))
+    out = mean > 1.0 + STANDARD_ERRORS * error + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST_VALUES)
+
+
+def _energy(left: LeftOver) -> np.ndarray:
+    """Energy (n,) of each value over the floor, LARGEST at most."""
+    return np.minimum(squared(left.gap) / left.power, LARGEST)

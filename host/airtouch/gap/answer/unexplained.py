@@ -1,9 +1,10 @@
-"""What a diagnosis leaves open: in which cells, when, and which signals of the flight the gap there follows."""
+"""What a diagnosis leaves open: in which cells of the map, and when."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from airtouch.gap.answer.followed_signals import followed_signals
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
@@ -16,12 +17,8 @@ from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
-from airtouch.simulation import signals as at
 
 MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
-FEWEST_RANKED = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
-CHANCE = 0.01  #: probability of a correlation by chance alone, all signals together (Bonferroni); chosen
-LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; far below any measured
 
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
@@ -68,7 +65,10 @@ def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
 
 
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:
-    """Flights with their ratios (blocks,), NaN in blocks most of which is another phase; as they are where all are."""
+    """Flights with their ratios (blocks,), NaN in blocks of which most is another phase.
+
+    Where no block of any flight is mostly of the phase, all count.
+    """
     place = KINDS.index(phase)
     within = [(f, np.where(_commonest_phase(f) == place, ratio, np.nan)) for f, ratio in ratios]
     return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] or [(f, r) for f, r in ratios if len(r)]
@@ -93,51 +93,3 @@ def worst_stretch(ratio: np.ndarray) -> tuple[int, int]:
     while last + 1 < len(ratio) and ratio[last + 1] >= limit:
         last += 1
     return first, last
-
-
-def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
-    """Names of the signals whose mean over a block ranks like a cell's power (Spearman), the closest first.
-
-    ratios: flights with the cell's rms over its floor (blocks,), NaN in blocks that do not count. A signal that not
-    every flight has is left out.
-    """
-    from scipy.stats import spearmanr  # slow to import, and seldom needed
-
-    power = np.concatenate([np.log(np.maximum(ratio, LEAST_RATIO)) for _, ratio in ratios])[::2]  # they overlap by half
-    known = np.isfinite(power)
-    if known.sum() < FEWEST_RANKED:
-        return []
-    means = [_block_means(study, flight) for flight, _ in ratios]
-    names = list(dict.fromkeys(name for of_flight in means for name in of_flight))
-    correlations = []
-    for name in names:
-        if not all(name in of_flight for of_flight in means):
-            continue
-        values = np.concatenate([of_flight[name] for of_flight in means])[::2][known]
-        if np.ptp(values) == 0.0:
-            continue
-        rank = spearmanr(values, power[known])
-        if rank.pvalue < CHANCE / len(names):
-            correlations.append((abs(rank.statistic), name))
-    return [name for _, name in sorted(correlations, reverse=True)]
-
-
-def _block_means(study: Study, flight: Flight) -> dict[str, np.ndarray]:
-    """Mean in the air (blocks,) of each signal of a flight, by its name."""
-    samples = starts(flight, AIR)[:, None] + np.arange(LENGTH[AIR])
-    return {name: values[samples].mean(axis=1) for name, values in _signals(study, flight).items()}
-
-
-def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
-    """The signals (n,) of a flight that a gap may follow, by their names in the answer."""
-    s, log = flight.signals, flight.log
-    thrust = study.vehicle.thrust(flight.pwm).sum(axis=1)
-    out = {"thrust": thrust, "tilt": np.hypot(flight.body_to_world[:, 2, 0], flight.body_to_world[:, 2, 1]),
-           "time": np.arange(len(flight)) * PERIOD_S}
-    if log.has("zrange_m") or log.has("z_m"):
-        out["height"] = s[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1)
-    if log.has("vx_mps", "vy_mps"):
-        out["speed"] = np.hypot(s[:, at.VELOCITY], s[:, at.VELOCITY + 1])
-    if log.has("vbat_V"):
-        out["battery voltage"] = interpolate_missing(log["vbat_V"])
-    return out

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -22,24 +23,13 @@ Spectra = dict[str, np.ndarray]  #: of one flight by state, (blocks, bins, COUNT
 BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Data:
-    """Flights with their blocks and the spectra of the gap before any effect is added.
-
-    By flight, and the first two by state: first (blocks,): first sample of each block; base (blocks, bins, COUNT):
-    spectra of the gap, unit/sqrt(Hz); measured_torque (blocks, bins, 3): those in the air of the measured angular
-    acceleration; quiet (blocks, 3): blocks in the air and axes in which no set-point stepped; bridging (blocks, bins,
-    COUNT): power that lost rows add there.
-    """
+    """Flights with their blocks and the spectra of the gap before any effect is added, each made at its first use."""
 
     study: Study
     flights: Sequence[Flight]
-    first: list[BlockStarts] = field(init=False, compare=False, repr=False)
-    base: list[Spectra] = field(init=False, compare=False, repr=False)
-    measured_torque: list[np.ndarray] = field(init=False, compare=False, repr=False)
-    quiet: list[np.ndarray] = field(default_factory=list, init=False, compare=False, repr=False)
-    bridging: list[np.ndarray] = field(init=False, compare=False, repr=False)
-    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
+    workspace: Workspace = field(default_factory=Workspace, init=False, repr=False)
 
     @property
     def means_only(self) -> bool:
@@ -55,17 +45,35 @@ class Data:
         """How long the flights last together, s."""
         return sum(len(f) for f in self.flights) * PERIOD_S
 
-    def __post_init__(self) -> None:
-        self.first = [{state: starts(f, state) for state in (AIR, REST)} for f in self.flights]
-        self.measured_torque = [short_time_spectra(angular_acceleration(f), b[AIR], AIR)
-                                for f, b in zip(self.flights, self.first, strict=True)]
-        if self.study.response is not None:
-            self.quiet = [self.study.response.quiet(command_torque(self, i)) for i in range(len(self.flights))]
+    @cached_property
+    def first(self) -> list[BlockStarts]:
+        """First sample of each block, by flight and state."""
+        return [{state: starts(f, state) for state in (AIR, REST)} for f in self.flights]
+
+    @cached_property
+    def measured_torque(self) -> list[np.ndarray]:
+        """Spectra (blocks, bins, 3) in the air of the measured angular acceleration, by flight."""
+        return [short_time_spectra(angular_acceleration(f), first[AIR], AIR)
+                for f, first in zip(self.flights, self.first, strict=True)]
+
+    @cached_property
+    def quiet(self) -> list[np.ndarray]:
+        """In which blocks in the air and axes (blocks, 3) no set-point stepped, by flight; empty without a response."""
+        response = self.study.response
+        return [] if response is None else [response.quiet(command_torque(self, i)) for i in range(len(self.flights))]
+
+    @cached_property
+    def bridging(self) -> list[np.ndarray]:
+        """Power (blocks, bins, COUNT) that lost rows add in the air, by flight, unit^2/Hz."""
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
-        self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
-                         for f, b, q in zip(self.flights, self.first, quiet, strict=True)]
-        self.base = gap_spectra(self, ())
+        return [bridging_power(f, study.vehicle, study.calibration, first[AIR], where, study.response)
+                for f, first, where in zip(self.flights, self.first, quiet, strict=True)]
+
+    @cached_property
+    def base(self) -> list[Spectra]:
+        """Spectra (blocks, bins, COUNT) of the gap without effects, by flight and state, unit/sqrt(Hz)."""
+        return gap_spectra(self, ())
 
 
 def gap_spectra(data: Data, active: Sequence[Active], flights: Iterable[int] | None = None) -> list[Spectra]:

@@ -6,6 +6,7 @@ to flight (offsets) has a prior.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -36,7 +37,7 @@ LEAST_CURVATURE = 1e-6  #: nats, curvature in the logarithm of a strength, by wh
 CURVATURE_STEP = 0.15  #: of the logarithm of a strength, over which the likelihood's curvature is taken; chosen
 
 
-@dataclass
+@dataclass(frozen=True)
 class FittedTerms:
     """A hypothesis fitted.
 
@@ -74,17 +75,18 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
     random_power: np.ndarray | float = 0.0
     # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
-        random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
+        random = _with_strengths(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
+        random_power = problem.random_power(random)
     last_level = -np.inf
     for _ in range(1 if brief else TURNS):
-        posterior = Posterior(problem, mean, random_power, prior, bool(random))
+        posterior = Posterior(problem, mean, random_power, prior, uncertain_floor=bool(random))
         solution = gauss_newton(posterior, x, BRIEF if brief else ITERATIONS)
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             break
-        command_power, floor_cost = problem.loop_power(active, True)
-        random_power = _random_power(problem, random, solution.values, active)
-        level = problem.likelihood(solution.values, random_power + command_power) - floor_cost
+        random = _with_strengths(problem, random, solution.values, active)
+        random_power, of_loop = problem.random_power(random), problem.loop_power(active, uncertain_floor=True)
+        level = problem.likelihood(solution.values, random_power + of_loop.power) - of_loop.cost
         if not mean or level < last_level + SETTLED:
             break
         last_level = level
@@ -97,64 +99,67 @@ def _with_values(terms: Sequence[Term], x: np.ndarray, random: Sequence[Term]) -
     return tuple(next(fitted[t.shows_in]) if t.shows_in in fitted else t for t in terms)
 
 
-def judge(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False) -> float:
+def judge(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> float:
     """Log likelihood of blocks under effects fitted elsewhere; offsets between flights fitted anew.
 
-    wide: the commands' floor is as uncertain as under random effects, though there are none.
+    uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
     """
-    problem, values, added, cost = _explained(data, part, terms, wide)
-    return problem.likelihood(values, added) - cost
+    left = left_over(data, part, terms, uncertain_floor)
+    return left.problem.likelihood(left.gap, left.added) - left.cost
 
 
-def left_over(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
-              ) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, the gap (n,) that effects leave, offsets subtracted, and its expected power (n,).
+class LeftOver(NamedTuple):
+    """What effects leave of the gap in some blocks.
 
-    wide: see `judge`.
+    problem: of the blocks; gap (n,): under the effects, offsets between flights subtracted; added (n,): power that the
+    effects add to that expected; cost: nats that the offsets and the commands' floor cost.
     """
-    problem, values, added, _ = _explained(data, part, terms, wide)
-    return problem, values, problem.elements.power + added
+
+    problem: Problem
+    gap: np.ndarray
+    added: np.ndarray
+    cost: float
+
+    @property
+    def power(self) -> np.ndarray:
+        """Expected power (n,) of the gap."""
+        return self.problem.elements.power + self.added
+
+    def log_likelihoods(self) -> np.ndarray:
+        """Log likelihood (n,) of each value, without the cost."""
+        return self.problem.likelihood.per_value(self.gap, self.added)
+
+
+def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> LeftOver:
+    """What effects with these parameters leave of the gap; offsets between flights fitted anew.
+
+    uncertain_floor: see `judge`.
+    """
+    problem = problem_of(data, part)
+    modelled = problem.modelled(terms, uncertain_floor)
+    gap, offset_cost = without_offsets(problem, modelled.gap, modelled.added)
+    return LeftOver(problem, gap, modelled.added, offset_cost + modelled.cost)
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
-    flat = problem_of(data, part).flat
-
-    def each_likelihood(hypothesis: Sequence[Term], wide: bool) -> np.ndarray:
-        """Log likelihood (n,) of each value under effects."""
-        _, values, power = left_over(data, part, hypothesis, wide)
-        return flat.likelihood.per_value(values, power - flat.elements.power)
-
-    without = each_likelihood((), bool(random_of(terms)))
-    return np.bincount(flat.cells, each_likelihood(terms, False) - without, CELLS)
+    without = left_over(data, part, (), uncertain_floor=bool(random_of(terms)))
+    gains = left_over(data, part, terms).log_likelihoods() - without.log_likelihoods()
+    return np.bincount(without.problem.flat.cells, gains, CELLS)
 
 
-def _explained(data: Data, part: BlockSet, terms: Sequence[Term], wide: bool = False,
-               ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
-    """Problem, gap (n,) under effects, power (n,) that these add, and nats that the offsets and the floor cost.
+def _with_strengths(problem: Problem, random: Sequence[Term], values: np.ndarray, mean: Sequence[Active],
+                    ) -> list[Term]:
+    """Random effects with their strengths of highest likelihood, fitted one after another, the others as they are.
 
-    Offsets are subtracted. wide: see `judge`.
+    values (n,): the gap under the mean effects `mean`.
     """
-    problem = problem_of(data, part)
-    values, added, floor_cost = problem.modelled(terms, wide)
-    values, offset_cost = without_offsets(problem, values, added)
-    return problem, values, added, offset_cost + floor_cost
-
-
-def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
-    """Power (n,) that random effects add, their strengths in the list `random` fitted anew, one after another."""
-    command_power, _ = problem.loop_power(mean, True)
-    for _ in range(STRENGTH_ROUNDS if len(random) > 1 else 1):
-        for i in range(len(random)):
-            random[i] = _strength(problem, random, i, values, command_power)
-    return problem.random_power(random)
-
-
-def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray,
-              command_power: np.ndarray) -> Term:
-    """A random effect's strength of highest likelihood, the others as they are."""
-    other_power = command_power + problem.random_power([t for i, t in enumerate(random) if i != which])
-    return strongest(problem, random[which], values, other_power)
+    fitted, loop_power = list(random), problem.loop_power(mean, uncertain_floor=True).power
+    for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
+        for i, term in enumerate(fitted):
+            others = loop_power + problem.random_power([*fitted[:i], *fitted[i + 1:]])
+            fitted[i] = strongest(problem, term, values, others)
+    return fitted
 
 
 def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.ndarray) -> Term:

@@ -10,7 +10,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data, Spectra
 from airtouch.gap.evidence.layout import AirBlocks, Layout, Piece
-from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail_scale
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandElements, CommandView, view_of
@@ -46,18 +46,18 @@ class Offset(NamedTuple):
 class Elements:
     """What is known of flattened values (n,) before any hypothesis.
 
-    base: the gap without effects, unit/sqrt(Hz), 0 where unknown; power: its expected power, unit^2/Hz; known: whether
-    a value counts; channel, flight: their numbers; freedom, tail: degrees of freedom and scale of the likelihood's
-    tails.
+    base: the gap without effects, unit/sqrt(Hz), 0 where it is not valid; power: its expected power, unit^2/Hz; valid:
+    bool, False where the log lacks what the value is made of; channel, flight: their numbers; freedom, tail_scale:
+    degrees of freedom and scale of the likelihood's tails.
     """
 
     base: np.ndarray
     power: np.ndarray
-    known: np.ndarray
+    valid: np.ndarray
     channel: np.ndarray
     flight: np.ndarray
     freedom: np.ndarray
-    tail: np.ndarray
+    tail_scale: np.ndarray
 
     def followed_by(self, other: "Elements") -> "Elements":
         """These and others after them."""
@@ -90,7 +90,7 @@ class Flattened:
     def likelihood(self) -> Likelihood:
         """The likelihood of all values."""
         e = self.elements
-        return Likelihood(e.power, e.freedom, e.tail, e.known)
+        return Likelihood(e.power, e.freedom, e.tail_scale, e.valid)
 
     @functools.cached_property
     def is_torque(self) -> np.ndarray:
@@ -137,13 +137,13 @@ def _counted(means_only: bool) -> dict[str, np.ndarray]:
 def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
     """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
     base, counts = layout.gather(data.base), data.study.floor.block_counts
-    known = np.isfinite(base)
+    valid = np.isfinite(base)
     power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
                                    for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real
     freedom = layout.per_piece(
         lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, REPLAY_FREEDOM))
-    return Elements(np.where(known, base, 0.0), np.where(known, power, 1.0), known, layout.channels(),
-                    layout.per_piece(lambda flight, _: flight).astype(int), freedom, tail(freedom))
+    return Elements(np.where(valid, base, 0.0), np.where(valid, power, 1.0), valid, layout.channels(),
+                    layout.per_piece(lambda flight, _: flight).astype(int), freedom, tail_scale(freedom))
 
 
 def _of_commands(commands: CommandElements) -> Elements:

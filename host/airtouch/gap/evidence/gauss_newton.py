@@ -8,17 +8,17 @@ import numpy as np
 
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
-from airtouch.gap.evidence.slopes import SpectraSlopes, active_at
+from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
 from airtouch.gap.signatures.term import Term, mean_places
 
 ITERATIONS = 8  #: steps at most; chosen
-ENOUGH = 0.02  #: nats that a step must gain for the fit to go on; chosen
+LEAST_STEP_GAIN = 0.02  #: nats that a step must gain for the fit to go on; chosen
 TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
 DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after one that failed; chosen
 FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: damping after the first step that failed, 0.1 but for its last bit; chosen
 ROUNDING = 1e-9  #: nats that a step must gain at least; chosen, above rounding
 COMMAND_PRIOR = 1.5  #: standard deviation, natural steps, of parameters of effects that only the commands show; chosen
-CLOSE = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
+NEAR_NEUTRAL = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
 #: scaled parameters from which effects of the loop may start; chosen
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
@@ -44,13 +44,13 @@ class _State(NamedTuple):
 class Posterior:
     """Posterior of mean effects' parameters beside random effects that stay as they are.
 
-    added (n,): power of the random effects; wide: whether the commands' floor is as uncertain as under such;
+    added (n,): power of the random effects; uncertain_floor: whether the commands' floor is as uncertain as under such;
     spread: standard deviation of the parameters' prior; prior (k + m,): of parameters and offsets.
     """
 
     def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
-                 wide: bool) -> None:
-        self.problem, self.mean, self.added, self.wide = problem, mean, added, wide
+                 uncertain_floor: bool) -> None:
+        self.problem, self.mean, self.added, self.uncertain_floor = problem, mean, added, uncertain_floor
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         spreads = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
         self.prior = np.concatenate([spreads, [o.spread for o in problem.offsets]])
@@ -61,10 +61,10 @@ class Posterior:
         values = self.problem.values(active) if self.mean else self.problem.elements.base.copy()
         for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[places] -= amount * column
-        command_power, floor_cost = self.problem.loop_power(active, self.wide)
-        power = self.added + command_power
+        of_loop = self.problem.loop_power(active, self.uncertain_floor)
+        power = self.added + of_loop.power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
-        return _State(x, offsets, values, power, floor_cost + (0.5 * away - self.problem.likelihood(values, power)))
+        return _State(x, offsets, values, power, of_loop.cost + (0.5 * away - self.problem.likelihood(values, power)))
 
 
 class _Step(NamedTuple):
@@ -88,13 +88,14 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
     if not mean and not problem.offsets:
         return MeanFit(x, covariance, problem.elements.base)
     now = posterior.at(x, offsets)
-    slopes, stuck, damping = SpectraSlopes(problem, mean, high), False, 0.0
+    slopes: SpectraSlopes | None = None
+    stuck, damping = False, 0.0
     for _ in range(most):
-        slopes.take(now.x, stuck)
+        slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)
         gain = before - now.cost if gained else 0.0
-        if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
+        if gain < LEAST_STEP_GAIN and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
             break
         stuck = gain == 0.0
     return MeanFit(now.x, covariance, now.values)
@@ -104,10 +105,10 @@ def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tupl
           damping: float) -> _Step:
     """A step, shortened until it gains, TRIES times at most."""
     problem, size = posterior.problem, len(now.x)
-    equations = normal_equations(slopes.columns, posterior.prior, now.values,
+    equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior, now.values,
                                  weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
                                  problem.offsets)
-    equations = equations.with_power(*slopes.power_equations(now.x, now.values, now.power, posterior.wide))
+    equations = equations.with_power(*slopes.power_equations(now.x, now.values, now.power, posterior.uncertain_floor))
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
@@ -124,7 +125,7 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
     """
     size = sum(len(t.free) for t in mean)
     start = np.full(size, np.nan) if start is None else start
-    x = np.where(np.isnan(start), CLOSE, start)
+    x = np.where(np.isnan(start), NEAR_NEUTRAL, start)
     for t, place in mean_places(mean):
         if t.signature.loop_only and len(problem.flat.commands) and np.isnan(start[place]).all():
             x = _best_on_grid(problem, mean, x, range(place.start, place.stop))
@@ -138,8 +139,8 @@ def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, place: 
     for i, amount in itertools.product(place, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        command_power, floor_cost = problem.loop_power(active_at(mean, trial))
-        level = problem.likelihood(problem.elements.base, command_power) - floor_cost
+        of_loop = problem.loop_power(active_at(mean, trial))
+        level = problem.likelihood(problem.elements.base, of_loop.power) - of_loop.cost
         if level > best:
             best, out = level, trial
     return out

@@ -70,14 +70,14 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
         solved = np.flatnonzero(free)
         if not len(solved):
             break
-        full = np.linalg.pinv(matrix[np.ix_(solved, solved)], hermitian=True)
+        inverse = np.linalg.pinv(matrix[np.ix_(solved, solved)], hermitian=True)
         damped = matrix[np.ix_(solved, solved)] + damping * np.diag(np.diag(matrix)[solved])
-        change[solved] = np.linalg.solve(damped, right[solved]) if damping else full @ right[solved]
+        change[solved] = np.linalg.solve(damped, right[solved]) if damping else inverse @ right[solved]
         stuck = np.zeros(len(right), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
             free_parameters = solved[solved < n]
-            covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
+            covariance[np.ix_(free_parameters, free_parameters)] = inverse[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck
     return change, covariance
@@ -91,14 +91,14 @@ def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
-    """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where unknown.
+    """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where not valid.
 
     values (n,): the gap; added (n,): power over the floor.
     """
     elements = problem.elements
     power = elements.power + added
     over_expected = squared(values) / power
-    return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail + over_expected) / power * elements.known
+    return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail_scale + over_expected) / power * elements.valid
 
 
 def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -110,9 +110,9 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
     power, gap, cost = elements.power + added, values.copy(), 0.0
     for places, column, spread in problem.offsets:
         amount = 0.0
-        largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.known[places] / power[places]
+        largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.valid[places] / power[places]
         for _ in range(2):
-            weights = largest_weight / (elements.tail[places] + squared(gap[places]) / power[places])
+            weights = largest_weight / (elements.tail_scale[places] + squared(gap[places]) / power[places])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
             slope = 2.0 * float(np.vdot(column, weights * gap[places]).real) - amount / spread ** 2
             amount += slope / normal

@@ -26,23 +26,24 @@ BRACKET = 1e-3, 600.0  #: tails' scales among which `tail` seeks; chosen, beyond
 class Likelihood:
     """Log likelihood of flattened values; only differences mean something.
 
-    power (n,): expected without random effects, unit^2/Hz; freedom, tail (n,): degrees of freedom and scale of the
-    tails; known (n,): values that count. `added` in its functions is the power (n,) that a hypothesis adds.
+    power (n,): expected without random effects, unit^2/Hz; freedom, tail_scale (n,): degrees of freedom and scale of
+    the tails; valid (n,): bool, which values count. `added` in its functions is the power (n,) that a hypothesis adds.
     """
 
     power: np.ndarray
     freedom: np.ndarray
-    tail: np.ndarray
-    known: np.ndarray
+    tail_scale: np.ndarray
+    valid: np.ndarray
 
     def __call__(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """Log likelihood of values (n,)."""
-        return -OVERLAP_WEIGHT * tailed(squared(values), self.power + added, self.tail, self.exponent, self.known)
+        size, power = squared(values), self.power + added
+        return -OVERLAP_WEIGHT * minus_log_likelihood(size, power, self.tail_scale, self.exponent, self.valid)
 
     def per_value(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        levels = _levels(squared(values), self.power + added, self.tail, self.exponent)
-        levels[~self.known] = 0.0
+        levels = _levels(squared(values), self.power + added, self.tail_scale, self.exponent)
+        levels[~self.valid] = 0.0
         return levels
 
     def along(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
@@ -50,15 +51,16 @@ class Likelihood:
 
         size (n,): the values' squared size.
         """
-        changing = (unit != 0.0) & self.known
-        rest = tailed(size, self.power + others, self.tail, self.exponent, self.known & ~changing)
-        places = np.flatnonzero(changing)
-        power, tail, exponents, known = (x[places] for x in (self.power + others, self.tail, self.exponent, self.known))
-        size_there, unit_there = size[places], unit[places]
+        changing = (unit != 0.0) & self.valid
+        power, scale, exponents = self.power + others, self.tail_scale, self.exponent
+        rest = minus_log_likelihood(size, power, scale, exponents, self.valid & ~changing)
+        size_there, unit_there, power, scale, exponents, valid = (
+            x[changing] for x in (size, unit, power, scale, exponents, self.valid))
 
         def at(x: float) -> float:
             """Log likelihood at x."""
-            return -OVERLAP_WEIGHT * (rest + tailed(size_there, power + x * unit_there, tail, exponents, known))
+            there = minus_log_likelihood(size_there, power + x * unit_there, scale, exponents, valid)
+            return -OVERLAP_WEIGHT * (rest + there)
 
         return at
 
@@ -72,8 +74,8 @@ class Likelihood:
         places = slice(count)
         power = self.power[places] + added[places]
         over_expected = squared(values[places]) / power
-        share = OVERLAP_WEIGHT * self.known[places] / power
-        counted = self.exponent[places] * over_expected / (self.tail[places] + over_expected)
+        share = OVERLAP_WEIGHT * self.valid[places] / power
+        counted = self.exponent[places] * over_expected / (self.tail_scale[places] + over_expected)
         return share * (counted - 1.0), share / power
 
     @functools.cached_property
@@ -97,34 +99,34 @@ def _levels(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np
     return power
 
 
-def tail(freedom: np.ndarray) -> np.ndarray:
+def tail_scale(freedom: np.ndarray) -> np.ndarray:
     """Scale (n,) of tails whose likelihood is highest at the mean of exponential power.
 
     E[(nu + 1) e / (tail + e)] = 1, where e is exponential and nu are the degrees of freedom (n,).
     """
     different, place = np.unique(freedom, return_inverse=True)
-    return np.array([_tail(nu) for nu in different])[place] if len(freedom) else freedom
+    return np.array([_tail_scale(nu) for nu in different])[place] if len(freedom) else freedom
 
 
 @functools.cache
-def _tail(nu: float) -> float:
-    """`tail` for one number nu of degrees of freedom: the scale a of a e^a E1(a) = nu / (nu + 1)."""
+def _tail_scale(nu: float) -> float:
+    """`tail_scale` for one number nu of degrees of freedom: the scale a of a e^a E1(a) = nu / (nu + 1)."""
     low, high = BRACKET
     return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), low, high))
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")
-def tailed(size, power, tail, exponents, known):
-    """Sum of log(power) + exponent log(1 + size / power / tail) over those values (n,) that are known.
+def minus_log_likelihood(size, power, tail, exponents, valid):
+    """Sum of log(power) + exponent log(1 + size / power / tail) over those values (n,) that are valid.
 
-    It is minus the log likelihood, but for a constant, of values of this squared size where this power is expected;
-    where `tail` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
+    It is minus the log likelihood, but for a constant and for OVERLAP_WEIGHT, of values of this squared size where
+    this power is expected; where `tail` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
     Sums of logarithms are logarithms of products; what the addition rounds off is carried along (Kahan).
     """
     total, lost = 0.0, 0.0
     powers, over, exponent = 1.0, 1.0, 0.0
     for i in range(len(size)):
-        if not known[i]:
+        if not valid[i]:
             continue
         if exponents[i] != exponent or not (powers > LEAST and powers < MOST and over < MOST):
             term = np.log(powers) + exponent * np.log(over) - lost

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,25 @@ class BlockSet:
     def key(self) -> Hashable:
         """Equal for two parts of the same blocks."""
         return tuple((flight, state, chosen.tobytes()) for flight, state, chosen in self.pieces)
+
+
+class AddedPower(NamedTuple):
+    """Power (n,) that effects add to that expected of the gap, unit^2/Hz, and nats that the commands' floor costs."""
+
+    power: np.ndarray
+    cost: float
+
+
+class Modelled(NamedTuple):
+    """A hypothesis on some blocks.
+
+    gap (n,): what its mean effects leave, unit/sqrt(Hz); added (n,): power that its effects add to that expected of the
+    gap, unit^2/Hz; cost: nats that the commands' floor costs.
+    """
+
+    gap: np.ndarray
+    added: np.ndarray
+    cost: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,26 +80,26 @@ class Problem:
         if replayed:
             replay_values = flat.layout.gather(gap_spectra(self.data, replayed, flat.layout.flights))
         command_values = flat.commands.values_without([a for a in active if not a.gate])
-        return np.where(flat.elements.known, flat.joined(replay_values, command_values), 0.0)
+        return np.where(flat.elements.valid, flat.joined(replay_values, command_values), 0.0)
 
-    def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
-        """A hypothesis: the gap (n,) with its mean effects, the power (n,) that it adds, and nats that its floor costs.
+    def modelled(self, terms: Sequence[Term], uncertain_floor: bool = False) -> Modelled:
+        """What a hypothesis makes of the blocks.
 
-        wide: the commands' floor is as uncertain as under random effects, though there are none.
+        uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
         """
         random = random_of(terms)
         mean = [t.active() for t in mean_of(terms)]
-        command_power, cost = self.loop_power([*mean, *(t.active() for t in random)], wide or bool(random))
-        return self.values(mean), self.random_power(random) + command_power, cost
+        of_loop = self.loop_power([*mean, *(t.active() for t in random)], uncertain_floor or bool(random))
+        return Modelled(self.values(mean), self.random_power(random) + of_loop.power, of_loop.cost)
 
-    def loop_power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
-        """Power (n,) that effects of the loop add to the floors of torque and commands, and nats that this costs.
+    def loop_power(self, active: Sequence[Active], uncertain_floor: bool = False) -> AddedPower:
+        """What effects of the loop add to the floors of torque and commands.
 
-        wide: as in `modelled`.
+        uncertain_floor: as in `modelled`.
         """
         commands = self.flat.commands
-        power, cost = commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.torque_power(active), power - commands.elements.floor]), cost
+        power, cost = commands.power([a for a in active if not a.gate], uncertain_floor)
+        return AddedPower(np.concatenate([self.torque_power(active), power - commands.elements.floor]), cost)
 
     def torque_power(self, active: Sequence[Active]) -> np.ndarray:
         """Power (replay,) that effects of the loop add to the floor of the torque, the first part of `loop_power`."""

@@ -1,9 +1,12 @@
 """Slopes of the spectra by the parameters of mean effects, for the steps of a fit."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from airtouch.gap.evidence.least_squares import limits
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.torque_power import loops_differ
 from airtouch.gap.signatures.term import Term, mean_places
@@ -18,54 +21,81 @@ def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     return [t.active(x[place]) for t, place in mean_places(mean) if x[place].any() or t.acts_when_neutral]
 
 
-class SpectraSlopes:
-    """First-order changes of the spectra by k parameters of mean effects, taken anew only where a fit has moved far.
+class ParameterSlopes(NamedTuple):
+    """Change per unit of one scaled parameter.
 
-    at (k,): scaled parameters at which they were taken. For each parameter columns (n,): of the flattened spectra;
-    rises (bins, axes): of the logarithm of the commands' power; torque_powers (replay,): of the floor of the torque;
-    nonlinear: whether it changes the loop, so that the spectra are no linear function of it and its slopes are taken
-    anew at every step. high (k,): largest parameters.
+    column, complex (n,): of the flattened spectra; rise (bins, axes): of the logarithm of the commands' power;
+    torque_power (replay,): of the floor of the torque; nonlinear: whether the parameter changes the loop, so that the
+    spectra are no linear function of it.
     """
 
-    def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
-        self.problem, self.mean, self.high = problem, mean, high
-        size = sum(len(t.free) for t in mean)
-        self.at = np.full(size, np.inf)
-        self.columns = [np.zeros(0)] * size
-        self.rises, self.torque_powers = [np.zeros(0)] * size, [np.zeros(0)] * size
-        self.nonlinear = np.ones(size, bool)
+    column: np.ndarray
+    rise: np.ndarray
+    torque_power: np.ndarray
+    nonlinear: bool
 
-    def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take slopes at scaled parameters x (k,): the nonlinear ones; all where x is far from the last, or if anew."""
-        anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
-        stale = np.arange(len(x)) if anew else np.flatnonzero(self.nonlinear)
-        if not len(stale):
-            return
-        before = active_at(self.mean, x)
-        values, power = self.problem.values(before), self.problem.torque_power(before)
-        for i in stale:
-            step = STEP if x[i] + STEP <= self.high[i] else -STEP
-            shifted = x.copy()
-            shifted[i] += step
-            after = active_at(self.mean, shifted)
-            self.columns[i] = (self.problem.values(after) - values) / step
-            self.rises[i] = self.problem.flat.commands.rise(before, after) / step
-            self.torque_powers[i] = (self.problem.torque_power(after) - power) / step
-            self.nonlinear[i] = loops_differ(self.problem.data, before, after)
-        self.at = x.copy() if anew else self.at
 
-    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
-                 ) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class SpectraSlopes:
+    """First-order changes of the spectra of `problem` by the k parameters of mean effects.
+
+    at (k,): scaled parameters at which they were taken, those of nonlinear parameters at the last call of `moved_to`;
+    by_parameter: k of them.
+    """
+
+    problem: Problem
+    mean: Sequence[Term]
+    at: np.ndarray
+    by_parameter: Sequence[ParameterSlopes]
+
+    def moved_to(self, x: np.ndarray, anew: bool = False) -> "SpectraSlopes":
+        """The slopes for scaled parameters x (k,): of nonlinear parameters taken there.
+
+        All are where x is FAR from `at`, or if `anew`.
+        """
+        if anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any()):
+            return slopes_at(self.problem, self.mean, x)
+        stale = [i for i, s in enumerate(self.by_parameter) if s.nonlinear]
+        taken = dict(zip(stale, _taken(self.problem, self.mean, x, stale), strict=True))
+        return replace(self, by_parameter=[taken.get(i, s) for i, s in enumerate(self.by_parameter)])
+
+    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, uncertain_floor: bool,
+                        ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
-        values, added: the gap, and the power over the floor, flattened.
+        values, added: the gap, and the power over the floor, flattened; uncertain_floor: as in `Problem.modelled`.
         """
         problem = self.problem
-        gradient, information = problem.flat.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
-        powers = np.array(self.torque_powers)
+        active, rises = active_at(self.mean, x), np.array([s.rise for s in self.by_parameter])
+        gradient, information = problem.flat.commands.slopes(active, rises, uncertain_floor)
+        powers = np.array([s.torque_power for s in self.by_parameter])
         if powers.any():
             slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
                                                            problem.flat.replay_count)
             gradient = gradient + powers @ slope
             information = information + (powers * curvature) @ powers.T
         return gradient, information
+
+
+def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray) -> SpectraSlopes:
+    """The slopes by all parameters of mean effects at scaled ones x (k,)."""
+    return SpectraSlopes(problem, mean, x.copy(), _taken(problem, mean, x, range(len(x))))
+
+
+def _taken(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int]) -> list[ParameterSlopes]:
+    """The slopes by some of the parameters at scaled parameters x (k,), by differences over STEP within the bounds."""
+    if not which:
+        return []
+    _, high = limits(mean)
+    before = active_at(mean, x)
+    values, power = problem.values(before), problem.torque_power(before)
+    out = []
+    for i in which:
+        step = STEP if x[i] + STEP <= high[i] else -STEP
+        shifted = x.copy()
+        shifted[i] += step
+        after = active_at(mean, shifted)
+        out.append(ParameterSlopes(
+            (problem.values(after) - values) / step, problem.flat.commands.rise(before, after) / step,
+            (problem.torque_power(after) - power) / step, loops_differ(problem.data, before, after)))
+    return out

@@ -29,8 +29,8 @@ def torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.nd
     if loop_change is None:
         return np.zeros(count)
     gather, flights = flat.layout.gather, flat.layout.flights
-    base, known = flat.elements.base[:count], flat.elements.known[:count]
-    change = np.where(known, gather(gap_spectra(data, effects, flights)) - base, 0.0)
+    base, valid = flat.elements.base[:count], flat.elements.valid[:count]
+    change = np.where(valid, gather(gap_spectra(data, effects, flights)) - base, 0.0)
     step_power = step_doubt(data, effects, flights)
     doubt = TORQUE_DOUBT ** 2 * squared(change) * flat.is_torque
     if step_power is not None:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tailed
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, minus_log_likelihood
 from airtouch.gap.flights.blocks import hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
+from airtouch.gap.signals.channels import FORCE
 from airtouch.gap.signals.spectra import AIR, LEAST_POWER, LENGTH
 from airtouch.gap.study import Study
 from airtouch.simulation import replay
@@ -117,14 +118,14 @@ class _Sample:
     """Some blocks of all flights, and how well lines at a place explain them."""
 
     def __init__(self, data: Data, powers: list[np.ndarray]) -> None:
-        blocks = np.concatenate([b[AIR][:, :, :3] for b in data.base])
+        blocks = np.concatenate([b[AIR][:, :, FORCE] for b in data.base])
         chosen = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).astype(int)) if len(blocks) else []
         self.over_floor, self.floor = _over_floor(data, blocks[chosen])
         two_sided_power = np.concatenate(powers)[chosen]
         self.two_sided_power = {h: widened(two_sided_power, h) for h in SPREADS_HZ}
 
     def gain(self, spread_hz: float, shift: int) -> float:
-        """Twice the log likelihood that lines of the best strength gain over none."""
+        """Log likelihood, without OVERLAP_WEIGHT, that lines of the best strength gain over none."""
         shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
         return _best_strength(self.over_floor, shape)[0]
 
@@ -137,25 +138,25 @@ def _judged() -> np.ndarray:
 
 def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Power (blocks, bins) of the three axes over their floor, mean of them, and that floor (bins,)."""
-    floor = data.study.floor.power[AIR][_judged(), :3]
+    floor = data.study.floor.power[AIR][_judged(), FORCE]
     with np.errstate(invalid="ignore"):
         over = np.nan_to_num(np.abs(blocks[:, _judged()]) ** 2 / floor).mean(axis=2)
     return over, 1.0 / (1.0 / floor).mean(axis=1)
 
 
 def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
-    """Twice the log likelihood that lines of the best strength gain over none, and that strength (power).
+    """Nats, without OVERLAP_WEIGHT, that lines of the best strength gain over none, and that strength (power).
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
-    scale nu, not `likelihood.tail` of nu as elsewhere: with that other strengths would be found.
+    scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
     """
     strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
-    tail, exponents, known = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
+    tail, exponents, valid = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
-        """Twice the log likelihood of lines of a strength (power), but for a constant."""
-        return -tailed(size, 1.0 + strength * flat, tail, exponents, known)
+        """Log likelihood of lines of a strength (power), without OVERLAP_WEIGHT and but for a constant."""
+        return -minus_log_likelihood(size, 1.0 + strength * flat, tail, exponents, valid)
 
     levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))
@@ -168,8 +169,10 @@ def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]
     """Lines of several flights, each with its share of the power; 1 on average."""
     if len(power) < 2:
         return power
-    share = np.array([_best_strength(over, p[:, _judged()] / floor)[1] if len(p) else 0.0
-                      for p, (over, floor) in ((p, _over_floor(data, b[AIR][:, :, :3]))
-                                               for p, b in zip(power, data.base, strict=True))])
+    share = np.zeros(len(power))
+    for i, (lines_of_flight, gap) in enumerate(zip(power, data.base, strict=True)):
+        if len(lines_of_flight):
+            over, floor = _over_floor(data, gap[AIR][:, :, FORCE])
+            _, share[i] = _best_strength(over, lines_of_flight[:, _judged()] / floor)
     mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
     return [p * s / mean_share for p, s in zip(power, share, strict=True)]

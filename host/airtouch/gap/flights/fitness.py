@@ -36,7 +36,7 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
     for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
         if not log.has(*columns):
             raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
-                                "compares what the motors were told with what the IMU felt")
+                                "compares the motor commands with the IMU's measurements")
     if len(log) < 2:
         raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
     notes += [f"{Path(name).name}: {channel} does not change in {share:.0%} of the flight"

@@ -78,11 +78,11 @@ def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors
     """See `regressors_of`."""
     out = []
     e, count = problem.elements, problem.flat.replay_count
-    channel, flight, known = (x[:count] for x in (e.channel, e.flight, e.known))
+    channel, flight, valid = (x[:count] for x in (e.channel, e.flight, e.valid))
     for c in range(CHANNELS):
         table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
-            here = known[elements] & (flight[elements] == f)
+            here = valid[elements] & (flight[elements] == f)
             places = elements[here]
             offsets = [(x, o.spread) for o in problem.offsets if np.any(x := o.at(places))]
             if len(places):

@@ -27,8 +27,8 @@ class PartResiduals:
 
     def __init__(self, data: Data, part: BlockSet, terms: Sequence[Term]) -> None:
         self.problem = problem = problem_of(data, part)
-        self.values, added, _ = problem.modelled(terms)
-        self.power = problem.elements.power + added
+        modelled = problem.modelled(terms)
+        self.values, self.power = modelled.gap, problem.elements.power + modelled.added
         self.cells = problem.flat.cells
         self.regressors = regressors_of(data, part, problem)
 
@@ -40,7 +40,8 @@ class PartResiduals:
         tails are Student's.
         """
         places = regressors.places
-        nu, tail, power = self.problem.elements.freedom[places], self.problem.elements.tail[places], self.power[places]
+        elements, power = self.problem.elements, self.power[places]
+        nu, tail = elements.freedom[places], elements.tail_scale[places]
         weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
         weighted = regressors.columns.conj().T * weights
         return 2.0 * (weighted @ regressors.columns).real, 2.0 * (weighted @ values).real
@@ -58,15 +59,16 @@ class PartResiduals:
             normal, right = self.normal_equations(regressors, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
             residual = values - regressors.columns @ x
-        nu, tail = self.problem.elements.freedom[regressors.places], self.problem.elements.tail[regressors.places]
+        nu, tail = self.problem.elements.freedom[regressors.places], self.problem.elements.tail_scale[regressors.places]
         tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[regressors.places] / tail)
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:
-        """Powers of the residuals (elements,) whose values are known."""
-        known = self.problem.elements.known
-        over = squared(residuals[known]) / self.power[known]
-        return Powers(over, self.problem.elements.freedom[known], self.problem.elements.tail[known], self.cells[known])
+        """Powers of the residuals (elements,) whose values are valid."""
+        elements = self.problem.elements
+        valid = elements.valid
+        over = squared(residuals[valid]) / self.power[valid]
+        return Powers(over, elements.freedom[valid], elements.tail_scale[valid], self.cells[valid])
 
     def residuals_under(self, fitted: np.ndarray, floor: NamelessFloor) -> np.ndarray:
         """`residual_under` of every channel of every flight, (elements,). fitted (CHANNELS, WIDEST): coefficients."""

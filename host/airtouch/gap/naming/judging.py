@@ -59,7 +59,8 @@ class Trial:
 def trial_of(data: Data) -> Trial:
     """Flights made ready to be judged."""
     of_data = halves(data)
-    none_certain, none_uncertain = ([judge(data, half, (), wide) for half in of_data] for wide in (False, True))
+    none_certain, none_uncertain = ([judge(data, half, (), uncertain) for half in of_data]
+                                    for uncertain in (False, True))
     return Trial(data, of_data, policy_of(data.study, data.seconds), none_certain, none_uncertain)
 
 
@@ -144,17 +145,17 @@ def price_of(terms: Sequence[Term]) -> float:
 
 def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
     """Held-out nats that effects, fitted on each half, lose where the commands' floor is as beside a random effect."""
-    return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, True)
+    return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, uncertain_floor=True)
                for train, test in TWO_FOLDS)
 
 
-def gain_of(trial: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
+def gain_of(trial: Trial, half: int, terms: Sequence[Term], uncertain_floor: bool = False) -> float:
     """Nats that fitted effects add on a half, over no effect with a commands' floor as certain.
 
-    wide: that floor is as uncertain as under random effects, though there are none.
+    uncertain_floor: that floor is as uncertain as under random effects, though there are none.
     """
-    none = trial.none_uncertain if wide or random_of(terms) else trial.none_certain
-    return judge(trial.data, trial.halves[half], terms, wide) - none[half]
+    none = trial.none_uncertain if uncertain_floor or random_of(terms) else trial.none_certain
+    return judge(trial.data, trial.halves[half], terms, uncertain_floor) - none[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:

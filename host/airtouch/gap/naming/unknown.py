@@ -8,8 +8,8 @@ limits: `policy.UnknownLimit`.
 
 import numpy as np
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.relations.inference import Against
 
 
 def against(selection: Selection) -> Against:

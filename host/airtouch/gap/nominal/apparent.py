@@ -8,6 +8,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
@@ -64,7 +65,7 @@ def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
     """At most FLIGHTS of the flights, evenly spaced; none where there is only one, which shows no scatter."""
     if len(flights) < 2:
         return []
-    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, FLIGHTS).astype(int))]
+    return evenly_spaced(flights, FLIGHTS)
 
 
 def is_recorded(flight: Flight) -> bool:

@@ -61,7 +61,7 @@ def no_effect(data: Data) -> NoEffect | None:
     each = each_block(data, whole, ())
     if len(each) < LEAST_BLOCKS:
         return None
-    return NoEffect(data, whole, each, {wide: judge(data, whole, (), wide) for wide in (False, True)})
+    return NoEffect(data, whole, each, {uncertain: judge(data, whole, (), uncertain) for uncertain in (False, True)})
 
 
 def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, PassingEffect]:

@@ -99,10 +99,10 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
-    problem, values, power = left_over(data, part, terms)
-    levels = problem.likelihood.per_value(values, power - problem.elements.power)[:problem.flat.replay_count]
-    in_air = problem.flat.air.block_of_value >= 0
-    return np.bincount(problem.flat.air.block_of_value[in_air], levels[in_air])
+    left = left_over(data, part, terms)
+    block, levels = left.problem.flat.air.block_of_value, left.log_likelihoods()[:left.problem.flat.replay_count]
+    in_air = block >= 0
+    return np.bincount(block[in_air], levels[in_air])
 
 
 def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:

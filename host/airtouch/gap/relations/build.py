@@ -36,7 +36,7 @@ from airtouch.gap.relations.learning import (
     halved,
     scaled,
 )
-from airtouch.gap.relations.library import STORED, Library, packed, read, save
+from airtouch.gap.relations.library import STORED, Library, NominalDistance, packed, read, save
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import load
 
@@ -110,7 +110,7 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     library = Library(
         scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),
         LearnedModel(classes, np.zeros((projection.shape[1], 0)), _scatter_of_nameless(nameless @ axes)),
-        distance=(0.0, 1.0), nameless_share=none, second_share=none, distance_scatter=none, pair_scatter=0.0)
+        NominalDistance(0.0, 1.0), nameless_share=none, second_share=none, distance_scatter=none, pair_scatter=0.0)
     say("flights of two effects")
     library = replace(library, model=replace(library.model, interaction=_interaction(scene, library, paired)))
     say("calibration")

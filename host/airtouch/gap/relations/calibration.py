@@ -18,7 +18,7 @@ from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
-from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.library import Library, NominalDistance
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import log_uniform
@@ -48,7 +48,7 @@ def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Lib
     found = []
     for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
         say(f"calibration of {own.name} {own.shape or ''}")
-        found.append(calibrate_class(scene, library, place, drawing))
+        found.append(calibrate_class(scene, library, place, drawing, CLASS_FLIGHTS))
     library = with_calibrations(library, found)
     say("flights of two effects")
     return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings))
@@ -64,8 +64,7 @@ class ClassCalibration:
     distance_scatter: float
 
 
-def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int = CLASS_FLIGHTS,
-                    ) -> ClassCalibration:
+def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int) -> ClassCalibration:
     """Measure the class at a place of the library by so many flights."""
     shown = _calibration_flights(scene, library, place, drawing, count)
     return ClassCalibration(
@@ -84,12 +83,12 @@ def with_calibrations(library: Library, found: Sequence[ClassCalibration]) -> Li
                    distance_scatter=np.array([one.distance_scatter for one in found]))
 
 
-def _nominal_distance(scene: Scene, library: Library) -> tuple[float, float]:
-    """`Library.distance`: median and standard deviation of squared distances of nominal flights."""
+def _nominal_distance(scene: Scene, library: Library) -> NominalDistance:
+    """`Library.distance`, the standard deviation from the middle two thirds."""
     flown = [f for i in range(NOMINAL_FLIGHTS) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
     squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
-    return float(np.median(squared)), float(0.5 * (high - low))
+    return NominalDistance(float(np.median(squared)), float(0.5 * (high - low)))
 
 
 @dataclass(frozen=True)
@@ -232,6 +231,6 @@ def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, 
 
 
 def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightHypotheses | None:
-    """The features of a flight with effects; None where it does not end well."""
+    """A flight with effects, ready for hypotheses; None where it does not end well."""
     features = fly(scene, number, active)
     return None if features is None else FlightHypotheses(library.coordinates(features[None])[0], library.model)

@@ -73,7 +73,7 @@ class Fit:
     Laplace's approximation, and `level` where that would exceed it.
     """
 
-    of: EffectClass
+    effect_class: EffectClass
     strength: np.ndarray
     level: float
     evidence: float
@@ -81,23 +81,23 @@ class Fit:
     @property
     def shift(self) -> np.ndarray:
         """Expected shift (Q,), not rescaled."""
-        return self.of.mean(self.strength[None])[0]
+        return self.effect_class.mean(self.strength[None])[0]
 
     def factors(self) -> np.ndarray:
         """F (Q, r): F F' is the covariance of a flight about the curve, beyond that of nominal flights."""
-        return self.of.axes * (np.linalg.norm(self.shift) * np.sqrt(self.of.variances))
+        return self.effect_class.axes * (np.linalg.norm(self.shift) * np.sqrt(self.effect_class.variances))
 
 
 class _Likelihood:
     """The log density of a flight's values (Q,) under a class, rescaled, as a function of its strength."""
 
-    def __init__(self, of: EffectClass, values: np.ndarray, rescaling: Rescaling) -> None:
+    def __init__(self, effect_class: EffectClass, values: np.ndarray, rescaling: Rescaling) -> None:
         """values: rescaled."""
-        self.of, self.values, self.rescaling = of, values, rescaling
-        if rescaling.stretch.size and of.variances.size:
-            self.axes, self.variances = principal(rescaling((of.axes * np.sqrt(of.variances)).T).T)
+        self.effect_class, self.values, self.rescaling = effect_class, values, rescaling
+        if rescaling.stretch.size and effect_class.variances.size:
+            self.axes, self.variances = principal(rescaling((effect_class.axes * np.sqrt(effect_class.variances)).T).T)
         else:
-            self.axes, self.variances = of.axes, of.variances
+            self.axes, self.variances = effect_class.axes, effect_class.variances
 
     def level(self, shift: np.ndarray) -> np.ndarray:
         """Log density (n,) at expected shifts (n, Q), not rescaled."""
@@ -109,7 +109,7 @@ class _Likelihood:
 
     def at(self, strength: np.ndarray) -> np.ndarray:
         """Log density (n,) at strengths (n, parameters)."""
-        return self.level(self.of.mean(strength))
+        return self.level(self.effect_class.mean(strength))
 
     def over_covariance(self, shift: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (n, Q) times the inverse of the covariance that the class has at an expected shift (Q,)."""
@@ -119,31 +119,32 @@ class _Likelihood:
     def clipped(self, strength: np.ndarray) -> np.ndarray:
         """A strength (parameters,) with its length cut to what was flown."""
         size = float(np.linalg.norm(strength))
-        return strength / max(size, SMALLEST) * np.clip(size, self.of.least, self.of.most)
+        return strength / max(size, SMALLEST) * np.clip(size, self.effect_class.least, self.effect_class.most)
 
     def slopes(self, strength: np.ndarray) -> np.ndarray:
         """Change (parameters, Q) of the expected shift per parameter, rescaled."""
         step = SLOPE * float(np.linalg.norm(strength)) * np.eye(len(strength))
-        ahead, back = (self.of.mean(strength + s) for s in (step, -step))
+        ahead, back = (self.effect_class.mean(strength + s) for s in (step, -step))
         return self.rescaling((ahead - back) / (2.0 * step[0, 0]))
 
 
-def fit(of: EffectClass, values: np.ndarray, rescaling: Rescaling) -> Fit:
+def fit(effect_class: EffectClass, values: np.ndarray, rescaling: Rescaling) -> Fit:
     """The likeliest strength of a class for a flight's coordinates (Q,), values: rescaled."""
-    likelihood = _Likelihood(of, values, rescaling)
-    strength, level = _on_a_grid(likelihood) if of.parameters == 1 else _by_gauss_newton(likelihood)
-    return Fit(of, strength, level, level + min(_occam_factor(likelihood, strength), 0.0))
+    likelihood = _Likelihood(effect_class, values, rescaling)
+    strength, level = _on_a_grid(likelihood) if effect_class.parameters == 1 else _by_gauss_newton(likelihood)
+    return Fit(effect_class, strength, level, level + min(_occam_factor(likelihood, strength), 0.0))
 
 
 def _on_a_grid(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
     """The likeliest strength (1,) of one parameter and its log density: on the class's grid, then closer and closer."""
-    of = likelihood.of
-    strengths, shifts = of.grid
+    effect_class = likelihood.effect_class
+    strengths, shifts = effect_class.grid
     levels = likelihood.level(shifts)
     place, width = int(np.argmax(levels)), float(np.log(strengths[1, 0] / strengths[0, 0]))
     best, top = strengths[place], float(levels[place])
     for _ in range(REFINEMENTS):
-        trials = np.clip(np.abs(best) * np.exp(np.linspace(-width, width, TRIALS)), of.least, of.most) * np.sign(best)
+        sizes = np.abs(best) * np.exp(np.linspace(-width, width, TRIALS))
+        trials = np.clip(sizes, effect_class.least, effect_class.most) * np.sign(best)
         levels = likelihood.at(trials[:, None])
         place = int(np.argmax(levels))
         if levels[place] > top:
@@ -171,9 +172,9 @@ def _by_gauss_newton(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
 
 def _start(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
     """The best of several first strengths (parameters,): least squares with the slopes at several sizes of strength."""
-    of, best, top = likelihood.of, np.zeros(0), -np.inf
-    for size in np.geomspace(of.least, of.most, STARTS):
-        slopes = likelihood.slopes(np.full(of.parameters, size / np.sqrt(of.parameters)))
+    effect_class, best, top = likelihood.effect_class, np.zeros(0), -np.inf
+    for size in np.geomspace(effect_class.least, effect_class.most, STARTS):
+        slopes = likelihood.slopes(np.full(effect_class.parameters, size / np.sqrt(effect_class.parameters)))
         trial = likelihood.clipped(np.linalg.lstsq(slopes.T, likelihood.values, rcond=None)[0])
         level = float(likelihood.at(trial[None])[0])
         if level > top:
@@ -183,7 +184,7 @@ def _start(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
 
 def _step(likelihood: _Likelihood, strength: np.ndarray) -> np.ndarray:
     """The step (parameters,) of Gauss-Newton at a strength: least squares weighed by the covariance there."""
-    shift, slopes = likelihood.of.mean(strength[None])[0], likelihood.slopes(strength)
+    shift, slopes = likelihood.effect_class.mean(strength[None])[0], likelihood.slopes(strength)
     weighed = likelihood.over_covariance(shift, slopes)
     residual = likelihood.values - likelihood.rescaling(shift)
     return np.linalg.lstsq(weighed @ slopes.T, weighed @ residual, rcond=1e-9)[0]
@@ -195,12 +196,12 @@ def _occam_factor(likelihood: _Likelihood, strength: np.ndarray) -> float:
     MacKay, Information Theory, Inference, and Learning Algorithms, 2003, section 28.1. A strength may be anything
     between the least and the most that was flown, on a logarithmic scale, in any direction.
     """
-    of, many = likelihood.of, len(strength)
+    effect_class, many = likelihood.effect_class, len(strength)
     slopes = likelihood.slopes(strength)
-    precision = likelihood.over_covariance(of.mean(strength[None])[0], slopes) @ slopes.T
+    precision = likelihood.over_covariance(effect_class.mean(strength[None])[0], slopes) @ slopes.T
     size = float(np.linalg.norm(strength))
     unit_sphere = np.log(2.0) + 0.5 * many * np.log(np.pi) - gammaln(0.5 * many)  # its area; 2 for one parameter
-    if many == 1 and not of.signed:
+    if many == 1 and not effect_class.signed:
         unit_sphere = 0.0
-    prior = -np.log(np.log(of.most / of.least)) - unit_sphere - many * np.log(size)
+    prior = -np.log(np.log(effect_class.most / effect_class.least)) - unit_sphere - many * np.log(size)
     return 0.5 * many * LOG_2PI - 0.5 * float(np.linalg.slogdet(precision)[1]) + prior

@@ -161,8 +161,9 @@ def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights) 
     distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHED)
     near = distance < OUTLIER * np.median(distance)
     axes, variances = _scatter(coordinates[near] - expected[near], length[near], columns.shape[1])
-    return EffectClass(name, effect, shape, strength.shape[1], signed, knots,
-                       table.reshape(parts.shape[1], len(knots), -1), axes, variances), near
+    table = table.reshape(parts.shape[1], len(knots), -1)
+    return EffectClass(name, effect, shape, parameters=strength.shape[1], signed=signed, knots=knots, table=table,
+                       axes=axes, variances=variances), near
 
 
 def _scatter(residual: np.ndarray, length: np.ndarray, fitted: int) -> tuple[np.ndarray, np.ndarray]:

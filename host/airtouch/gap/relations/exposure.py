@@ -17,6 +17,7 @@ import numpy as np
 from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation import plant
 from airtouch.simulation import signals as at
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, wrench
 from airtouch.simulation.effects import NAMES as PACKAGE
 from airtouch.simulation.random_generator import normal
@@ -43,6 +44,10 @@ class Follows(IntEnum):
     ONE_ROTOR = 14  #: its thrust beyond a quarter of the weight
 
 
+#: by what the signal is of; the others are 1, the time, and those of SCALE
+OF_MOTION = (Follows.VELOCITY, Follows.SPEED, Follows.BODY_RATE, Follows.TILT, Follows.POSITION,
+             Follows.SQUARED_VELOCITY)
+OF_THRUST = (Follows.THRUST, Follows.ROLL_THRUST, Follows.PITCH_THRUST, Follows.ONE_ROTOR)
 WEIGHT = {Follows.VELOCITY: 3, Follows.BODY_RATE: 3, Follows.NOISE: 3, Follows.TILT: 2}  #: times as often as the others
 DRAWN = tuple(f for f in Follows for _ in range(WEIGHT.get(f, 1)))  #: each as often as it is drawn
 #: height (m), period (s) and correlation time (s) of those that have one, between which it is log-uniform
@@ -74,47 +79,64 @@ NAMES = ("kind", "force_x", "force_y", "force_z", "torque_x", "torque_y", "torqu
 KIND, FORCE, TIME, BEGIN, END = (NAMES.index(n) for n in ("kind", "force_x", "time", "begin", "end"))
 
 
+@jit
+def _of_motion(kind, axis, s):
+    """Signal of one of OF_MOTION: a velocity, a turning rate, a tilt or a place; axis: 0 to 2."""
+    v = at.VELOCITY
+    if kind == Follows.VELOCITY:
+        return s[v + axis] / SPEED_SCALE_MPS
+    if kind == Follows.SPEED:
+        return math.sqrt(s[v] * s[v] + s[v + 1] * s[v + 1] + s[v + 2] * s[v + 2]) / SPEED_SCALE_MPS
+    if kind == Follows.SQUARED_VELOCITY:
+        return s[v] * abs(s[v]) / SPEED_SCALE_MPS ** 2
+    if kind == Follows.BODY_RATE:
+        return s[at.RATES + axis] / RATE_SCALE_RADPS
+    if kind == Follows.TILT:
+        return s[at.ROTATION + 2 + 3 * min(axis, 1)] / TILT_SCALE
+    return s[at.POSITION]
+
+
+@jit
+def _of_thrust(kind, rotor, s):
+    """Signal of one of OF_THRUST: thrust over the weight, of all rotors, between two sides or of one; rotor: 0 to 3."""
+    weight, t = s[at.MASS] * s[at.GRAVITY], at.THRUST
+    if kind == Follows.THRUST:
+        return ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / THRUST_SCALE
+    if kind == Follows.ROLL_THRUST:
+        return (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / DIFFERENCE_SCALE
+    if kind == Follows.PITCH_THRUST:
+        return (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / DIFFERENCE_SCALE
+    return 4.0 * s[t + min(rotor, 3)] / weight - 1.0
+
+
+@jit
+def _of_scale(kind, scale, s, memory, stream):
+    """Signal of one of SCALE, whose height (m), period (s) or correlation time (s) is `scale`."""
+    if kind == Follows.NEAR_GROUND:
+        return math.exp(-s[at.HEIGHT] / scale)
+    if kind == Follows.WAVE:
+        return math.sin(2.0 * math.pi * s[at.TIME] / scale)
+    keep = math.exp(-s[at.STEP] / scale)
+    memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
+    return memory[0]
+
+
 @wrench
 def _disturbance(p, s, memory, stream, out):
     """Force and torque in proportion to a signal x that is about 1 in an ordinary flight."""
     if s[at.TIME] < p[BEGIN] or s[at.TIME] > p[END]:
         return
-    kind, weight, x = int(p[KIND]) // 3, s[at.MASS] * s[at.GRAVITY], 0.0
-    axis = int(p[KIND]) - 3 * kind
-    t = at.THRUST
-    vx, vy, vz = s[at.VELOCITY], s[at.VELOCITY + 1], s[at.VELOCITY + 2]
+    kind = int(p[KIND]) // 3
     if kind == Follows.CONSTANT:
         x = 1.0
-    elif kind == Follows.VELOCITY:
-        x = s[at.VELOCITY + axis] / SPEED_SCALE_MPS
-    elif kind == Follows.SPEED:
-        x = math.sqrt(vx * vx + vy * vy + vz * vz) / SPEED_SCALE_MPS
-    elif kind == Follows.THRUST:
-        x = ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / THRUST_SCALE
-    elif kind == Follows.ROLL_THRUST:
-        x = (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / DIFFERENCE_SCALE
-    elif kind == Follows.PITCH_THRUST:
-        x = (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / DIFFERENCE_SCALE
-    elif kind == Follows.BODY_RATE:
-        x = s[at.RATES + axis] / RATE_SCALE_RADPS
-    elif kind == Follows.NEAR_GROUND:
-        x = math.exp(-s[at.HEIGHT] / p[TIME])
     elif kind == Follows.TIME:
         x = s[at.TIME] / TIME_SCALE_S
-    elif kind == Follows.WAVE:
-        x = math.sin(2.0 * math.pi * s[at.TIME] / p[TIME])
-    elif kind == Follows.NOISE:
-        keep = math.exp(-s[at.STEP] / p[TIME])
-        memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
-        x = memory[0]
-    elif kind == Follows.TILT:
-        x = s[at.ROTATION + 2 + 3 * min(axis, 1)] / TILT_SCALE
-    elif kind == Follows.POSITION:
-        x = s[at.POSITION]
-    elif kind == Follows.SQUARED_VELOCITY:
-        x = vx * abs(vx) / SPEED_SCALE_MPS ** 2
+    elif kind in OF_MOTION:
+        x = _of_motion(kind, int(p[KIND]) - 3 * kind, s)
+    elif kind in OF_THRUST:
+        x = _of_thrust(kind, int(p[TIME]), s)
     else:
-        x = 4.0 * s[t + min(int(p[TIME]), 3)] / weight - 1.0
+        x = _of_scale(kind, p[TIME], s, memory, stream)
     for i in range(6):
         out[i] += p[FORCE + i] * x
 

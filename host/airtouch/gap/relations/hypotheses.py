@@ -43,14 +43,19 @@ class Hypothesis:
     evidence: float
 
     @property
+    def classes(self) -> tuple[EffectClass, ...]:
+        """The classes of the effects."""
+        return tuple(f.effect_class for f in self.fits)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the classes."""
-        return tuple(f.of.name for f in self.fits)
+        return tuple(c.name for c in self.classes)
 
     @property
     def effect_names(self) -> tuple[str, ...]:
         """Names of the classes' effects in the registry, in their order."""
-        return tuple(f.of.effect for f in self.fits)
+        return tuple(c.effect for c in self.classes)
 
     @cached_property
     def shift(self) -> np.ndarray:
@@ -69,9 +74,9 @@ class FlightHypotheses:
         """A hypothesis for every class alone, the likeliest first."""
         return sorted(map(self.with_class, self.model.classes), key=lambda h: -h.evidence)
 
-    def with_class(self, of: EffectClass) -> Hypothesis:
+    def with_class(self, effect_class: EffectClass) -> Hypothesis:
         """The hypothesis of one class alone."""
-        base, f = log_density(self.values), fit(of, self.values, self.rescaling(()))
+        base, f = log_density(self.values), fit(effect_class, self.values, self.rescaling(()))
         return Hypothesis((f,), f.level - base, f.evidence - base)
 
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
@@ -97,8 +102,8 @@ class FlightHypotheses:
         for _ in range(TURNS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
-                rescaling = self.rescaling(others)
-                fits[i] = fit(f.of, rescaling(self.values - np.sum([o.shift for o in others], axis=0)), rescaling)
+                rescaling, beside = self.rescaling(others), np.sum([o.shift for o in others], axis=0)
+                fits[i] = fit(f.effect_class, rescaling(self.values - beside), rescaling)
             tried = self.at_fits(tuple(fits))
             if tried.level <= best.level:
                 break

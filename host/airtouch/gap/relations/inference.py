@@ -8,11 +8,11 @@ speaks against effects is measured in two ways, each with its limit: what a name
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
+from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
@@ -36,27 +36,10 @@ PAIR_ERROR_SHARE = 0.01  #: the same once more for several effects, because they
 #: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
 #: below 10,000 nats lie farther, half of them because they hit something (2,750 flights of `learning.SEED`, scatters
 #: and limit by other halves)
-FAR = 3.5
+MOST_SCATTERS = 3.5
 MOST_EFFECTS = 3  #: effects that a flight is named to have, at most; chosen
 BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn; chosen
 TEMPERATURE = 2.0  #: divisor of the evidence in probabilities: the densities' tails are heavier than normal; chosen
-ByClass = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
-
-
-class Against(NamedTuple):
-    """Nats that speak against effects, and those that may where the effects are right.
-
-    of_distance: whether they are the excess of a flight's distance, not the gain of a nameless disturbance.
-    """
-
-    nats: float
-    limit: float
-    of_distance: bool
-
-    @property
-    def is_too_much(self) -> bool:
-        """Whether more speaks against the effects than may."""
-        return self.nats > self.limit
 
 
 @dataclass(frozen=True)
@@ -95,17 +78,10 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     many = len(coordinates)
     flight = FlightHypotheses(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
     singles = flight.single_effects()
-    best = _likeliest(flight, singles, library)
+    best, against = _likeliest(flight, singles, library)
     return Inference(
-        classes=tuple(f.of for f in best.fits), evidence=_by_effect(singles),
-        against=_against(flight, best, library), readings=_readings(best),
-        without_sign=tuple(f.of.effect for f in best.fits
-                           if f.of.readout is not None and not f.of.readout.shows_sign(f.strength)))
-
-
-def _by_class(library: Library, numbers: np.ndarray) -> ByClass:
-    """Numbers (classes,) by the name and shape of their class."""
-    return {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, numbers, strict=True)}
+        classes=best.classes, evidence=_by_effect(singles), against=against,
+        readings=_readings(best), without_sign=_without_sign(best))
 
 
 def _readings(best: Hypothesis) -> Mapping[str, Reading]:
@@ -113,33 +89,38 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
 
     An effect of which several parameters act gives none: each was calibrated acting alone.
     """
-    count = Counter(f.of.effect for f in best.fits)
-    return {f.of.effect: read_out(f.of.readout, get(f.of.effect), f.strength)
-            for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
+    count = Counter(best.effect_names)
+    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
+    return {effect: read_out(readout, get(effect), strength)
+            for effect, readout, strength in classes if readout is not None and count[effect] == 1}
+
+
+def _without_sign(best: Hypothesis) -> tuple[str, ...]:
+    """The effects of a hypothesis whose strength does not tell their sign."""
+    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
+    return tuple(effect for effect, readout, strength in classes
+                 if readout is not None and not readout.shows_sign(strength))
 
 
 def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """What speaks against effects, by the measure that is nearer to its limit or farther beyond."""
-    return max(_nameless(flight, best, _by_class(library, library.nameless_share)),
-               _distance(flight, best, _by_class(library, library.distance_scatter), library),
-               key=lambda a: a.nats / a.limit)
+    return max(_nameless(flight, best, library), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis, shares: ByClass) -> Against:
+def _nameless(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """What a nameless disturbance gains beside effects."""
-    share = _largest(best, shares) + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
-    return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence, False)
+    of_classes = library.largest(library.nameless_share, best.classes)
+    share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
+    return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
+                   of_distance=False)
 
 
-def _distance(flight: FlightHypotheses, best: Hypothesis, scatters: ByClass, library: Library) -> Against:
+def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
-    share = float(np.hypot(_largest(best, scatters), library.pair_scatter * (len(best.fits) > 1)))
-    return Against(library.excess(flight.squared_distance(best)), FAR * library.scatter(share, best.evidence), True)
-
-
-def _largest(of: Hypothesis, shares: ByClass) -> float:
-    """Largest share of the classes of a hypothesis, 0 for no class."""
-    return max((shares[f.of.name, f.of.shape] for f in of.fits), default=0.0)
+    scatter = library.largest(library.distance_scatter, best.classes)
+    share = float(np.hypot(scatter, library.pair_scatter * (len(best.fits) > 1)))
+    return Against(library.excess(flight.squared_distance(best)), MOST_SCATTERS * library.scatter(share, best.evidence),
+                   of_distance=True)
 
 
 def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
@@ -153,36 +134,36 @@ def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library) -> Hypothesis:
-    """The likeliest hypothesis, with no more effects than its evidence supports.
+def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library) -> tuple[Hypothesis, Against]:
+    """The likeliest hypothesis, with no more effects than its evidence supports, and what speaks against it.
 
-    A second effect is always tried, a third only where too much speaks against the two. One more effect is kept if it
-    gains LEAST_EVIDENCE and what wrong second effects gain beside those classes (`Library.second_share`), and if it
-    explains the flight better than a nameless disturbance in its place would. A third is tried beside the chosen two
-    alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
+    A second effect is always tried, a third only where too much speaks against the two. A third is tried beside the
+    chosen two alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
     """
-    choices, second = _choices(library), _by_class(library, library.second_share)
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
-        return flight.none
-    best, beam = _by_thing(singles, choices), singles[:BEAM]
-    while len(best.fits) < MOST_EFFECTS and (len(best.fits) < 2 or _against(flight, best, library).is_too_much):
+        return flight.none, _against(flight, flight.none, library)
+    best, beam, against = _by_thing(singles, library), singles[:BEAM], None
+    while len(best.fits) < MOST_EFFECTS and (against is None or against.is_too_much):
         larger = _with_one_more(flight, beam)
-        if not larger:
+        first = _by_thing(larger, library) if larger else None
+        if first is None or first.evidence < _required_of_one_more(flight, best, library):
             break
-        first = _by_thing(larger, choices)
-        needed = best.evidence + LEAST_EVIDENCE + _largest(best, second) * best.evidence
-        if first.evidence < max(needed, flight.nameless_evidence(best) + NAMELESS_MARGIN):
-            break
-        best, beam = first, [first]
-    return best
+        best, beam, against = first, [first], _against(flight, first, library)
+    return best, _against(flight, best, library) if against is None else against
 
 
-def _choices(library: Library) -> Mapping[str, float]:
-    """Nats that the choice among its classes costs each effect."""
-    return {name: float(np.log(n)) for name, n in Counter(c.effect for c in library.model.classes).items()}
+def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis, library: Library) -> float:
+    """Evidence, nats, that a hypothesis with one more effect than this one must have.
+
+    It must gain LEAST_EVIDENCE and what wrong second effects gain beside those classes (`Library.second_share`), and
+    explain the flight better than a nameless disturbance in the place of the effect would.
+    """
+    share = library.largest(library.second_share, best.classes)
+    return max(best.evidence + LEAST_EVIDENCE + share * best.evidence,
+               flight.nameless_evidence(best) + NAMELESS_MARGIN)
 
 
-def _by_thing(hypotheses: Sequence[Hypothesis], choices: Mapping[str, float]) -> Hypothesis:
+def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
     """The likeliest name of the likeliest thing: hypotheses that are names of one thing count together.
 
     Each has the weight that the choice among the classes of its effects leaves; evidence counts as in probabilities.
@@ -194,14 +175,15 @@ def _by_thing(hypotheses: Sequence[Hypothesis], choices: Mapping[str, float]) ->
             groups.append([h])
         else:
             alike.append(h)
-    weights = [logsumexp([h.evidence / TEMPERATURE - sum(choices[name] for name in h.effect_names) for h in group])
+    cost = library.choice_cost
+    weights = [logsumexp([h.evidence / TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group])
                for group in groups]
     return max(groups[int(np.argmax(weights))], key=lambda h: h.evidence)
 
 
 def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
-    by_classes = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
+    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h
                   for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
     likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
@@ -220,5 +202,5 @@ def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
     """Evidence for each effect, the mean of its classes' likelihoods."""
     own: dict[str, list[float]] = {}
     for h in singles:
-        own.setdefault(h.fits[0].of.effect, []).append(h.evidence)
+        own.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
     return {name: float(logsumexp(v) - np.log(len(v))) for name, v in own.items()}

@@ -2,12 +2,13 @@
 
 import io
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any, SupportsIndex
+from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 
@@ -21,9 +22,17 @@ from airtouch.vehicle import Vehicle, load
 SHIPPED = "diagnosis.npz"
 FARTHEST_NOMINAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
 SHARES = ("nameless_share", "second_share", "distance_scatter")  #: fields of a library with one number for each class
+PARTS = ("knots", "table", "axes", "variances")  #: arrays of a class
 STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its scatter
 #: ends of the names of the arrays that are stored in float32
 EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
+
+
+class NominalDistance(NamedTuple):
+    """Squared length of the coordinates of nominal flights that were not learned from: median, standard deviation."""
+
+    median: float
+    deviation: float
 
 
 @dataclass(frozen=True)
@@ -32,8 +41,6 @@ class Library:
 
     projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
     less the middle.
-    distance: median and standard deviation of the squared length of coordinates of nominal flights that were not
-    learned from.
     nameless_share, second_share (classes,): nats that a nameless disturbance, or a second effect, gains beside
     the class, over the evidence for it; four of five flights with it have at most so much.
     distance_scatter (classes,): scatter of the nats by which a flight with the class lies farther from it than nominal
@@ -47,7 +54,7 @@ class Library:
     projection: np.ndarray
     middle: np.ndarray
     model: LearnedModel
-    distance: tuple[float, float]
+    distance: NominalDistance
     nameless_share: np.ndarray
     second_share: np.ndarray
     distance_scatter: np.ndarray
@@ -64,7 +71,7 @@ class Library:
     @property
     def nominal_scatter(self) -> float:
         """Standard deviation of the excess distance of nominal flights, nats."""
-        return 0.5 * self.distance[1]
+        return 0.5 * self.distance.deviation
 
     def scatter(self, share: float, evidence: float) -> float:
         """Standard deviation of the excess distance of flights with effects, nats.
@@ -75,7 +82,7 @@ class Library:
 
     def excess(self, squared: float) -> float:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
-        return 0.5 * (squared - self.distance[0])
+        return 0.5 * (squared - self.distance.median)
 
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
@@ -86,6 +93,20 @@ class Library:
     def effects(self) -> frozenset[str]:
         """Names of the effects of the registry that it has classes of."""
         return frozenset(c.effect for c in self.model.classes)
+
+    def largest(self, numbers: np.ndarray, classes: Iterable[EffectClass]) -> float:
+        """Largest number of some classes, 0 of none. numbers (classes,): one for each class of the library."""
+        return max((float(numbers[self._places[c.name, c.shape]]) for c in classes), default=0.0)
+
+    @cached_property
+    def _places(self) -> Mapping[tuple[str, float | None], int]:
+        """Places of the classes by their name and shape."""
+        return {(c.name, c.shape): i for i, c in enumerate(self.model.classes)}
+
+    @cached_property
+    def choice_cost(self) -> Mapping[str, float]:
+        """Nats that the choice among its classes costs each effect."""
+        return {name: float(np.log(n)) for name, n in Counter(c.effect for c in self.model.classes).items()}
 
     def without(self, names: Iterable[str]) -> "Library":
         """The library without the classes of some effects."""
@@ -108,7 +129,7 @@ def packed(library: Library) -> bytes:
               "projection": library.projection, "middle": library.middle, "interaction": model.interaction,
               "nameless": model.nameless, **{name: getattr(library, name) for name in SHARES}}
     for i, c in enumerate(model.classes):
-        arrays |= {f"{i}.knots": c.knots, f"{i}.table": c.table, f"{i}.axes": c.axes, f"{i}.variances": c.variances}
+        arrays |= {f"{i}.{part}": getattr(c, part) for part in PARTS}
         if c.readout is not None:
             arrays |= {f"{i}.strength": c.readout.strength, f"{i}.amount": c.readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
@@ -127,13 +148,13 @@ def read(content: bytes) -> Library:
         words = json.loads(str(file["words"]))
         arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
     classes = tuple(
-        EffectClass(name, effect, shape, parameters, signed, arrays[f"{i}.knots"], arrays[f"{i}.table"],
-                    arrays[f"{i}.axes"], arrays[f"{i}.variances"], _readout(words["readouts"][i], i, arrays))
+        EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in PARTS},
+                    readout=_readout(words["readouts"][i], i, arrays))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
     return Library(
         words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
         arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
-        distance=tuple(words["distance"]), pair_scatter=words["pair_scatter"],
+        distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"],
         **{name: arrays[name] for name in SHARES})
 
 

@@ -23,7 +23,7 @@ SPREAD = (0.10, 0.04)
 NEWTON_STEPS = 4  #: Newton steps to the correction; chosen
 #: factor on SPREAD where random effects shake the loop in ways that no log holds; chosen, not measured. With a larger
 #: one commands say less of any effect beside a random one, with a smaller one what shakes the loop looks like an effect
-WIDE = 6.0
+UNCERTAIN_FACTOR = 6.0
 #: error of the loop model, as a share of the logarithm of `ClosedLoop.ratio` (rms over bins and axes); chosen, not
 #: measured. The floor of a hypothesis is as much less certain: with a larger error the commands speak less for and
 #: against strong effects, with a smaller one errors of the loop model speak against right ones
@@ -45,15 +45,15 @@ class Correction(NamedTuple):
     covariance: np.ndarray
 
 
-def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> Correction:
+def correction_of(power: np.ndarray, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> Correction:
     """The floor's likeliest correction for the power (blocks, bins, AXES) of a flight, by Newton's method.
 
-    floor (bins, AXES): power of nominal flights; ratio (bins, AXES): what the hypothesis multiplies it by; wide: the
-    floor is as uncertain as random effects make it (WIDE). The information is that of exponential laws: 1 for each bin
-    of a block, times the block's weight.
+    floor (bins, AXES): power of nominal flights; ratio (bins, AXES): what the hypothesis multiplies it by;
+    uncertain_floor: it is as uncertain as random effects make it (UNCERTAIN_FACTOR). The information is that of
+    exponential laws: 1 for each bin of a block, times the block's weight.
     """
     over_floor, shapes = power / (floor * ratio), smooth_shapes()
-    spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1)) * (WIDE if wide else 1.0)
+    spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1)) * (UNCERTAIN_FACTOR if uncertain_floor else 1.0)
     spread = np.hypot(spread, COMMAND_DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
     weight = OVERLAP_WEIGHT * len(power)
     normal = weight * shapes @ shapes.T + np.diag(1.0 / spread ** 2)

@@ -80,23 +80,23 @@ class CommandView:
             at += edge_response.COUNT
         return out
 
-    def power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+    def power(self, active: Sequence[Active], uncertain_floor: bool = False) -> tuple[np.ndarray, float]:
         """Expected power (elements,) with the floor's correction fitted anew, and what that costs, nats.
 
-        wide: the floor is as uncertain as random effects make it (`command_floor_correction.WIDE`).
+        uncertain_floor: it is as uncertain as random effects make it (`command_floor_correction.UNCERTAIN_FACTOR`).
         """
         loop = self.loop
         if loop is None or not self.powers:
             return self.elements.floor, 0.0
         ratio = loop.ratio(active)
-        return self.workspace.cached("power", (ratio.tobytes(), wide),
-                                     lambda: self._expected(loop.floor, ratio, wide), KEPT_POWERS)
+        return self.workspace.cached("power", (ratio.tobytes(), uncertain_floor),
+                                     lambda: self._expected(loop.floor, ratio, uncertain_floor), KEPT_POWERS)
 
-    def _expected(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
+    def _expected(self, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> tuple[np.ndarray, float]:
         """`power` where effects multiply the floor of the commands by a ratio, (bins, AXES) each."""
         powers, cost = [], 0.0
         for s in self.powers:
-            correction = correction_of(s, floor, ratio, wide)
+            correction = correction_of(s, floor, ratio, uncertain_floor)
             cost += correction.cost
             powers.append(np.broadcast_to(correction.power, s.shape).ravel())
         powers.append(np.ones(len(self.edges) * edge_response.COUNT))
@@ -108,12 +108,13 @@ class CommandView:
             return np.zeros((0, len(AXES)))
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
-    def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, active: Sequence[Active], rise: np.ndarray, uncertain_floor: bool = False,
+               ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the spectra's log likelihood for k scaled parameters.
 
         Responses at edges are not in it: their power is 1 under every hypothesis.
 
-        rise (k, bins, AXES): of the logarithm of the power per scaled parameter; active, wide: see `power`.
+        rise (k, bins, AXES): of the logarithm of the power per scaled parameter; active, uncertain_floor: see `power`.
         """
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
@@ -121,25 +122,25 @@ class CommandView:
             return gradient, information
         floor, ratio = self.loop.floor, self.loop.ratio(active)
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
-            up, down = (self._log_likelihood(floor, ratio * np.exp(sign * SMALL * rise[i]), wide)
+            up, down = (self._log_likelihood(floor, ratio * np.exp(sign * SMALL * rise[i]), uncertain_floor)
                         for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
         for s in self.powers:
-            correction = correction_of(s, floor, ratio, wide)
+            correction = correction_of(s, floor, ratio, uncertain_floor)
             for axis in range(len(AXES)):  # what the shapes can take up tells nothing
                 slope = rise[:, :, axis]
                 cross = correction.weight * slope @ smooth_shapes().T
                 information += correction.weight * slope @ slope.T - cross @ correction.covariance @ cross.T
         return gradient, information
 
-    def _log_likelihood(self, floor: np.ndarray, ratio: np.ndarray, wide: bool) -> float:
+    def _log_likelihood(self, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> float:
         """Log likelihood of the spectra, less the costs of the floor's correction.
 
         floor, ratio (bins, AXES): power in nominal flights, and what effects multiply it by.
         """
         total = 0.0
         for s in self.powers:
-            correction = correction_of(s, floor, ratio, wide)
+            correction = correction_of(s, floor, ratio, uncertain_floor)
             total += OVERLAP_WEIGHT * log_likelihood(s, correction.power) - correction.cost
         return total
 

@@ -1,8 +1,10 @@
-"""A cell of the map in words: its phrase, its interval, its ratio."""
+"""A cell of the map in words: its phrase, its interval, its ratio, and what is left of it with effects in the model."""
 
-from airtouch.gap.result import Cell
+from collections.abc import Sequence
+
+from airtouch.gap.result import Cell, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
-from airtouch.gap.where.summary import SMALLEST_FLOOR
+from airtouch.gap.where import summary
 
 #: each phase as a phrase
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
@@ -17,8 +19,12 @@ def in_words(cell: Cell) -> str:
 def place_in_words(cell: Cell) -> str:
     """The cell's place in the map as a phrase, `over the platform, 0-0.5 Hz, roll torque`."""
     regime = "" if cell.regime == "all" else f" ({cell.regime})"
-    return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
-            f"{CHANNEL_WORDS[cell.channel]}")
+    return f"{PHASE_WORDS[cell.phase]}{regime}, {band_in_words(cell)}, {CHANNEL_WORDS[cell.channel]}"
+
+
+def band_in_words(cell: Cell | OpenCell) -> str:
+    """The cell's band in words, as `0-0.5 Hz`."""
+    return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
 
 def interval(cell: Cell) -> str:
@@ -33,4 +39,16 @@ def short(value: float) -> str:
 
 def ratio(cell: Cell) -> float:
     """The cell's gap over its floor."""
-    return cell.gap / max(cell.floor, SMALLEST_FLOOR)
+    return cell.gap / max(cell.floor, summary.SMALLEST_FLOOR)
+
+
+def change_in_words(cell: Cell) -> str:
+    """The cell with what is left of it, as `at take-off in lift at 0-0.5 Hz (6.1 to 4 times the floor)`."""
+    before, after = short(ratio(cell)), short(summary.ratio_after(cell))
+    change = f"{before} to {after} times the floor" if after != before else f"{after} times the floor, as before"
+    return f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} ({change})"
+
+
+def remaining_in_words(cells: Sequence[Cell]) -> list[str]:
+    """One line for each cell that stays over its floor with the named effects in the model."""
+    return [change_in_words(c) + (": worse than before" if summary.got_worse(c) else "") for c in cells]

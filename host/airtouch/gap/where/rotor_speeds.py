@@ -30,6 +30,11 @@ class RotorSpeed(NamedTuple):
     high: float
     flights: int
 
+    def in_words(self) -> str:
+        """As `rotor 1: 19600 rpm logged, 0.960 of the model's (0.950 to 0.970 over 6 flights)`."""
+        return (f"rotor {self.rotor}: {self.logged:.0f} rpm logged, {self.ratio:.3f} of the model's "
+                f"({self.low:.3f} to {self.high:.3f} over {self.flights} flights)")
+
 
 def rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
     """Median speed of each rotor in the air as logged and as modelled, (2, 4) 1/min; None without rpm."""

@@ -36,6 +36,15 @@ def test_one_group_against_all_others():
             folds.only(collection, group)
 
 
+def test_flights_in_still_air_are_grouped_by_day_height_and_angle():
+    flown = [Condition(day="0126", height=height, angle_deg=angle, wind=wind)
+             for height, angle, wind in (("low", 0.0, "none"), ("h80", 0.0, "none"), ("low", 0.0, "low"),
+                                         ("low", 30.0, "none"), ("low", 0.0, "none"), ("low", 0.0, None))]
+    a, b, _, d, e, _ = collection = [FlightFile(Path(f"{i}.csv"), condition) for i, condition in enumerate(flown)]
+    assert folds.still_air(collection) == {("0126", "low", "0"): [a, e], ("0126", "h80", "0"): [b],
+                                           ("0126", "low", "30"): [d]}
+
+
 def test_days_are_needed():
     with pytest.raises(AirTouchError, match="add a column 'day'"):
         folds.by_day([FlightFile(Path("f.csv"), Condition())])

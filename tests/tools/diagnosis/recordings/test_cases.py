@@ -8,9 +8,9 @@ from tools.diagnosis.recordings import cases as recorded_cases
 @pytest.fixture
 def folder(tmp_path):
     """Authors: eight calm flights of a day and condition, and some that are not; neural-swarm, CrazyPAD and peers."""
-    calm = [f"a_b_0125x_{i}.csv,clean,none,{i % 3},0.5,0" for i in range(8)]
-    others = ["a_b_0125x_8.csv,clean,fan,0,0.5,0", "a_b_0125x_9.csv,messy,none,0,0.5,0",
-              *(f"a_b_0126x_{i}.csv,clean,none,1,0.5,0" for i in range(recorded_cases.OTHERS))]
+    calm = [f"a_b_0125-1200_{i}.csv,clean,none,{i % 3},0.5,0" for i in range(8)]
+    others = ["a_b_0125-1200_8.csv,clean,fan,0,0.5,0", "a_b_0125-1200_9.csv,messy,none,0,0.5,0",
+              *(f"a_b_0126-1200_{i}.csv,clean,none,1,0.5,0" for i in range(recorded_cases.OTHERS))]
     write(tmp_path / "airtouch", "manifest", "file,use,wind,fold,height,angle_deg", [*calm, *others])
     write(tmp_path / "neuralswarm", "manifest", "file,truth,vehicle,group,day",
           ["s19.csv,none,ns-34g,g19,19", "s20.csv,downwash,ns-34g,g20,20", "s21.csv,none,ns-67g,g21,21"])
@@ -48,8 +48,8 @@ def test_every_flight_is_of_one_part(folder, row):
 
 def test_four_of_the_authors_flights_are_held_against_five_calm_ones_of_their_day(folder):
     cases = list(recorded_cases.authors(folder, "build"))
-    assert names(c.flight for c in cases) == [f"a_b_0125x_{i}.csv" for i in (0, 2, 4, 6)]
-    assert all(len(c.baseline) == 5 and set(names(c.baseline)) <= {f"a_b_0125x_{i}.csv" for i in range(8)}
+    assert names(c.flight for c in cases) == [f"a_b_0125-1200_{i}.csv" for i in (0, 2, 4, 6)]
+    assert all(len(c.baseline) == 5 and set(names(c.baseline)) <= {f"a_b_0125-1200_{i}.csv" for i in range(8)}
                for c in cases)
     assert not list(recorded_cases.authors(folder, "view"))
 
@@ -63,7 +63,7 @@ def test_swarm_flights_have_the_baseline_of_their_group(folder):
 def test_each_nominal_flight_of_three_or_more_is_held_against_five_others_of_its_group(folder):
     cases = list(recorded_cases.nominal(folder, "all"))
     groups = [names([c.flight])[0].rsplit("_", 1)[0] for c in cases]
-    assert {g: groups.count(g) for g in groups} == {"a_b_0125x": 8, "a_b_0126x": 5, "base19": 3, "base21": 7}
+    assert {g: groups.count(g) for g in groups} == {"a_b_0125-1200": 8, "a_b_0126-1200": 5, "base19": 3, "base21": 7}
     assert [len(c.baseline) for c, g in zip(cases, groups, strict=True) if g == "base21"] == [5] * 7
     assert all(name.startswith(g) for c, g in zip(cases, groups, strict=True) for name in names(c.baseline))
 

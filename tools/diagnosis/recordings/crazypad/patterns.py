@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.cli.shared.progress import with_bar
 from airtouch.gap.balance.hover_pattern import HoverPattern, hover_pattern
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
@@ -13,7 +14,7 @@ from airtouch.vehicle import Vehicle
 
 def hover_patterns(folder: Path, rows: list[dict[str, str]], vehicle: Vehicle) -> list[HoverPattern]:
     """The pattern of each flight of some rows of the manifest."""
-    return [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows]
+    return [hover_pattern(ready(read(folder / r["file"]), vehicle), vehicle) for r in with_bar(rows, "flights")]
 
 
 def likeliest(logs: np.ndarray, names: Sequence[str]) -> str:

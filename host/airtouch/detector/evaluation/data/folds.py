@@ -7,6 +7,9 @@ from airtouch.errors import AirTouchError
 
 Folds = dict[int, list[FlightFile]]
 GROUPS_OF_DAYS = 5  #: as many as the manifest has folds
+#: folds of the authors' flights on which settings are chosen; each look at the others is in host/docs/looks.md
+BUILD_FOLDS = (0, 1, 2)
+BUILD_DAYS = ("19", "20")  #: neural-swarm's days on which settings are chosen, as its manifest names them
 
 
 def by_fold(files: Sequence[FlightFile]) -> Folds:
@@ -39,6 +42,16 @@ def by_day(files: Sequence[FlightFile]) -> Folds:
     for day in sorted(days, key=lambda name: (-len(days[name]), name)):
         min(groups, key=len).extend(days[day])
     return dict(enumerate(groups))
+
+
+def still_air(files: Sequence[FlightFile]) -> dict[tuple[str, str, str], list[FlightFile]]:
+    """(Day, class of height, angle in degrees) -> the flights in still air that were flown so."""
+    groups: dict[tuple[str, str, str], list[FlightFile]] = {}
+    for file in files:
+        flown = file.condition
+        if flown.wind == "none":
+            groups.setdefault((f"{flown.day}", f"{flown.height}", f"{flown.angle_deg:g}"), []).append(file)
+    return groups
 
 
 def only(files: Sequence[FlightFile], group: str) -> Folds:

@@ -54,9 +54,9 @@ class FirstOrder:
 def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder:
     """What effects with these parameters leave of a part of the flights."""
     problem = problem_of(data, part)
-    values, extra_power, _ = problem.modelled(terms)
-    residual, cost = without_offsets(problem, values, extra_power)
-    return Remainder(problem, values, residual, extra_power, problem.likelihood(residual, extra_power), cost)
+    gap, added, _ = problem.modelled(terms)
+    residual, cost = without_offsets(problem, gap, added)
+    return Remainder(problem, gap, residual, added, problem.likelihood(residual, added), cost)
 
 
 def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Term], base: Sequence[Term] = (),
@@ -115,7 +115,7 @@ def shows(data: Data, term: Term) -> bool:
 def column(data: Data, problem: Problem, term: Term, i: int) -> np.ndarray:
     """Change (n,) of the flattened spectra of a problem per scaled parameter i of a term at neutral."""
     gathered = problem.flat.layout.gather(_change(data, term, i))
-    return np.where(problem.elements.known, problem.flat.joined(gathered), 0.0)
+    return np.where(problem.elements.valid, problem.flat.joined(gathered), 0.0)
 
 
 def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:

@@ -5,39 +5,39 @@ import json
 import numpy as np
 import pytest
 
-from tools.diagnosis import gap_wakes
+from tools.diagnosis.recordings.wakes import known_seconds, tracks, without_seconds
 
 
 def window(cf="cf50", start_s=0.0, place=(0.0, 0.0, 0.5), n=1000, force=0.0):
     generator = np.random.default_rng(int(start_s) + n)
     row = {"cf": cf, "start_s": str(start_s), "flight": f"day/{cf}_01"}
     noise = generator.normal(scale=0.02, size=(3, n))
-    return gap_wakes.Track(row, np.tile(place, (n, 1)), noise[0] + force, noise[1], noise[2], np.ones(n, bool))
+    return tracks.Track(row, np.tile(place, (n, 1)), noise[0] + force, noise[1], noise[2], np.ones(n, bool))
 
 
 def test_another_vehicle_is_above_where_both_cuts_hold_the_time():
     low, high = window(), window("cf51", 4.0, (0.1, 0.0, 0.9), 300)
-    assert np.flatnonzero(gap_wakes.under(low, high)).tolist() == list(range(400, 700))
-    assert not gap_wakes.under(high, low).any()
-    assert not gap_wakes.under(low, window("cf51", 0.0, (0.2, 0.0, 0.9))).any()
-    assert not gap_wakes.under(low, window("cf51", 0.0, (0.0, 0.0, 1.2))).any()
+    assert np.flatnonzero(tracks.under(low, high)).tolist() == list(range(400, 700))
+    assert not tracks.under(high, low).any()
+    assert not tracks.under(low, window("cf51", 0.0, (0.2, 0.0, 0.9))).any()
+    assert not tracks.under(low, window("cf51", 0.0, (0.0, 0.0, 1.2))).any()
 
 
 def test_only_vehicles_of_the_same_flight_count():
     low, high = window(), window("cf51", 0.0, (0.0, 0.0, 0.9))
-    assert gap_wakes.overhead_at(low, [low, high]).all()
+    assert tracks.overhead_at(low, [low, high]).all()
     high.row["flight"] = "day/cf51_02"
-    assert not gap_wakes.overhead_at(low, [low, high]).any()
+    assert not tracks.overhead_at(low, [low, high]).any()
 
 
 def test_a_push_in_these_seconds_is_beyond_chance_and_none_is_not():
     acts = np.zeros(1000, bool)
     acts[300:400] = True
-    by_chance = gap_wakes.chance(acts, [window(n=1000 + i) for i in range(6)])
+    by_chance = known_seconds.chance(acts, [window(n=1000 + i) for i in range(6)])
     push = window(n=1000, force=np.where(acts, -0.05, 0.0))
-    assert gap_wakes.measures(push, acts)[0] == pytest.approx(0.05, abs=0.01)
-    assert gap_wakes.measures(push, acts)[0] > np.quantile(by_chance[:, 0], 0.997)
-    assert gap_wakes.measures(window(n=1200), np.resize(acts, 1200))[0] < np.quantile(by_chance[:, 0], 0.997)
+    assert known_seconds.measures(push, acts)[0] == pytest.approx(0.05, abs=0.01)
+    assert known_seconds.measures(push, acts)[0] > np.quantile(by_chance[:, 0], 0.997)
+    assert known_seconds.measures(window(n=1200), np.resize(acts, 1200))[0] < np.quantile(by_chance[:, 0], 0.997)
 
 
 def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(capsys):
@@ -48,8 +48,8 @@ def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(cap
     for samples, words in ((40, "less than 0.5 s held"), (60, "| yes |")):
         high = window("cf51", 4.0, (0.0, 0.0, 0.9), samples)
         high.row.update(here, file="high.csv", truth="partner")
-        low.force[:] = np.where(gap_wakes.under(low, high), -0.2, low.force)
-        gap_wakes.show_seen([low, high, nominal], None)
+        low.force[:] = np.where(tracks.under(low, high), -0.2, low.force)
+        known_seconds.show_seen([low, high, nominal], None)
         out = capsys.readouterr().out
         assert words in next(line for line in out.splitlines() if "low.csv" in line)
         assert f"{int(samples == 40)} more, for which the data hold less than 0.5 s" in out
@@ -64,20 +64,20 @@ def test_named_wakes_are_counted_by_whether_the_path_is_held(tmp_path):
         high.row.update(file=f"above {name}", flight=f"day/cf51_{number}")
         return [low, high] if seconds else [low]
 
-    tracks = [*wake("long", 1, 3.0), *wake("unnamed", 2, 3.0), *wake("short", 3, 0.3), *wake("alone", 4, 0.0)]
+    held = [*wake("long", 1, 3.0), *wake("unnamed", 2, 3.0), *wake("short", 3, 0.3), *wake("alone", 4, 0.0)]
     kept = tmp_path / "answers.jsonl"
     kept.write_text("".join(json.dumps({"flight": name, "verdict": verdict, "effects": [{"name": n} for n in names]})
                             + "\n" for name, verdict, names in (
         ("long", "effect", ["downwash", "mass"]), ("unnamed", "effect", ["mass", "downwash"]), ("short", "none", []),
         ("alone", "effect", ["downwash"]))))
-    answers = gap_wakes.answers_of(kept)
+    answers = known_seconds.answers_of(kept)
     assert answers == {"long": "downwash", "unnamed": "mass", "short": "none", "alone": "downwash"}
-    assert gap_wakes.named_by_path(tracks, answers) == {True: [True, False], False: [False, True]}
-    assert gap_wakes.named_by_path(tracks, gap_wakes.answers_of(None)) == {True: [False] * 2, False: [False] * 2}
+    assert known_seconds.named_by_path(held, answers) == {True: [True, False], False: [False, True]}
+    assert known_seconds.named_by_path(held, known_seconds.answers_of(None)) == {True: [False] * 2, False: [False] * 2}
 
 
 def test_the_interval_of_an_area_holds_it():
     """Scores apart by one standard deviation: the area is 0.76, and 100 of each give it to 0.03."""
     rng = np.random.default_rng(0)
-    low, high = gap_wakes.auroc_interval(rng.normal(1.0, 1.0, 100), rng.normal(0.0, 1.0, 100))
+    low, high = without_seconds.auroc_interval(rng.normal(1.0, 1.0, 100), rng.normal(0.0, 1.0, 100))
     assert low < 0.76 < high and 0.06 < high - low < 0.2

@@ -1,0 +1,82 @@
+"""The answer of a diagnosis in three sentences: where, which, how far."""
+
+from collections.abc import Sequence
+
+from airtouch.gap.answer.words import joined, name_in_words, quantity
+from airtouch.gap.result import Cell, Diagnosis, NamedEffect
+from airtouch.gap.signals.channels import CHANNEL_WORDS
+from airtouch.gap.where import summary
+from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, ratio, short
+
+
+def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
+    """Where the gap lies, which effect it is and how probable that is, how far it closes."""
+    return _where(diagnosis), _which(diagnosis), _how_far(diagnosis)
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
+    cell = diagnosis.headline
+    if cell is None:
+        return "In no cell of the map does the gap stand out of its floor."
+    cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
+    standing_out = len({c.phase for c in summary.same_place(cells, cell)})
+    flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
+    most = summary.headline(cells) or cell  # the effects named may close another
+    share = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
+    return (f"{share} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
+            f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
+            + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
+
+
+def _which(diagnosis: Diagnosis) -> str:
+    """The effects named with their probability; where none is, what comes nearest."""
+    chance = f"{diagnosis.ranking[0].probability:.0%}" if diagnosis.ranking else "not known"
+    if diagnosis.verdict == "none":
+        return f"No unmodelled effect stands out (probability {chance})."
+    if diagnosis.verdict == "unknown":
+        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
+        return (f"No known effect explains it (probability {chance})"
+                + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
+    first, *others = (_named(e) for e in diagnosis.effects)
+    cell = diagnosis.headline
+    if cell is not None and cell.after is not None and not summary.closes(cell):
+        sentence = f"The effect named, {first} (probability {chance}), does not close this cell"
+        return sentence + (f", nor does {joined(others)} beside it." if others else ".")
+    begin = "Its cause" if cell is not None else "The effect named, from all cells together,"
+    return f"{begin} is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
+
+
+def _named(effect: NamedEffect) -> str:
+    """The effect's name, and of which rotor."""
+    rotor = effect.parameters.get("rotor")
+    return name_in_words(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+
+
+def _how_far(diagnosis: Diagnosis) -> str:
+    """How far the effects named close the gap; how large it is where none is named."""
+    before, after = diagnosis.gap.get("before"), diagnosis.gap.get("after")
+    if before is None or after is None:
+        return "How far it would close is not known."
+    if diagnosis.verdict == "none":
+        if short(before) == "1":
+            return "Over all it is at the floor, so there is nothing to close."
+        return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
+    if diagnosis.verdict != "effect" or diagnosis.shrink is None:
+        return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
+    added = "it" if len(diagnosis.effects) == 1 else "them"
+    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
+            f"floor on data held out, from {short(before)} to {short(after)} times the floor"
+            f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}.")
+
+
+def _cells_in_words(cells: Sequence[Cell]) -> str:
+    """How many cells still stand out with the effects named, and how many got worse; "" where neither."""
+    open_cells, worse_cells = summary.remaining(cells), summary.worse(cells)
+    over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
+    still = sum(summary.stands_out(c) for c in open_cells)
+    out = ""
+    if open_cells:
+        new = f", beside {len(open_cells) - still} that did not before" if len(open_cells) > still else ""
+        out = f"; {still} of {over} cells still stand out{new}, mostly {change_in_words(open_cells[0])}"
+    return out + (f", and {len(worse_cells)} got worse" if worse_cells else "")

@@ -1,0 +1,56 @@
+"""The signals that a gap of known shape follows."""
+
+import numpy as np
+import pytest
+
+from airtouch.gap.answer.followed_signals import followed_signals
+from airtouch.gap.answer.unexplained import ratios_of_blocks
+from airtouch.gap.nominal.build_study import declared_study
+from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.spectra import AIR, starts
+from airtouch.simulation import signals as at
+from gap_flights import VEHICLE, flight, noise
+from made_diagnosis import cell
+
+STUDY = declared_study(VEHICLE, ())
+SECONDS = 40.0
+CELL = cell("force_x", "hover", 1.0, band_hz=(2.0, 6.0))
+
+
+def hover(strength):
+    """A hover whose forward gap is white noise of rms `strength` (n,) or one number, m/s^2."""
+    force = noise(SECONDS, 1.0, 1) * np.broadcast_to(strength, 4000)[:, None] * [1.0, 0.0, 0.0]
+    return flight(SECONDS, force)
+
+
+def ratio_of(one):
+    """Rms over the floor of CELL in each block of a flight."""
+    return ratios_of_blocks(one, residual(one, VEHICLE), CELL)
+
+
+def test_signal_that_the_power_follows_is_named():
+    """A gap that grows with time; the height, which does not change, and signals of the made hover say nothing."""
+    growing = hover(np.linspace(0.1, 3.0, 4000))
+    assert followed_signals(STUDY, [(growing, ratio_of(growing))]) == ["time"]
+    steady = hover(1.0)
+    assert not followed_signals(STUDY, [(steady, ratio_of(steady))])
+
+
+def test_a_signal_that_one_flight_lacks_is_not_named():
+    """Height that goes with the gap in two flights, of which one log has none."""
+    climbing = np.linspace(0.1, 3.0, 4000)[::-1]
+    pair = []
+    for with_height in (True, False):
+        one = hover(climbing)
+        if with_height:
+            one.log.columns["z_m"] = climbing
+        one.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = climbing[:, None]
+        pair.append((one, ratio_of(one)))
+    assert "height" in followed_signals(STUDY, pair[:1])
+    assert "height" not in followed_signals(STUDY, pair)
+
+
+@pytest.mark.parametrize(("seconds", "names"), [(19.2, []), (21.8, ["time"])])
+def test_fewer_than_eight_separate_blocks_are_not_tested(seconds, names):
+    one = flight(seconds)
+    assert followed_signals(STUDY, [(one, np.arange(1.0, len(starts(one, AIR)) + 1.0))]) == names

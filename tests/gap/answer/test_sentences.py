@@ -1,0 +1,74 @@
+"""The answer in three sentences, by what the diagnosis names and by what its cells show."""
+
+from dataclasses import replace
+
+import pytest
+
+from airtouch.gap.answer.sentences import sentences
+from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.where import summary
+from made_diagnosis import cell, diagnosis
+
+
+def test_effect_that_does_not_close_the_headline_cell_is_not_its_cause():
+    cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
+    said = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
+    assert said[1] == "The effect named, motor noise (probability 93%), does not close this cell."
+    assert "500 to 475 times the floor" in said[2].replace("  ", " ")
+
+
+@pytest.mark.parametrize(("other", "begin"), [(0.2, "The gap lies mostly in lift"),
+                                              (9.0, "A part of the gap lies in lift")])
+def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
+    cells = [cell("force_z", "hover", 1.0, after=0.1), cell("torque_x", "hover", other, after=other)]
+    said = sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
+                                          headline=summary.headline(cells, True)))
+    assert said[0].startswith(begin) and said[1].startswith("Its cause is ground effect")
+
+
+def test_no_cause_is_given_without_a_headline_cell():
+    where, which, _ = sentences(diagnosis([cell("force_z", "hover", 0.05)]))
+    assert where == "In no cell of the map does the gap stand out of its floor."
+    assert which.startswith("The effect named, from all cells together, is imu bias")
+
+
+def test_weak_motors_are_named_with_their_rotors():
+    weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
+    sentence = sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
+    assert sentence == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
+
+
+def test_cells_that_got_worse_are_counted():
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
+             cell("force_y", "ground", 2.6, after=8.8)]
+    sentence = sentences(diagnosis(cells))[2]
+    assert "2 of 3 cells still stand out, mostly on the ground in sideways force" in sentence
+    assert "(26 to 88 times the floor)" in sentence
+    assert sentence.endswith("and 2 got worse.")
+
+
+def test_cells_that_newly_stand_out_are_counted_apart():
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "hover", 0.1, after=0.4),
+             cell("force_y", "hover", 0.5, after=0.45)]
+    counts = "; 1 of 2 cells still stand out, beside 1 that did not before, mostly in"
+    assert counts in sentences(diagnosis(cells))[2]
+
+
+@pytest.mark.parametrize(("before", "size"), [(1.01, "at the floor, so there is nothing to close."),
+                                            (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
+def test_none_says_how_large_the_gap_is(before, size):
+    none = diagnosis(verdict="none", effects=())
+    assert sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {size}"
+
+
+def test_an_effect_beside_the_first_is_told_as_one_though_the_headline_is_its_own():
+    cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
+    said = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {}))))
+    assert said[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
+
+
+def test_unknown_names_what_comes_nearest_and_closes_nothing():
+    where, which, how_far = sentences(diagnosis([cell("force_z", "hover", 0.5)], "unknown", ()))
+    assert where == ("The gap lies mostly in lift at 0-0.5 Hz: in hover it is 0.5 m/s^2, 5 times the floor.")
+    assert which == "No known effect explains it (probability 93%); the nearest is mass with 4.0%."
+    assert how_far == "Nothing closes it yet: over all it stays 4 times the floor."

@@ -1,0 +1,82 @@
+"""Which nominal flights are compared with which, and what is done anew, on stand-ins for the flights."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter
+from tools.calibration.nominal import comparisons, scatter_table
+from tools.calibration.nominal.groups import Group
+
+
+def group(name, drone, count):
+    """A group of flights that are their names."""
+    names = [f"{name}{i}" for i in range(count)]
+    return Group("class", drone, name, SimpleNamespace(name="it"), [(n, lambda n=n: n) for n in names])
+
+
+@pytest.fixture
+def compared(monkeypatch):
+    """(flight, its baseline) of each comparison, in order; nothing is measured."""
+    pairs = []
+    monkeypatch.setattr(comparisons, "ready", lambda log, vehicle: log)
+    monkeypatch.setattr(comparisons.calibrate, "calibrated", lambda vehicle, base, scatter: (base, None))
+    monkeypatch.setattr(comparisons, "Data", lambda base, flights: pairs.append((flights[0], base)))
+    return pairs
+
+
+def test_groups_are_held_against_the_other_groups_of_their_drone_where_these_have_two_flights():
+    many, few, other = group("a", "one", 4), group("b", "one", 1), group("c", "two", 4)
+    tasks = {(t.group.name, t.note): t.others and [name for name, _ in t.others]
+             for t in comparisons.tasks_of([many, few, other])}
+    assert tasks == {("a", ""): None, ("b", ""): None, ("c", ""): None,
+                     ("b", ", other groups"): ["a0", "a1", "a2", "a3"]}
+
+
+def test_no_flight_is_in_its_own_baseline_and_that_has_five_at_most(compared):
+    names = [name for name, _ in comparisons.held_out(group("a", "one", 9).logs, None, look=lambda data: None)]
+    assert names == [f"a{i}" for i in range(9)] == [flight for flight, _ in compared]
+    assert all(flight not in base and len(base) == 5 for flight, base in compared)
+
+
+def test_flights_of_other_groups_have_one_baseline(compared):
+    list(comparisons.held_out(group("a", "one", 3).logs, None, group("b", "one", 20).logs, look=lambda data: None))
+    assert len(compared) == 3 and len({tuple(base) for _, base in compared}) == 1
+    assert {name[0] for name in compared[0][1]} == {"b"} and len(compared[0][1]) == 5
+
+
+def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
+    done = []
+
+    def rows_of(task):
+        done.append(task.group.name + task.note)
+        return [{"file": name + task.note} for name, _ in task.group.logs]
+
+    class Alone:
+        def __enter__(self):
+            return SimpleNamespace(map=map)
+
+        def __exit__(self, *_):
+            return None
+
+    monkeypatch.setattr(comparisons, "_rows_of", rows_of)
+    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: Alone())
+    both, kept = [group("a", "one", 4), group("b", "one", 3)], tmp_path / "kept.jsonl"
+    first = comparisons.compare_all(both, kept, 1)
+    assert len(first) == 14 and done == ["a", "a, other groups", "b", "b, other groups"]
+    kept.write_text("\n".join(line for line in kept.read_text().splitlines() if '"b1, ' not in line) + "\n")
+    assert comparisons.compare_all(both, kept, 1) == first and done[4:] == ["b, other groups"]
+
+
+def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monkeypatch):
+    seen = []
+    monkeypatch.setattr(scatter_table, "class_scatter",
+                        lambda flights, alike: seen.append((flights, alike)) or Scatter({}, 1.0, (0.0, 0.0)))
+    one = group("a", "one", 2)
+    rows = {name + note: {"strengths": {}, "errors": {}, "rate": rate, "passing": {}}
+            for name, _ in one.logs for note, rate in (("", 1.0), (", other groups", 2.0))}
+    classes, counts = scatter_table.scatter_of_classes([one], rows)
+    (flights, alike), = seen
+    assert sorted(f.rate for f in flights) == [1.0, 1.0, 2.0, 2.0] and [f.rate for f in alike] == [1.0, 1.0]
+    assert counts == {"class": "2 flights, 4 comparisons in 1 groups"} and classes["class"].vehicle == "it"
+    assert all(isinstance(f, ApparentStrengths) for f in flights)
