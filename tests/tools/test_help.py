@@ -1,5 +1,5 @@
 """Every script and every module of tools that is run starts, and says what it does and what each option
-means, and each argument of argparse; arguments of click have no help texts."""
+means, and each argument of argparse. Arguments of click have no help texts."""
 
 import subprocess
 import sys
