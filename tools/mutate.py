@@ -138,7 +138,7 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown := set(args.groups) - set(GROUPS):
         parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
     if not args.show and find_spec("mutmut") is None:
-        parser.error("mutmut is not installed: pip install 'airtouch[mutate]', or run it by make mutate")
+        parser.error("mutmut is not installed: pip install '.[mutate]', or run it by make mutate")
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:
