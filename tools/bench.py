@@ -193,8 +193,8 @@ def main() -> None:
     benches = [(bench_band_power, flights), (bench_pipelines, flights), (bench_inference, flights)]
     if options.train:
         benches.append((bench_training, load_flights(ALL)))
-    for bench, given in with_bar(benches, "benchmarks"):
-        bench(table, given)
+    for bench, recorded in with_bar(benches, "benchmarks"):
+        bench(table, recorded)
     Console(width=130).print(table)
 
 

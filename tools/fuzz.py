@@ -6,7 +6,7 @@
     python tools/fuzz.py --coverage                       # lines that the corpus reaches, source by source
     python tools/fuzz.py --keep                           # the corpus, made small, becomes the seeds of tests/fuzz
 
-A million inputs of one target take 1 to 8 minutes of processor time, all targets hours.
+A million inputs of one target take 1 to 8 minutes of processor time, all targets take hours.
 
 With clang the engine is libFuzzer, which follows coverage; else a small driver of our own under the C compiler's
 sanitizers, which only mutates the seeds. Everything is under build/fuzz: a corpus that grows from run to run, the

@@ -4,7 +4,7 @@
     python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711
     python tools/fuzz_logs.py --shapes 100000
 
-A thousand inputs of each format, as by default, take two to three minutes, 100,000 hours.
+A thousand inputs of each format, as by default, take two to three minutes, 100,000 inputs take hours.
 
 Prints per format the number of inputs, logs, refusals and failures, and the worst time and memory.
 Exit code 1 when anything failed. One input is known by seed, format and number: the last line of a

@@ -6,7 +6,7 @@
 A group is a few modules and the tests that are there for them. mutmut works on a copy in build/mutate, where what is
 done is not done again; `--force` begins anew. A sample is drawn by a seed from all mutants; without one each is
 run. Each mutant runs those of its group's tests that reach it, until one fails: a sample of 60 does so
-sixty times. Needs `pip install airtouch[mutate]`.
+sixty times. Needs `pip install '.[mutate]'`.
 """
 
 import argparse
@@ -106,17 +106,17 @@ def table(codes: dict[str, int | None]) -> float:
     total = Counter()
     for count in by_module.values():
         total += count
-    share = 0.0
+    fraction = 0.0
     for module, count in [*sorted(by_module.items()), ("all", total)]:
         n, hits = sum(count.values()), count["noticed"]
         if not n:
             continue
         between = wilson(hits, n)
-        share = hits / n
+        fraction = hits / n
         rest = ", ".join(f"{k} {v}" for k, v in sorted(count.items()) if k != "noticed")
-        print(f"{module}: noticed {hits} of {n}, {share:.1%} [{between['low']:.0%}, {between['high']:.0%}]"
+        print(f"{module}: noticed {hits} of {n}, {fraction:.1%} [{between['low']:.0%}, {between['high']:.0%}]"
               + (f"; {rest}" if rest else ""))
-    return share
+    return fraction
 
 
 def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
@@ -138,7 +138,7 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown := set(args.groups) - set(GROUPS):
         parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
     if not args.show and find_spec("mutmut") is None:
-        parser.error("mutmut is not installed: pip install 'airtouch[mutate]', or run it by make mutate")
+        parser.error("mutmut is not installed: pip install '.[mutate]', or run it by make mutate")
     worst = 1.0
     for name in args.groups or GROUPS:
         if args.show:

@@ -152,7 +152,7 @@ def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):
     for arguments, message in ((["measure", tmp_path / "baseline.csv"], "no column of stages"),
                                (["measure", tmp_path / "none.csv"], "cannot be read")):
         refusal = run(*arguments)
-        assert refusal.returncode == 1 and message in refusal.stderr and refusal.stderr.count("\n") == 1
+        assert refusal.returncode == 2 and message in refusal.stderr and refusal.stderr.count("\n") == 1
 
 
 def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():

@@ -37,6 +37,46 @@ def test_tables_of_the_readme_are_those_of_the_results():
     assert len(in_readme) > 8 and in_readme <= there, in_readme - there
 
 
+def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
+    """Each figure of its two columns against the row of results.md, or of gap-crazypad.md, that it is from."""
+    text, there = (path.read_text("utf-8") for path in (ROOT / "README.md", DOCS / "results.md"))
+    edges, simulated, trained, named = (cells[1:3] for cells in tables(text[:text.index("(*) Not a blind")])[2:])
+
+    def cells_of(section, first):
+        return next(cells for cells in tables(there[there.index(f"\n{section}\n"):]) if cells[0] == first)
+
+    def numbers(*texts):
+        return [re.search(r"[\d.]+", text).group() for text in texts]
+
+    _, missed, _, error, *_ = cells_of("## Edges", "`best`")
+    assert edges[0].startswith("{} % of 174 edges missed, the others {} m off".format(*numbers(missed, error)))
+    high, others = (cells_of("### Where `best` fails", "0201")[i] for i in (2, 3))
+    (hits, of), more = map(int, re.match(r"(\d+) of (\d+)", high).groups()), re.match(r"none of (\d+)", others)
+    assert edges[1].startswith(f"{hits} of {of + int(more.group(1))} missed on one of their days")
+    for said, name in zip(simulated, ("`paper-4cm`", "`paper-mixed`"), strict=True):
+        seeds = cells_of("## Flights of the virtual drone", name)[2:]
+        assert said.startswith("{} and {} % of 40 missed".format(*numbers(*seeds))) and name in said
+    detector = "## A detector from the simulator"
+    small, large = (cells_of(detector, name) for name in ("the twin and the free air of the other half (two trainings)",
+                                                          "the same"))
+    assert trained[0] == "edges {} m off, {} % missed in 34 flights".format(*numbers(*small[2:4])), small
+    assert "34 flights" in small[1] and "53 flights" in large[1]
+    assert re.match("{} m off, .*{} % missed in the 53 others".format(*numbers(*large[2:4])), trained[1]), large
+    ground = cells_of("## Gaps", "the same, **day 21** (*)")[1].split(", ")
+    assert any(part.startswith(named[0].split(" ground")[0]) for part in ground)
+    crazypad = cells_of("## Gaps", "CrazyPAD, real defects, no gyro")[1]
+    rotors = re.search(r"the exact rotors in (\d+) %", crazypad).group(1)
+    assert named[1].startswith(f"the damaged rotors of {rotors} % of 72 recorded flights")
+    page = (DOCS / "gap-crazypad.md").read_text("utf-8")
+    exact = next(cells for cells in tables(page) if cells[0] == "the same of all 72 flights")
+    assert exact[2].startswith(f"0.{rotors} ")
+
+
+def tables(text):
+    """The cells of each row of a page's tables."""
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+
+
 def rows(text):
     """The rows of a page's tables, links as from host/docs."""
     return {re.sub(r"\((?:host/docs/)?", "(", line) for line in text.splitlines() if line.startswith("|")}

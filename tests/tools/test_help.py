@@ -1,4 +1,5 @@
-"""Every script and every module of tools that is run starts, and says what it does and what each argument means."""
+"""Every script and every module of tools that is run starts, and says what it does and what each option
+means, and each argument of argparse. Arguments of click have no help texts."""
 
 import subprocess
 import sys
@@ -41,7 +42,7 @@ for path in sys.argv[1:]:
 """
 
 
-def test_every_script_and_every_argument_has_a_help_text():
+def test_every_script_every_option_and_every_argument_of_argparse_has_a_help_text():
     run = subprocess.run([sys.executable, "-c", RUN, *SCRIPTS, *MODULES], capture_output=True, text=True,
                          cwd=TOOLS.parent)
     answers = dict(line.split(" ", 1) for line in run.stdout.splitlines())

@@ -7,7 +7,7 @@ rotors that turn one way less those of the others, the yaw acceleration is (2 w 
 k thrust over speed squared, yaw torque over thrust, I a rotor's inertia, Jz the body's. The transfer function from D
 to the measured yaw acceleration is the ratio of their cross-spectra with the commanded yaw, so that noise of the
 speeds does not count; a delay of the gyro is fitted too. Printed for each flight: I / Jz, I for the vehicle's Jz,
-yaw torque over thrust, delay, each with its 90 % interval (bootstrap over blocks of 4 s), and what share of the yaw
+yaw torque over thrust, delay, each with its 90 % interval (bootstrap over blocks of 4 s), and what fraction of the yaw
 acceleration from 1 to 12 Hz that follows the command is explained with I and without.
 host/docs/twin-method.md has the figures.
 """
@@ -60,7 +60,7 @@ def spectra(log: FlightLog, arm_pwm: float) -> tuple[np.ndarray, np.ndarray, flo
 
 
 def fit(f: np.ndarray, blocks: np.ndarray, with_inertia: bool = True) -> tuple[np.ndarray, float]:
-    """((steady gain, I / Jz, delay s), share of the yaw acceleration's cross-spectrum explained) of `spectra`."""
+    """((steady gain, I / Jz, delay s), fraction of the yaw acceleration's cross-spectrum explained) of `spectra`."""
     difference, yaw = blocks.mean(axis=0)
     scale = np.sqrt(np.mean(np.abs(blocks[:, 1]) ** 2, axis=0))  # each frequency counts alike
 
@@ -77,13 +77,13 @@ def fit(f: np.ndarray, blocks: np.ndarray, with_inertia: bool = True) -> tuple[n
 def report(log: FlightLog, craft: Vehicle) -> str:
     """The line of one flight."""
     f, blocks, speed = spectra(log, craft.arm_pwm)
-    (gain, ratio, delay), share = fit(f, blocks)
+    (gain, ratio, delay), explained = fit(f, blocks)
     low, high = resampled(lambda pick: fit(f, blocks[pick])[0], len(blocks), replicates=DRAWS, level=0.9)
     jz = craft.inertia_kg_m2[2]
     lever = jz * speed / (2.0 * craft.mass_kg * craft.gravity_mps2 / 4.0)  # of torque over thrust to the steady gain
     return (f"{Path(log.source).name}: I/Jz {ratio:.2e} ({low[1]:.2e} to {high[1]:.2e}), I {ratio * jz:.1e} kg m² for "
             f"Jz {jz:.3g}, torque over thrust {gain * lever:.4f} m ({low[0] * lever:.4f} to {high[0] * lever:.4f}), "
-            f"delay {1000 * delay:.0f} ms, {len(blocks)} blocks; explained {share:.0%}, without inertia "
+            f"delay {1000 * delay:.0f} ms, {len(blocks)} blocks; explained {explained:.0%}, without inertia "
             f"{fit(f, blocks, False)[1]:.0%}")
 
 

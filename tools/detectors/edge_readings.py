@@ -31,8 +31,8 @@ from airtouch.twin.recorded import flights, near_range
 from airtouch.twin.recorded.course import Course
 
 FIRMWARE = "authors-2024-01"  #: name of the simulated firmware
-#: limits of the bins of the histogram of shares; no source: chosen by eye, a bin for each kind
-SHARES = np.array([-0.05, 0.05, 0.5, 0.6, 0.9, 1.05, 1.6])
+#: limits of the bins of the histogram of fractions; no source: chosen by eye, a bin for each kind
+FRACTIONS = np.array([-0.05, 0.05, 0.5, 0.6, 0.9, 1.05, 1.6])
 #: limits of the bins of readings, cm; between the heights that the authors flew
 READINGS_CM = (0.0, 0.5, 1.5, 2.5, 3.5, 6.5, 8.0, 9.0, 13.0)
 HIGH_M = 0.065  #: m over the platform from which on a flight is high, as in `features.CLASSES`
@@ -48,15 +48,15 @@ PWM_OF_COMMAND = 0.7  #: battery compensation around hover at 3.5 V: 65535 / 3.5
 Passes = Sequence[tuple[Course, np.ndarray]]
 
 
-def mixed_shares(passes: Passes, kind: str) -> np.ndarray:
+def mixed_fractions(passes: Passes, kind: str) -> np.ndarray:
     """(edges,) where the reading in passing lies, 0 at the old distance and 1 at the new; NaN where none stands out."""
     out = np.full(len(passes), np.nan)
     for i, (course, x) in enumerate(passes):
         edge = getattr(course, kind)
         down = x[edge + PASSING.start:edge + PASSING.stop, ch.DOWN]
         old, new = np.median(down[:4]), np.median(down[-8:])
-        share = (down - old) / (new - old)
-        between = share[(np.abs(share) > CLEAR) & (np.abs(share - 1.0) > CLEAR)]
+        fraction = (down - old) / (new - old)
+        between = fraction[(np.abs(fraction) > CLEAR) & (np.abs(fraction - 1.0) > CLEAR)]
         if len(between):
             out[i] = between[np.argmin(np.abs(between - 0.5))]
     return out
@@ -141,10 +141,10 @@ def print_tables(name: str, passes: Passes) -> None:
     """Print the three tables of some flights."""
     print(f"\n## {name}: {len(passes)} flights")
     for kind in ("entry", "exit"):
-        shares = mixed_shares(passes, kind)
-        counts = np.histogram(shares[np.isfinite(shares)], SHARES)[0]
-        cells = ", ".join(f"{a:g} to {b:g}: {n}" for a, b, n in zip(SHARES, SHARES[1:], counts, strict=False))
-        print(f"{kind}: reading in passing, share of the step: none {np.isnan(shares).sum()}; {cells}")
+        fractions = mixed_fractions(passes, kind)
+        counts = np.histogram(fractions[np.isfinite(fractions)], FRACTIONS)[0]
+        cells = ", ".join(f"{a:g} to {b:g}: {n}" for a, b, n in zip(FRACTIONS, FRACTIONS[1:], counts, strict=False))
+        print(f"{kind}: reading in passing, fraction of the step: none {np.isnan(fractions).sum()}; {cells}")
     steps = steps_before_exits(passes)
     for low, high in zip(READINGS_CM, READINGS_CM[1:], strict=False):
         group = steps[(steps[:, 0] >= low) & (steps[:, 0] < high)]

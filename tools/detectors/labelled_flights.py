@@ -6,12 +6,12 @@
 
 Each group of flights is scored by models that saw none of it: --start, --start trained further on K flights of the
 other groups, and a network trained on the same K alone. Prints a Markdown table: means over all draws and seeds, 95 %
-intervals by bootstrap over flights, and missed edges by height. host/docs/twin.md has the table of the authors'
-flights, host/docs/results.md that of another month.
+intervals by bootstrap over flights, and missed edges by height. host/docs/twin-findings.md has the tables of the
+authors' flights and of another month.
 
-By default it trains `best` 160 times: two groups, four K, five draws and two seeds, each once with 300 steps from
---start and once with 1,000 alone. With --twin the former have 2,500 steps, with --beside 400 (`adapt.STEPS`). What
---out holds is not trained again, so a run that was ended goes on.
+By default it trains `best` 80 times: two groups, four K, five draws and two seeds, each with 1,000 steps on the K
+alone. With --start it trains 80 more, with 300 steps from that model; with --twin these have 2,500 steps, with --beside
+400 (`adapt.STEPS`), and --steps is refused. What --out holds is not trained again, so a run that was ended goes on.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.twin import adapt
 from labelled.training import Group, Training, recorded_beside, scores_of, twin_flights
 
-COUNTS = (2, 5, 10, 20)  #: labelled flights by default, the rows of host/docs/twin.md
+COUNTS = (2, 5, 10, 20)  #: labelled flights by default, the rows of host/docs/twin-findings.md
 FIRST_HALF = 3  #: folds below this one are one half, the others the other
 
 
@@ -88,7 +88,7 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
 
 
 def arguments() -> argparse.Namespace:
-    """The command line."""
+    """The command line. Raises AirTouchError for --steps where the steps are fixed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--start", type=Path, action="append", default=[],
@@ -110,10 +110,15 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
     parser.add_argument("--draws", type=int, default=5, help="of labelled flights, for each row (default %(default)s)")
     parser.add_argument("--seeds", type=int, default=2, help="trainings of each draw (default %(default)s)")
-    parser.add_argument("--steps", type=int, default=best.FINE_TUNING["steps"], help="of going on (default 300)")
+    parser.add_argument("--steps", type=int, help="of going on from --start (default 300)")
     parser.add_argument("--alone-steps", type=int, default=1000, help="of training on the K alone; 0: no such rows")
     parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.steps is not None and (options.twin or options.beside):
+        raise AirTouchError("--steps has no effect with --twin or --beside, whose steps are fixed: leave it out")
+    if options.steps is None:
+        options.steps = best.FINE_TUNING["steps"]
+    return options
 
 
 def check(options: argparse.Namespace, groups: Sequence[str]) -> None:

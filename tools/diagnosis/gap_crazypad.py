@@ -39,7 +39,7 @@ GRID = [Priors(nominal_flights=n, maintenance=(*PRIORS.maintenance[:3], yaw), sl
         for n, yaw, slung, power in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
             ({}, {"damaged": SAME}))]
-ROTOR_WEIGHT = 0.3  #: of the share of rotors named exactly beside the balanced accuracy; no source: round number
+ROTOR_WEIGHT = 0.3  #: of the fraction of rotors named exactly beside the balanced accuracy; no source: round number
 
 
 def cases(folder: Path, store: Path | None) -> list[dict]:

@@ -33,7 +33,7 @@ from airtouch.gap.balance.priors import PRIORS, STEADY
 from recordings.crazypad import figures, labels
 from recordings.crazypad.patterns import hover_patterns, likeliest
 
-DRAWS = 4000  #: of the scatter, for the expected share of right rotors; no source: round number, good to 0.01
+DRAWS = 4000  #: of the scatter, for the expected fraction of right rotors; no source: round number, good to 0.01
 FLIGHTS = 400  #: drawn of each family; no source: round number, good to 0.03
 SMALL = 2.0  #: times the variance of one set of propellers in each axis: what two sets differ by
 MOST_MAINTENANCE = 0.1  #: upper bound of the scatter of vehicles after maintenance; no source: far above what was found
@@ -127,7 +127,7 @@ def _rivals(cut: dict[int, float]) -> Iterator[dict[int, float]]:
 class RotorTest:
     """A condition as a test of the rotor sees it.
 
-    small: whether the cut changes less than two sets of propellers differ; expected: share right, if residuals are
+    small: whether the cut changes less than two sets of propellers differ; expected: fraction right, if residuals are
     normal; sides, hits (flights,): whether the change is to the predicted side, the rotors right; mm (flights,): of
     the cut, as measured.
     """

@@ -34,7 +34,7 @@ from airtouch.errors import in_one_line
 from recordings import swarm_cuts
 from recordings.folder import add_folder
 from recordings.wakes.false_alarms import show_false_alarms
-from recordings.wakes.known_seconds import show_seen
+from recordings.wakes.known_seconds import show_detected
 from recordings.wakes.tracks import track
 from recordings.wakes.without_seconds import show_without_seconds
 
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--answers", type=Path, help="what `gap_real.py --keep` wrote")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
-    instead.add_argument("--without-seconds", action="store_true", help="what a test without the seconds sees")
+    instead.add_argument("--without-seconds", action="store_true", help="what a test without the seconds detects")
     options = parser.parse_args()
     if (options.false_alarms or options.without_seconds) and (options.part == "all" or options.answers):
         parser.error("--part all and --answers are of the test that knows the seconds: leave them out")
@@ -62,7 +62,7 @@ def main() -> None:
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)
     else:
-        show_seen(tracks, options.answers)
+        show_detected(tracks, options.answers)
 
 
 if __name__ == "__main__":

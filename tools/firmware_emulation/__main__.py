@@ -18,7 +18,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import data_folder
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
@@ -93,9 +93,7 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    try:
+    with in_one_line("make emulate"):
         if len(sys.argv) < 2 or not sys.argv[1]:
             raise AirTouchError(NO_BASE)
         sys.exit(main(sys.argv[1:]))
-    except AirTouchError as error:
-        sys.exit(f"make emulate: {error}")

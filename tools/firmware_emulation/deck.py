@@ -19,7 +19,7 @@ HEARTBEAT_STEPS = 50  #: steps of 10 ms from one heartbeat of the GAP8 to the ne
 
 @dataclass(frozen=True)
 class Faults:
-    """What goes wrong on the deck: steps are the app's, shares are of the packets, both ways.
+    """What goes wrong on the deck: steps are the app's, fractions are of the packets, both ways.
 
     there: whether its ESP32 answers at all. dead: (from, to) in which the GAP8 says nothing. reset: the step before
     which it loses power. late: steps by which answers come later. lost, damaged: packets that never come, or with a

@@ -55,7 +55,7 @@ CASES = (
 
 
 def cases(only: str = "") -> list[Case]:
-    """Those whose names begin so. AirTouchError where none does."""
+    """Cases whose names begin with `only`. AirTouchError where none does."""
     matches = [case for case in CASES if case.name.startswith(only)]
     if not matches:
         raise AirTouchError(f"no case begins with {only!r}; --only is the beginning of one of: "

@@ -9,12 +9,11 @@ one they are milliseconds, volts, milliamperes, as tools/power/ina219_logger.ino
 switched on beside those before it, so its power is what it adds. See host/docs/power.md.
 """
 
-import sys
 from pathlib import Path
 
 import click
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.power.ina219 import Power, by_stage, canonical, parse, power
 from airtouch.power.stages import BUDGETS, PAPER_MW, counts, estimate, estimate_table, table
 
@@ -61,7 +60,5 @@ def estimate_command(budget: Path, gap8: Path) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with in_one_line("power"):
         main()
-    except AirTouchError as error:
-        sys.exit(f"power: {error}")

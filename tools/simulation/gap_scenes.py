@@ -62,8 +62,8 @@ def _cases(scene: str, flights: int, seed: int) -> Iterator[tuple[str, FlightLog
         yield from ((effect.split(":")[0], log) for log in flown(scene, 1, seed + 2 + i, effect))
 
 
-def share(rows: list[tuple[str, str, float]]) -> str:
-    """How many first answers are right, and the interval of their share."""
+def right(rows: list[tuple[str, str, float]]) -> str:
+    """How many first answers are right, and the interval of their fraction."""
     hits = sum(interchangeable(truth, first) for truth, first, _ in rows)
     return share_text(hits, len(rows))
 
@@ -84,7 +84,7 @@ def main() -> None:
         nominal, with_one = ([r for r in rows if (r[0] == "none") is none] for none in (True, False))
         wrong = ", ".join(f"{truth}: {first}" for truth, first, _ in rows
                           if not interchangeable(truth, first)) if scene in rows_of else ""
-        print(f"| {scene} | {share(nominal)} | {share(with_one)} | {wrong} |")
+        print(f"| {scene} | {right(nominal)} | {right(with_one)} | {wrong} |")
 
 
 if __name__ == "__main__":

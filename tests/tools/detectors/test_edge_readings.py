@@ -10,22 +10,22 @@ from tools.detectors import edge_readings
 from twin_courses import made_course
 
 
-def stepped(share: float | None) -> tuple:
-    """A course and channels whose down range goes from 80 to 8 cm at sample 500, by way of one reading at `share`."""
+def stepped(fraction: float | None) -> tuple:
+    """A course and channels whose down range goes from 80 to 8 cm at sample 500, by one reading at `fraction`."""
     x = np.zeros((1000, 12))
     x[:500, ch.DOWN], x[500:, ch.DOWN] = 80.0, 8.0
-    if share is not None:
-        x[500:503, ch.DOWN] = 80.0 - 72.0 * share
+    if fraction is not None:
+        x[500:503, ch.DOWN] = 80.0 - 72.0 * fraction
     return replace(made_course(0, 0.08), entry=500, exit=900, level=100), x
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 1.4])
-def test_the_reading_in_passing_comes_back(share):
-    assert edge_readings.mixed_shares([stepped(share)], "entry") == pytest.approx([share], abs=1e-9)
+@pytest.mark.parametrize("fraction", [0.1, 0.5, 1.4])
+def test_the_reading_in_passing_comes_back(fraction):
+    assert edge_readings.mixed_fractions([stepped(fraction)], "entry") == pytest.approx([fraction], abs=1e-9)
 
 
 def test_a_clean_step_has_none():
-    assert np.isnan(edge_readings.mixed_shares([stepped(None)], "entry")).all()
+    assert np.isnan(edge_readings.mixed_fractions([stepped(None)], "entry")).all()
 
 
 def test_the_height_loop_holds_still_and_pushes_against_a_lower_reading():

@@ -122,6 +122,14 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
             "--out", tmp_path / "out")
 
 
+@pytest.mark.parametrize("option", ["--twin", "--beside"])
+def test_steps_are_refused_where_they_have_no_effect(tmp_path, monkeypatch, option):
+    with pytest.raises(AirTouchError, match="--steps has no effect with --twin or --beside"):
+        run(monkeypatch, tmp_path, option, tmp_path, "--steps", 300)
+    monkeypatch.setattr(sys, "argv", ["labelled_flights.py", str(tmp_path), option, str(tmp_path)])
+    assert labelled_flights.arguments().steps == best.FINE_TUNING["steps"]
+
+
 def test_missed_edges_are_counted_by_height():
     hit_edge, missed_edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
     low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)

@@ -24,7 +24,7 @@ def emulate(*arguments, **environment):
 
 
 def one_line(process, words):
-    assert process.returncode == 1 and words in process.stderr and process.stderr.count("\n") == 1, process.stderr
+    assert process.returncode == 2 and words in process.stderr and process.stderr.count("\n") == 1, process.stderr
 
 
 @pytest.fixture

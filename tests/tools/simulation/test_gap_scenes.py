@@ -8,7 +8,7 @@ from tools.simulation import gap_scenes
 def test_first_answers_are_counted_and_names_of_one_thing_are_one():
     rows = [("mass", "mass", 0.9), ("mass", "thrust_coefficient", 0.5), ("none", "none", 0.8), ("wind", "mass", 0.6)]
     ends = binomtest(3, 4).proportion_ci(method="wilson")
-    assert gap_scenes.share(rows) == f"3 of 4 [{ends.low:.0%}, {ends.high:.0%}]"
+    assert gap_scenes.right(rows) == f"3 of 4 [{ends.low:.0%}, {ends.high:.0%}]"
 
 
 def test_each_effect_acts_in_one_flight_of_a_seed_of_its_own(monkeypatch):

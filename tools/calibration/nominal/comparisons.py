@@ -24,7 +24,7 @@ MOST = 5  #: baseline flights of one, at most; no source: round number, for time
 
 
 class Task(NamedTuple):
-    """Flights of a group to be compared with others: of other groups of the same drone; None for their own group."""
+    """Flights of a group to be compared with `others`, of other groups of its drone; None: with those of the group."""
 
     group: Group
     others: list[Log] | None = None

@@ -10,7 +10,8 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 
-#: height above standing, m; share of the weight that the ground carries there (flights' medians, the data's SOURCE.md)
+#: height above standing, m; fraction of the weight that the ground carries there (flights' medians,
+#: the data's SOURCE.md)
 HEIGHTS_M, MEASURED = (0.02, 0.04), {"ns-34g": (0.097, 0.057), "ns-67g": (0.102, 0.065)}
 #: height of the rotors when it stands, as the diagnosis takes it from z_m, m; the large one's marker sits 5 mm higher
 STANDING_M = {"ns-34g": 0.0325, "ns-67g": 0.036}

@@ -46,7 +46,7 @@ def counts(cases: list[dict]) -> dict[tuple[str, str], Counter[str]]:
 
 
 def line(row: str, truth: str, answers: Counter[str]) -> str:
-    """A line of the table: hits, their fraction with its 95 % interval, all answers, the most frequent first."""
+    """A line of the table: hits, their fraction with its 95 % interval, every answer, the most frequent first."""
     hits = answers["right" if row == "peers" else truth]
     counted = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]))
     return f"| {row} | {truth} | {share_text(hits, answers.total())} | {counted} |"

@@ -1,5 +1,6 @@
 """Which nominal flights are compared with which, and what is done anew, on stand-ins for the flights."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -52,15 +53,8 @@ def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
         done.append(task.group.name + task.note)
         return [{"file": name + task.note} for name, _ in task.group.logs]
 
-    class Alone:
-        def __enter__(self):
-            return SimpleNamespace(map=map)
-
-        def __exit__(self, *_):
-            return None
-
     monkeypatch.setattr(comparisons, "_rows_of", rows_of)
-    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: Alone())
+    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: nullcontext(SimpleNamespace(map=map)))
     both, kept = [group("a", "one", 4), group("b", "one", 3)], tmp_path / "kept.jsonl"
     first = comparisons.compare_all(both, kept, 1)
     assert len(first) == 14 and done == ["a", "a, other groups", "b", "b, other groups"]
@@ -80,3 +74,12 @@ def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monke
     assert sorted(f.rate for f in flights) == [1.0, 1.0, 2.0, 2.0] and [f.rate for f in alike] == [1.0, 1.0]
     assert counts == {"class": "2 flights, 4 comparisons in 1 groups"} and classes["class"].vehicle == "it"
     assert all(isinstance(f, ApparentStrengths) for f in flights)
+
+
+def test_passing_effects_of_a_class_are_those_of_each_flight_against_the_others_of_its_group(compared, monkeypatch):
+    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: nullcontext(SimpleNamespace(map=map)))
+    monkeypatch.setattr(comparisons, "passing_sizes", lambda data: {"gust": float(len(compared))})
+    flights = comparisons.passing_of_classes([group("a", "one", 3), group("b", "one", 2)], 1)
+    assert list(flights) == ["class"] and [f.passing["gust"] for f in flights["class"]] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert compared == [("a0", ["a1", "a2"]), ("a1", ["a0", "a2"]), ("a2", ["a0", "a1"]),
+                        ("b0", ["b1"]), ("b1", ["b0"])]

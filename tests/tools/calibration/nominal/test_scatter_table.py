@@ -1,8 +1,11 @@
 """The table of nominal scatter as text: what is read and written again is the shipped one."""
 
+from dataclasses import replace
 from importlib import resources
 
-from airtouch.gap.signatures.scatter import table
+import pytest
+
+from airtouch.gap.signatures.scatter import ApparentStrengths, table
 from tools.calibration.nominal import scatter_table
 
 SHIPPED = (resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml").read_text(encoding="utf-8")
@@ -17,3 +20,12 @@ def test_the_shipped_table_is_written_as_it_was_read():
 def test_every_class_has_the_size_of_every_passing_effect():
     sizes = frozenset({"downwash", "gust", "wind", "unsteady_yaw", "downward"})
     assert {frozenset(s.passing) for s in table().values()} == {sizes}
+
+
+def test_with_passing_the_passing_effects_are_new_and_all_else_is_as_shipped():
+    """Sizes of 1 and 3: mean 2, standard deviation the root of 2."""
+    flights = [ApparentStrengths({}, {}, 9.0, {"gust": size}) for size in (1.0, 3.0)]
+    new, counts = scatter_table.with_passing(dict.fromkeys(table(), flights)), scatter_table.counts_of(SHIPPED)
+    assert all(s.passing == {"gust": pytest.approx((2.0, 2.0 ** 0.5))} for s in new.values())
+    shipped_passing = {of: replace(s, passing=table()[of].passing) for of, s in new.items()}
+    assert scatter_table.text_of(shipped_passing, counts).strip() == SHIPPED.strip()

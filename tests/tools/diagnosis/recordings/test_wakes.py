@@ -1,11 +1,12 @@
 """The test of wakes that knows when a vehicle was under another, and what the diagnosis names, on synthetic tracks."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from tools.diagnosis.recordings.wakes import known_seconds, tracks, without_seconds
+from tools.diagnosis.recordings.wakes import false_alarms, known_seconds, tracks, without_seconds
 
 
 def window(cf="cf50", start_s=0.0, place=(0.0, 0.0, 0.5), n=1000, force=0.0):
@@ -49,7 +50,7 @@ def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(cap
         high = window("cf51", 4.0, (0.0, 0.0, 0.9), samples)
         high.row.update(here, file="high.csv", truth="partner")
         low.force[:] = np.where(tracks.under(low, high), -0.2, low.force)
-        known_seconds.show_seen([low, high, nominal], None)
+        known_seconds.show_detected([low, high, nominal], None)
         out = capsys.readouterr().out
         assert words in next(line for line in out.splitlines() if "low.csv" in line)
         assert f"{int(samples == 40)} more, for which the data hold less than 0.5 s" in out
@@ -81,3 +82,60 @@ def test_the_interval_of_an_area_holds_it():
     rng = np.random.default_rng(0)
     low, high = without_seconds.auroc_interval(rng.normal(1.0, 1.0, 100), rng.normal(0.0, 1.0, 100))
     assert low < 0.76 < high and 0.06 < high - low < 0.2
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    """For a module's way from a case to its data: a flight and a study are the names of their logs."""
+    def make(module):
+        for name in ("ready", "read"):
+            monkeypatch.setattr(module, name, lambda x, *_: x)
+        monkeypatch.setattr(module, "Data", lambda study, flights: (study, flights[0].rsplit("/", 1)[-1]))
+        monkeypatch.setattr(module, "vehicles", SimpleNamespace(load=lambda name: SimpleNamespace(name=name)))
+        monkeypatch.setattr(module, "calibrate", SimpleNamespace(calibrated=lambda vehicle, base, **_: ("", 0)))
+    return make
+
+
+def case(name, truth="none", folder="neuralswarm"):
+    return SimpleNamespace(flight=f"F/{folder}/flights/{name}", vehicle="34 g", truth=truth, baseline=("one", "two"))
+
+
+def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_in, monkeypatch, capsys):
+    """Of three nominal flights that are tracks one gains enough, one too little, one flies another manoeuvre."""
+    stand_in(false_alarms)
+    low, high = window(), window("cf51", 4.0, (0.1, 0.0, 0.9), 300)
+    calm = [window(f"cf{60 + i}") for i in range(3)]
+    for t, name, truth in zip([low, high, *calm], ("low", "high", "a", "b", "c"), ("downwash", "", *["none"] * 3),
+                              strict=True):
+        t.row.update(file=name, vehicle="34 g", manoeuvre="swap" if name == "c" else "hover", truth=truth)
+    given = []
+    monkeypatch.setattr(false_alarms.overhead, "with_overhead", lambda study, flight, seconds: given.append(seconds))
+    monkeypatch.setattr(false_alarms.cases, "nominal", lambda *_: map(case, ("a", "b", "c", "no track")))
+    wake = SimpleNamespace(key="", strength=None)
+    monkeypatch.setattr(false_alarms.gates, "passing_effects", lambda data: {
+        false_alarms.gates.KNOWN_OVERHEAD: SimpleNamespace(**vars(wake), gain=data[1])})
+    monkeypatch.setattr(false_alarms, "passing_evidence",
+                        lambda data, key, gain, strength: false_alarms.PASSING_GAIN - (gain != "a"))
+    false_alarms.show_false_alarms("F", [low, high, *calm])
+    *lines, last = capsys.readouterr().out.splitlines()
+    assert lines == ["a: 1 of 1", "b: 0 of 1", "c: 0 of 0"] and "1 of 2" in last and last.endswith("in 1 flights")
+    assert given == [((4.0, 7.0),)] * 2
+
+
+def test_measures_without_seconds_are_held_against_nominal_flights_of_the_vehicle(stand_in, monkeypatch, capsys):
+    """One measure tells both wakes from both nominal flights, one tells nothing, one ranks them the other way."""
+    stand_in(without_seconds)
+    sizes = {"w1": (3.0, 1.0, 0.0), "w2": (4.0, 3.0, 0.0), "n1": (1.0, 2.0, 1.0), "n2": (2.0, 2.0, 1.0)}
+    measures = (without_seconds.OVERHEAD, without_seconds.UNSTEADY_YAW, without_seconds.DOWNWARD)
+    monkeypatch.setattr(without_seconds, "passing_sizes",
+                        lambda data: dict(zip(measures, sizes[data[1]], strict=True)))
+    monkeypatch.setattr(without_seconds, "DRAWS", 20)
+    monkeypatch.setattr(without_seconds.cases, "swarm", lambda *_: [case("w1", "downwash"), case("w2", "downwash"),
+                                                                    case("ground", "ground_effect")])
+    monkeypatch.setattr(without_seconds.cases, "nominal", lambda *_: [case("n1"), case("n2"),
+                                                                      case("x", folder="airtouch")])
+    without_seconds.show_without_seconds("F")
+    rows = capsys.readouterr().out.splitlines()[2:]
+    assert [row.split(" | ")[1] for row in rows] == list(measures)
+    assert [row.split(" | ")[2][:4] for row in rows] == ["1.00", "0.50", "0.00"]
+    assert [row.split(" | ")[3] for row in rows] == ["2 of 2, of 2 |", "1 of 2, of 2 |", "0 of 2, of 2 |"]

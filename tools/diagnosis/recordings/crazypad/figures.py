@@ -32,12 +32,12 @@ def answer(case: dict) -> tuple[str, list[int], float]:
 
 
 def balanced_accuracy(table: list[dict]) -> float:
-    """Mean over families of the share named right; families without flights are left out."""
-    shares = []
+    """Mean over families of the fraction named right; families without flights are left out."""
+    fractions = []
     for f in FAMILIES:
         hits = [answer(c)[0] == f for c in table if family(c["condition"]) == f]
-        shares += [np.mean(hits)] if hits else []
-    return float(np.mean(shares)) if shares else float("nan")
+        fractions += [np.mean(hits)] if hits else []
+    return float(np.mean(fractions)) if fractions else float("nan")
 
 
 def interval(table: list[dict], figure: Callable[[list[dict]], float]) -> tuple[float, float]:

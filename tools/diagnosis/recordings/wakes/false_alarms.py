@@ -1,4 +1,4 @@
-"""How often the diagnosis names a wake in nominal flights, told seconds in which a vehicle might have been overhead."""
+"""How often the diagnosis names a wake in nominal flights for which it is given seconds under another vehicle."""
 
 from pathlib import Path
 

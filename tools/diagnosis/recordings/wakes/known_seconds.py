@@ -56,12 +56,12 @@ def named_by_path(tracks: list[Track], answer_of: dict[str, str]) -> dict[bool, 
     return named
 
 
-def show_seen(tracks: list[Track], answers: Path | None) -> None:
-    """Print a line for each flight under another vehicle, and for each vehicle how many the test sees."""
+def show_detected(tracks: list[Track], answers: Path | None) -> None:
+    """Print a line for each flight under another vehicle, and for each vehicle how many the test detects."""
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
     answer_of = answers_of(answers)
     table: dict[str, list[bool]] = {}
-    print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
+    print(f"| flight | under, s | {' | '.join(MEASURES)} | detected | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
         acts, seconds = seconds_under(t, tracks)
         if seconds < LEAST_S:
@@ -78,7 +78,7 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
         print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {cells} | {'yes' if hit else 'no'} | "
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
-        print(f"{vehicle}: seen {share_text(sum(hits), len(hits))}")
+        print(f"{vehicle}: detected {share_text(sum(hits), len(hits))}")
     named = named_by_path(tracks, answer_of)
     print(f"{len(named[False])} more, for which the data hold less than {LEAST_S:g} s of a path overhead")
     if answers:
