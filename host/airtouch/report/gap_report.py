@@ -1,8 +1,10 @@
 """The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement.
 
 Nothing is fitted, replayed or averaged here. The answer, its figures and its headline stand in the diagnosis; of the
-map's cells `gap.where.summary` says which stay over the floor and sums them up by phase; `gap.answer.sentences`
-and `gap.answer.words` have the words. This module chooses how many of each are shown, and lays them out.
+map's cells `gap.where.summary` says which stay over the floor and sums them up by phase. The words are those of
+`gap.answer` (`sentences`, `words`, `advice`), of the cells (`gap.where.cell_words`), of the channels
+(`gap.signals.channels`) and of the measurement itself (`Measurement.sentences`). This module chooses how many of each
+are shown, and lays them out.
 """
 
 from collections.abc import Callable, Sequence
