@@ -22,9 +22,10 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS
 os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
 
 #: files that take longest, in this order: begun first, so that no worker is left with one of them at the end
-LONGEST = ("test_blind.py", "test_gap_real.py", "test_random_effects.py", "test_gates.py", "test_labelled_flights.py",
-           "test_user_effect.py", "test_adapt.py", "test_gap_crazypad_ideal.py", "test_overhead.py",
-           "test_own_effect.py")
+LONGEST = ("test_adapt.py", "test_gap_real.py", "test_blind.py", "test_ablate.py", "test_user_effect.py",
+           "test_rv32imc_networks.py", "test_gates.py", "test_random_effects.py", "test_notebooks.py", "test_fit.py",
+           "test_train_and_export.py", "test_calibrate.py", "test_overhead.py", "test_labelled_flights.py",
+           "test_demo.py", "test_fuzz.py", "test_team.py")
 
 pytest_make_collect_report = skips.pytest_make_collect_report
 pytest_runtest_makereport = skips.pytest_runtest_makereport

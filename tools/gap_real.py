@@ -59,7 +59,7 @@ def diagnose_case(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
     out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
-           "baseline": len(case.baseline), "effects": []}
+           "baseline": len(case.baseline), "partner": len(case.partner), "effects": []}
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
                              before=_LAST.get((case.vehicle, case.baseline)),
@@ -84,15 +84,24 @@ def quick(cases: list[Case]) -> list[Case]:
 
 def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     """Cases with their diagnoses, by `jobs` processes; those in the file `store` are read, others appended to it."""
-    answer_of = {(c["row"], c["flight"]): c for c in json_lines.read(store)}
-    todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in answer_of),
-                  key=lambda c: (c.row, c.vehicle, c.baseline))
+    answer_of = {_key(c): c for c in json_lines.read(store)}
+    todo = sorted((c for c in cases if _key_of(c) not in answer_of), key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
         for i, case in enumerate(pool.map(diagnose_case, todo)):
-            answer_of[case["row"], case["flight"]] = case
+            answer_of[_key(case)] = case
             json_lines.append(store, [case])
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
-    return [answer_of[c.row, Path(c.flight).name] for c in cases]
+    return [answer_of[_key_of(c)] for c in cases]
+
+
+def _key(answer: dict) -> tuple:
+    """What tells a kept answer from others: row, flight, numbers of baseline flights and of partners' logs."""
+    return answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0)
+
+
+def _key_of(case: Case) -> tuple:
+    """`_key` of the answer to a case."""
+    return case.row, Path(case.flight).name, len(case.baseline), len(case.partner)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,6 +1,7 @@
 """The diagnosis on a few recorded flights of each kind, and that the check of them can fail."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,12 +19,31 @@ def test_a_few_recorded_flights_of_each_kind(flights, capsys):
 def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, capsys):
     def blind(case):
         return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": case.flight.split("/")[-1],
-                "effects": [], "verdict": "none"}
+                "baseline": len(case.baseline), "effects": [], "verdict": "none"}
 
     monkeypatch.setattr(gap_real, "diagnose_case", blind)
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
     assert gap_real.main([str(flights), "--quick"]) == 1
     assert "wrong, more than" in capsys.readouterr().err
+
+
+def test_a_kept_answer_is_that_of_as_many_baseline_flights_and_partners(tmp_path, monkeypatch):
+    asked = []
+
+    def counted(case):
+        asked.append(case)
+        return {"row": case.row, "truth": case.truth, "flight": case.flight, "baseline": len(case.baseline),
+                "partner": len(case.partner), "effects": [], "verdict": "none"}
+
+    monkeypatch.setattr(gap_real, "diagnose_case", counted)
+    monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+    whole = cases.Case("swarm", "none", "v", "a.csv", ("b.csv", "c.csv", "d.csv"))
+    asks = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),))]
+    for case in asks:
+        for _ in range(2):
+            (answer,) = gap_real.diagnoses([case], tmp_path / "kept.jsonl", 1)
+            assert (answer["baseline"], answer["partner"]) == (len(case.baseline), len(case.partner))
+    assert asked == asks, "each once"
 
 
 def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(flights, monkeypatch):
@@ -32,7 +52,7 @@ def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(fligh
     def blind(case):
         seen.append(case)
         return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
-                "effects": [], "verdict": "none"}
+                "baseline": len(case.baseline), "effects": [], "verdict": "none"}
 
     monkeypatch.setattr(gap_real, "diagnose_case", blind)
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)

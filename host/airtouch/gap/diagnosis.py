@@ -24,7 +24,7 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
-from airtouch.gap.passing.overhead import seconds_overhead, with_overhead
+from airtouch.gap.passing import overhead
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures import candidates
@@ -37,10 +37,9 @@ from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
-NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
-               "nobody knows how much of the commanded torque is aliases of a faster loop. Nor does anybody know how "
-               "the vehicle shakes by itself: no wake is judged, and nominal recorded flights come out as motor_noise")
-PARTNER_UNUSED = "the log of the other vehicle was not used: without a gyro no wake is judged"
+NO_BASELINE = ("no baseline flights: the vehicle is taken as declared. Torque is judged in its mean alone, as logged "
+               "commands of a fast loop are aliased. No wake is judged, as a vehicle that shakes by itself looks like "
+               "one; a recorded flight is then often called motor_noise")
 
 
 @dataclass(frozen=True)
@@ -75,27 +74,28 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
     diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
     other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
-    these seconds. Raises AirTouchError when no flight can be used, or for a partner of several flights.
+    these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, or for a partner of several
+    flights.
     """
     say, without = progress or (lambda _: None), tuple(without)
     if partner and len(flights) != 1:
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
-    seconds = seconds_overhead(flights[0], partner) if partner else ()
+    seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
     nominal = list(ready_flights(baseline, vehicle, notes))
     usable = list(ready_flights(flights, vehicle, notes))
     if not usable:
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
-        notes += [PARTNER_UNUSED] if partner else []
+        notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
     known = None if before is None else before.calibrated
     calibrated = known or _calibrated(vehicle, nominal, without)
     study, calibration = calibrated
     if partner:
-        study, note = _with_partner(study, usable[0], seconds)
-        notes.append(note)
+        study = overhead.with_overhead(study, usable[0], seconds)
+        notes.append(overhead.note(study, seconds))
     nominal = [] if calibration is None else list(calibration.flights)  # without those that are left out
     comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, comparison.judged)
@@ -119,13 +119,6 @@ def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterab
     data = _data(study, flights) if data is None else data
     selection, gap = selection_and_gap(data, tuple(without), rank_all=rank_all)
     return replace(_answer(data, selection, gap), flights=tuple(f.name for f in flights))
-
-
-def _with_partner(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> tuple[Study, str]:
-    """The study with the seconds in which another vehicle is overhead, and a note on how many these are."""
-    long = sum(end - begin for begin, end in seconds)
-    note = f"the other vehicle was overhead for {long:.1f} s" if seconds else "the other vehicle was never overhead"
-    return with_overhead(study, flight, seconds), note
 
 
 def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:

@@ -25,6 +25,14 @@ def _without_fits(monkeypatch):
     without_fits(monkeypatch)
 
 
+@pytest.fixture(scope="module")
+def of_nominal(nominal):
+    """The study of nominal flights, and the calibration."""
+    with pytest.MonkeyPatch.context() as patch:
+        without_fits(patch)
+        return calibrated(VEHICLE, nominal)
+
+
 def with_a_push(flight, metres_per_second2):
     """The flight with a lift in its last second in the air, as where it lands on an edge."""
     air = ((flight.phase > 0) & flight.usable).nonzero()[0][-LAST:]
@@ -37,21 +45,21 @@ def recorded(flight):
     return replace(flight, log=replace(flight.log, meta={**flight.log.meta, "format": "usd"}))
 
 
-def test_nominal_simulated_flights_all_count(nominal, without_fits):
-    study, calibration = calibrated(VEHICLE, nominal)
+def test_nominal_simulated_flights_all_count(of_nominal):
+    study, calibration = of_nominal
     assert study.simulated and not calibration.notes
 
 
-def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, without_fits):
+def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, of_nominal, without_fits):
     """Its mean lift is off by 0.08 m/s^2, as no nominal simulated flight's; the others' floor stays."""
     flights = [*nominal, with_a_push(nominal[0], 2.0)]
     study, calibration = calibrated(VEHICLE, flights)
     (note,) = calibration.notes
     assert note.startswith("landing on an edge: declared nominal") and note.endswith("left out")
     assert [f.name for f in calibration.flights] == [f.name for f in nominal]
-    alone, of_nominal = calibrated(VEHICLE, nominal)
+    alone, of_nominal_alone = of_nominal
     assert study.offset == pytest.approx(alone.offset)
-    assert calibration.declared.offset == pytest.approx(of_nominal.declared.offset)
+    assert calibration.declared.offset == pytest.approx(of_nominal_alone.declared.offset)
 
 
 def test_no_more_than_a_third_is_left_out_in_all_passes_together(nominal, without_fits, monkeypatch):

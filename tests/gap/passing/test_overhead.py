@@ -14,6 +14,7 @@ from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.policy import PASSING_GAIN
+from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.passing import gates, overhead
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -121,7 +122,13 @@ def test_where_no_wake_is_judged_a_note_says_that_the_partner_was_not_used(monke
     monkeypatch.setattr(module.balance_result, "diagnosis", lambda *arguments: arguments[3])
     log = nominal_flight.log.with_columns({k: np.zeros(len(nominal_flight)) for k in overhead.PLACE})
     assert module.diagnose([log], VEHICLE) == []
-    assert module.diagnose([log], VEHICLE, partner=[log]) == [module.PARTNER_UNUSED]
+    assert module.diagnose([log], VEHICLE, partner=[log]) == [overhead.UNUSED.format("a gyro")]
+
+
+def test_the_note_has_the_seconds_overhead_or_says_what_lacks(study):
+    assert overhead.note(study, [(1.0, 2.0), (5.0, 5.5)]) == "the other vehicle was overhead for 1.5 s"
+    assert overhead.note(study, ()) == "the other vehicle was never overhead"
+    assert "without baseline flights no wake" in overhead.note(declared_study(VEHICLE, ()), [(1.0, 2.0)])
 
 
 def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights, monkeypatch):

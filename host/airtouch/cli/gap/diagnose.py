@@ -23,7 +23,8 @@ from airtouch.errors import AirTouchError
 @click.option("--effect-file", "--effects-file", "effect_files", multiple=True, metavar="FILE",
               help="Python file with effects of your own; may be repeated.")
 @click.option("--partner", multiple=True, metavar="LOG",
-              help="Log of another vehicle in the air with REAL, of one clock and frame; may be repeated.")
+              help="Log of another vehicle in the air with REAL, of one clock and frame; may be repeated. Needs "
+                   "--baseline.")
 @click.option("--each", is_flag=True, help="Diagnose each flight alone.")
 def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
                      report: Path | None, json_path: Path | None, dask: str | None, force: bool,

@@ -22,6 +22,7 @@ from airtouch.logs.segments import runs
 from airtouch.simulation.effects.effect import Gate
 
 PLACE = ("x_m", "y_m", "z_m")
+UNUSED = "the log of the other vehicle was not used: without {} no wake is judged"
 #: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
 #: The rule by which known seconds are compared with the rest of a flight was chosen among seven, on recorded flights
@@ -67,6 +68,15 @@ def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tup
         else:
             out.append((first, last))
     return tuple((a, b) for a, b in out if b - a >= LEAST_S)
+
+
+def note(study: Study, seconds: Sequence[tuple[float, float]]) -> str:
+    """What a diagnosis says of another vehicle that was overhead in these seconds."""
+    if not study.nominal_count:
+        return UNUSED.format("baseline flights")
+    if not seconds:
+        return "the other vehicle was never overhead"
+    return f"the other vehicle was overhead for {sum(end - begin for begin, end in seconds):.1f} s"
 
 
 def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> Study:
