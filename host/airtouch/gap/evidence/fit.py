@@ -104,8 +104,8 @@ def judge(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bo
 
     uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
     """
-    left = left_over(data, part, terms, uncertain_floor)
-    return left.log_likelihood - left.cost
+    remainder = left_over(data, part, terms, uncertain_floor)
+    return remainder.log_likelihood - remainder.cost
 
 
 @dataclass(frozen=True, eq=False)

@@ -178,7 +178,7 @@ def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Libra
     another mission, of another simulator or of a real vehicle do not.
     """
     known = [f for f in nominal if f is not None]
-    found = shipped()
-    if not known or len(known) < len(nominal) or replace(load(found.vehicle), name=vehicle.name) != vehicle:
+    library = shipped()
+    if not known or len(known) < len(nominal) or replace(load(library.vehicle), name=vehicle.name) != vehicle:
         return None
-    return found if found.lies_as_nominal(found.coordinates(np.array(known))) else None
+    return library if library.lies_as_nominal(library.coordinates(np.array(known))) else None
