@@ -1,8 +1,10 @@
 """The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement.
 
 Nothing is fitted, replayed or averaged here. The answer, its figures and its headline stand in the diagnosis; of the
-map's cells `gap.where.summary` says which stay over the floor and sums them up by phase; `gap.answer.sentences`
-and `gap.answer.words` have the words. This module chooses how many of each are shown, and lays them out.
+map's cells `gap.where.summary` says which stay over the floor and sums them up by phase. The words are those of
+`gap.answer` (`sentences`, `words`, `advice`), of the cells (`gap.where.cell_words`), of the channels
+(`gap.signals.channels`) and of the measurement itself (`Measurement.sentences`). This module chooses how many of each
+are shown, and lays them out.
 """
 
 from collections.abc import Callable, Sequence
@@ -56,7 +58,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
     Raises AirTouchError for a file that exists, without `force`.
     """
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
-    left = summary.remaining(cells)
+    remaining = summary.remaining(cells)
     page = _page(
         title="Gap between flights and simulator: diagnosis", answers=sentences(diagnosis),
         headline=diagnosis.headline, cells=cells, floor_from=diagnosis.map.floor_from if diagnosis.map else "",
@@ -66,7 +68,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
-        remaining=remaining_in_words(left[:gap_tables.MOST_REMAINING]), remaining_count=len(left),
+        remaining=remaining_in_words(remaining[:gap_tables.MOST_REMAINING]), remaining_count=len(remaining),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),

@@ -63,7 +63,7 @@ def test_at_the_floor_that_is_the_reason_of_a_named_effect():
              "needed"),
     ("gust", "gains 20 nats, mass 200"),
     ("none", "mass gains 200 nats over it"),
-    ("unknown", "a model without names adds 4 nats, up to 20 may be left")])
+    ("unknown", "a model without names gains 4 nats beside mass, up to 20 may be left")])
 def test_reason_by_the_replay(name, words):
     assert why_not(selection(), name, "effect") == words
 
@@ -72,7 +72,7 @@ def test_reason_by_the_replay(name, words):
     ("inertia", f"the relations of the signals gain 2.0 nats by it, {LEAST_EVIDENCE:.0f} are needed"),
     ("wind", "the relations of the signals gain 40 nats by it, 200 by mass"),
     ("none", "mass gains 200 nats over it"),
-    ("unknown", "a model without names adds 4 nats, up to 30 may be left")])
+    ("unknown", "a model without names gains 4 nats beside mass, up to 30 may be left")])
 def test_by_the_relations_of_the_signals(name, words):
     assert why_not(selection(inference=True), name, "effect") == words
 
@@ -85,8 +85,8 @@ def test_reason_of_a_distance():
     assert why_not(near, "unknown", "effect") == ("the flight lies 4 nats farther from mass than nominal flights from "
                                                   "none, up to 30 may be chance")
     nothing = selection((), inference=True, of_distance=True)
-    assert why_not(nothing, "unknown", "none") == ("the flight lies 4 nats farther off than nominal flights, up to 30 "
-                                                   "may be chance")
+    assert why_not(nothing, "unknown", "none") == ("the flight lies 4 nats farther from the model than nominal "
+                                                   "flights do, up to 30 may be chance")
 
 
 def test_reason_of_a_second_named_effect():
@@ -102,7 +102,7 @@ def test_reasons_where_nothing_is_named():
     nothing = selection((), beside=40.0)
     assert not is_explained(nothing)
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
-    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, a model without names 150"
+    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, a model without names gains 150"
     back = replace(nothing, taken_back=TakenBack("mass", -0.2))
     assert shortfall(back, judged("mass", 990.0)) == "closes 0% of the gap, too little to be its cause"
     related = selection((), inference=True, beside=40.0)

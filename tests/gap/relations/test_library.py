@@ -43,6 +43,13 @@ def test_a_file_holds_what_was_saved(tmp_path):
     assert reloaded.distance_scatter == pytest.approx(shipped.distance_scatter)
 
 
+@pytest.mark.parametrize("name", library.SHARES)
+def test_a_file_with_a_number_too_few_is_refused(name):
+    shipped = library.shipped()
+    with pytest.raises(ValueError, match=name):
+        library.read(library.packed(replace(shipped, **{name: getattr(shipped, name)[1:]})))
+
+
 def test_the_file_is_of_todays_features_and_effects():
     """Else `python -m airtouch.gap.relations.build` makes a new one."""
     shipped = library.shipped()

@@ -17,7 +17,7 @@ from airtouch.gap.signatures.term import Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
 RESTARTS = 12  #: of a fit of several parameters, at most; chosen
-#: strength of an effect by which its random part is divided at least; chosen, far below any that is named
+#: lower bound of the divisor of a random part, the effect's strength; chosen, far below any that is named
 LEAST_DIVISOR = 1e-6
 
 

@@ -10,8 +10,8 @@ from airtouch.gap.naming.unknown import against_over_limit
 
 #: nats that others lie behind the effect that is named first, at least; chosen, so that it leads the list
 LEAST_LEAD = 1.0
-#: score, at least, of a candidate with the evidence that it needs, however far it is behind the first effect named;
-#: chosen: odds of 1/e beside `none`, as one of n candidates without that evidence has 1/n at most
+#: lowest score of a candidate with enough evidence: odds 1/e against `none`; chosen: more than one of three or more
+#: candidates without enough evidence can have, 1/n of n
 LEAST_SCORE = -TEMPERATURE
 #: of the probability of the answer, that of `unknown` at most where `unknown` is not the answer; chosen, as LEAST_LEAD
 MOST_UNKNOWN = 0.9

@@ -55,7 +55,7 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     if selection.named_hypothesis:
         return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named_steps)} "
                 f"{selection.named_hypothesis.gain:.0f}")
-    return f"gains {candidate.gain:.0f} nats, a model without names {selection.nameless.over_none:.0f}"
+    return f"gains {candidate.gain:.0f} nats, a model without names gains {selection.nameless.over_none:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -72,12 +72,16 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 
 def _against_in_words(selection: Selection) -> str:
-    """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
+    """The evidence against the effects named, with its limit: one of them, as `it`, is the best and not enough."""
     lost, worst = selection.over_prediction
     if worst is not None and over_prediction_ratio(selection) == against_over_limit(selection):
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}; "
                 f"{selection.policy.unknown.least:.0f} may be chance")
-    return _remainder_in_words(selection, "a model without names gains {} nats beside it", "it")
+    nats, limit = _nats_against(selection)
+    if against(selection).of_distance:
+        return (f"the flight lies {nats} nats farther from it than nominal flights from none, up to {limit} may be "
+                "chance")
+    return f"a model without names gains {nats} nats beside it, up to {limit} may be left"
 
 
 def cell_in_words(cell: int) -> str:
@@ -86,18 +90,10 @@ def cell_in_words(cell: int) -> str:
     return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
-def _remainder_in_words(selection: Selection, nameless_gains: str, named: str) -> str:
-    """What the effects named leave, in words, with its limit.
-
-    nameless_gains: what is said of the nameless model, with {} for its nats; named: the effects, "" for none, for what
-    is said of the distance from them where the relations of signals measured one.
-    """
+def _nats_against(selection: Selection) -> tuple[str, str]:
+    """The nats that speak against the effects named, 0 at least, and their limit, as they are shown."""
     remainder = against(selection)
-    nats = f"{max(remainder.nats, 0.0):.0f}"
-    if remainder.of_distance:
-        farther = f"from {named} than nominal flights from none" if named else "off than nominal flights"
-        return f"the flight lies {nats} nats farther {farther}, up to {remainder.limit:.0f} may be chance"
-    return f"{nameless_gains.format(nats)}, up to {remainder.limit:.0f} may be left"
+    return f"{max(remainder.nats, 0.0):.0f}", f"{remainder.limit:.0f}"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:
@@ -114,14 +110,28 @@ def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not is_explained(selection):
         return AT_ITS_FLOOR
-    names = " and ".join(s.name for s in selection.named_steps)
-    return _remainder_in_words(selection, "a model without names adds {} nats", names)
+    if not selection.named_steps:
+        return _beside_no_effect(selection)
+    names, (nats, limit) = " and ".join(s.name for s in selection.named_steps), _nats_against(selection)
+    if against(selection).of_distance:
+        return (f"the flight lies {nats} nats farther from {names} than nominal flights from none, up to {limit} may "
+                "be chance")
+    return f"a model without names gains {nats} nats beside {names}, up to {limit} may be left"
+
+
+def _beside_no_effect(selection: Selection) -> str:
+    """What speaks against there being no gap, with its limit, where no effect is named."""
+    nats, limit = _nats_against(selection)
+    if against(selection).of_distance:
+        return (f"the flight lies {nats} nats farther from the model than nominal flights do, up to {limit} may be "
+                "chance")
+    return f"a model without names gains {nats} nats, up to {limit} may be left"
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.named_hypothesis is None:
-        return _remainder_in_words(selection, "a model without names gains {} nats", "")
+        return _beside_no_effect(selection)
     first = selection.named_steps[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.named_hypothesis.gain
     return f"{first} gains {gain:.0f} nats over it"

@@ -156,18 +156,18 @@ def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
     The energy is what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
-        left = left_over(data, parts[half], terms[1 - half])
-        cell = left.problem.flat.cells
-        use = left.problem.elements.valid & cells[half][cell]
-        yield cell[use], _energy(left)[use]
+        remainder = left_over(data, parts[half], terms[1 - half])
+        cell = remainder.problem.flat.cells
+        use = remainder.problem.elements.valid & cells[half][cell]
+        yield cell[use], _energy(remainder)[use]
 
 
 def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
-    left = left_over(data, part, ())
-    cell, valid = left.problem.flat.cells, left.problem.elements.valid
+    remainder = left_over(data, part, ())
+    cell, valid = remainder.problem.flat.cells, remainder.problem.elements.valid
     count = np.bincount(cell, valid, CELLS)
-    mean = np.bincount(cell, _energy(left) * valid, CELLS) / np.maximum(count, 1)
+    mean = np.bincount(cell, _energy(remainder) * valid, CELLS) / np.maximum(count, 1)
     error = np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1)))
     out = mean > 1.0 + STANDARD_ERRORS * error + MARGIN
     if terms:
@@ -175,6 +175,6 @@ def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarr
     return out & (count >= FEWEST_VALUES)
 
 
-def _energy(left: LeftOver) -> np.ndarray:
+def _energy(remainder: LeftOver) -> np.ndarray:
     """Energy (n,) of each value over the floor, LARGEST at most."""
-    return np.minimum(squared(left.gap) / left.power, LARGEST)
+    return np.minimum(squared(remainder.gap) / remainder.power, LARGEST)

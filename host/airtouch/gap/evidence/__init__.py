@@ -1,9 +1,20 @@
 """How likely flights are under effects.
 
-`data` holds the spectra of some flights and keeps what is worked out of them. A part of their blocks is `flattened` to
-one array of values (`layout`, by `cells` of channel and band), of which the `likelihood` is taken. A `problem` is these
-values under hypotheses: what mean effects leave of the gap, and the power that is expected, which random effects
-(`random_effects`, `vibration_lines`) and effects of the loop (`torque_power`) change. `fit` finds the parameters: of
-mean effects by `gauss_newton` (`slopes`, `least_squares`), of random ones by their strength. `clock` judges what shows
-in the log's times alone. `against` is what speaks against effects, whoever measures it.
+**What is modelled.** What the model leaves of the spectra of some blocks, n complex values, log densities in nats:
+
+    residual      r = g(x) - sum b c                    g: the gap under mean effects (`problem`)
+    power         P = floor + random + loop             `flattened`; `random_effects`, `vibration_lines`; `torque_power`
+    likelihood    -w sum[log P + (nu + 1) log(1 + |r|^2 / (a P))]     `likelihood`; w: OVERLAP_WEIGHT, as blocks overlap
+    tails         E[(nu + 1) e / (a + e)] = 1           a: `tail_scale`, for e = |r|^2 / P exponential with mean 1
+    priors        x ~ N(0, s^2), b ~ N(0, spread^2)     `fit`, `gauss_newton`; x in natural steps, s: PRIOR_UNITS
+
+x: parameters of mean effects (s: COMMAND_PRIOR at most where only the commands show them); b, c: an offset of a channel
+of a flight and its column; nu: degrees of freedom of the floor, which is estimated from few flights. The commands'
+floor is corrected anew under each hypothesis, which costs nats beside the sum (`signals.command_view`).
+
+**How.** `data` holds the spectra of some flights and keeps what is worked out of them. A part of their blocks is
+`flattened` to one array of values (`layout`, by `cells` of channel and band). A `problem` is these values under
+hypotheses. `fit` finds the parameters: of mean effects by `gauss_newton` (`slopes`, `least_squares`), of random ones by
+their strength. `clock` judges what shows in the log's times alone. `against` is the evidence against the named effects,
+whoever measures it.
 """

@@ -1,10 +1,10 @@
-"""What speaks against effects that explain flights, in nats, with the nats that may where the effects are right."""
+"""Evidence against the named effects, with its limit."""
 
 from typing import NamedTuple
 
 
 class Against(NamedTuple):
-    """Nats that speak against effects, and those that may where the effects are right.
+    """Nats that speak against the named effects, and the limit: those that may where these are right.
 
     of_distance: whether they are the excess of a flight's distance (`relations.inference`), not the gain of a nameless
     disturbance or model.

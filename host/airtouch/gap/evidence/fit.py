@@ -6,7 +6,7 @@ to flight (offsets) has a prior.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -16,7 +16,7 @@ from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.gauss_newton import ITERATIONS, Posterior, gauss_newton, start_of
 from airtouch.gap.evidence.least_squares import without_offsets
-from airtouch.gap.evidence.problem import BlockSet, Problem, problem_of
+from airtouch.gap.evidence.problem import BlockSet, Modelled, Problem, problem_of
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import mean_of, random_of
@@ -104,30 +104,46 @@ def judge(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bo
 
     uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
     """
-    left = left_over(data, part, terms, uncertain_floor)
-    return left.problem.likelihood(left.gap, left.added) - left.cost
+    remainder = left_over(data, part, terms, uncertain_floor)
+    return remainder.log_likelihood - remainder.cost
 
 
-class LeftOver(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class LeftOver:
     """What effects leave of the gap in some blocks.
 
-    problem: of the blocks; gap (n,): under the effects, offsets between flights subtracted; added (n,): power that the
-    effects add to that expected; cost: nats that the offsets and the commands' floor cost.
+    problem: of the blocks; modelled: what the effects make of it; gap (n,): under them, offsets between flights
+    subtracted; offset_cost: nats that the offsets cost.
     """
 
     problem: Problem
+    modelled: Modelled
     gap: np.ndarray
-    added: np.ndarray
-    cost: float
+    offset_cost: float
+
+    @property
+    def extra_power(self) -> np.ndarray:
+        """Power (n,) that the effects add to that expected."""
+        return self.modelled.extra_power
+
+    @property
+    def cost(self) -> float:
+        """Nats that the offsets and the commands' floor cost."""
+        return self.offset_cost + self.modelled.cost
+
+    @cached_property
+    def log_likelihood(self) -> float:
+        """Log likelihood of the gap, without the cost."""
+        return self.problem.likelihood(self.gap, self.extra_power)
 
     @property
     def power(self) -> np.ndarray:
         """Expected power (n,) of the gap."""
-        return self.problem.elements.power + self.added
+        return self.problem.elements.power + self.extra_power
 
     def log_likelihoods(self) -> np.ndarray:
         """Log likelihood (n,) of each value, without the cost."""
-        return self.problem.likelihood.per_value(self.gap, self.added)
+        return self.problem.likelihood.per_value(self.gap, self.extra_power)
 
 
 def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> LeftOver:
@@ -137,8 +153,7 @@ def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor
     """
     problem = problem_of(data, part)
     modelled = problem.modelled(terms, uncertain_floor)
-    gap, offset_cost = without_offsets(problem, modelled.gap, modelled.added)
-    return LeftOver(problem, gap, modelled.added, offset_cost + modelled.cost)
+    return LeftOver(problem, modelled, *without_offsets(problem, modelled.gap, modelled.extra_power))
 
 
 def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:

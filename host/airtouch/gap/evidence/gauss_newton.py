@@ -44,13 +44,14 @@ class _State(NamedTuple):
 class Posterior:
     """Posterior of mean effects' parameters beside random effects that stay as they are.
 
-    added (n,): power of the random effects; uncertain_floor: whether the commands' floor is as uncertain as under such;
-    spread: standard deviation of the parameters' prior; prior (k + m,): of parameters and offsets.
+    extra_power (n,): that of the random effects; uncertain_floor: whether the commands' floor is as uncertain as under
+    such; spread: standard deviation of the parameters' prior; prior (k + m,): of parameters and offsets.
     """
 
-    def __init__(self, problem: Problem, mean: Sequence[Term], added: np.ndarray | float, spread: np.ndarray | float,
-                 uncertain_floor: bool) -> None:
-        self.problem, self.mean, self.added, self.uncertain_floor = problem, mean, added, uncertain_floor
+    def __init__(self, problem: Problem, mean: Sequence[Term], extra_power: np.ndarray | float,
+                 spread: np.ndarray | float, uncertain_floor: bool) -> None:
+        self.problem, self.mean = problem, mean
+        self.extra_power, self.uncertain_floor = extra_power, uncertain_floor
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         spreads = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
         self.prior = np.concatenate([spreads, [o.spread for o in problem.offsets]])
@@ -62,7 +63,7 @@ class Posterior:
         for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
             values[places] -= amount * column
         of_loop = self.problem.loop_power(active, self.uncertain_floor)
-        power = self.added + of_loop.power
+        power = self.extra_power + of_loop.power
         away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
         return _State(x, offsets, values, power, of_loop.cost + (0.5 * away - self.problem.likelihood(values, power)))
 

@@ -90,24 +90,24 @@ def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
         else (np.zeros(0), np.zeros(0))
 
 
-def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+def weights_of(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> np.ndarray:
     """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where not valid.
 
-    values (n,): the gap; added (n,): power over the floor.
+    values (n,): the gap; extra_power (n,): power over the floor.
     """
     elements = problem.elements
-    power = elements.power + added
+    power = elements.power + extra_power
     over_expected = squared(values) / power
     return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail_scale + over_expected) / power * elements.valid
 
 
-def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
+def without_offsets(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> tuple[np.ndarray, float]:
     """Values less the offsets between flights of highest posterior, and minus the log of these offsets' prior.
 
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
     elements, exponent = problem.elements, problem.likelihood.exponent
-    power, gap, cost = elements.power + added, values.copy(), 0.0
+    power, gap, cost = elements.power + extra_power, values.copy(), 0.0
     for places, column, spread in problem.offsets:
         amount = 0.0
         largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.valid[places] / power[places]

@@ -19,7 +19,8 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 REPLAY_FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
 _COLUMN = float64[::1]
 LEAST, MOST = 1e-100, 1e100  #: size of a product of values before its logarithm is taken; chosen, far from overflow
-BRACKET = 1e-3, 600.0  #: tails' scales among which `tail` seeks; chosen, beyond any in use, and exp does not overflow
+#: tails' scales among which `tail_scale` seeks; chosen, beyond any in use, and exp does not overflow
+BRACKET = 1e-3, 600.0
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Likelihood:
     """Log likelihood of flattened values; only differences mean something.
 
     power (n,): expected without random effects, unit^2/Hz; freedom, tail_scale (n,): degrees of freedom and scale of
-    the tails; valid (n,): bool, which values count. `added` in its functions is the power (n,) that a hypothesis adds.
+    the tails; valid (n,): bool, which values count. In its functions extra_power (n,) is what a hypothesis adds.
     """
 
     power: np.ndarray
@@ -35,14 +36,14 @@ class Likelihood:
     tail_scale: np.ndarray
     valid: np.ndarray
 
-    def __call__(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+    def __call__(self, values: np.ndarray, extra_power: np.ndarray | float = 0.0) -> float:
         """Log likelihood of values (n,)."""
-        size, power = squared(values), self.power + added
+        size, power = squared(values), self.power + extra_power
         return -OVERLAP_WEIGHT * minus_log_likelihood(size, power, self.tail_scale, self.exponent, self.valid)
 
-    def per_value(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+    def per_value(self, values: np.ndarray, extra_power: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        levels = _levels(squared(values), self.power + added, self.tail_scale, self.exponent)
+        levels = _levels(squared(values), self.power + extra_power, self.tail_scale, self.exponent)
         levels[~self.valid] = 0.0
         return levels
 
@@ -52,19 +53,19 @@ class Likelihood:
         size (n,): the values' squared size.
         """
         changing = (unit != 0.0) & self.valid
-        power, scale, exponents = self.power + others, self.tail_scale, self.exponent
-        rest = minus_log_likelihood(size, power, scale, exponents, self.valid & ~changing)
-        size_there, unit_there, power, scale, exponents, valid = (
-            x[changing] for x in (size, unit, power, scale, exponents, self.valid))
+        power, tail_scale, exponents = self.power + others, self.tail_scale, self.exponent
+        rest = minus_log_likelihood(size, power, tail_scale, exponents, self.valid & ~changing)
+        size_there, unit_there, power, tail_scale, exponents, valid = (
+            x[changing] for x in (size, unit, power, tail_scale, exponents, self.valid))
 
         def at(x: float) -> float:
             """Log likelihood at x."""
-            there = minus_log_likelihood(size_there, power + x * unit_there, scale, exponents, valid)
+            there = minus_log_likelihood(size_there, power + x * unit_there, tail_scale, exponents, valid)
             return -OVERLAP_WEIGHT * (rest + there)
 
         return at
 
-    def power_slopes(self, values: np.ndarray, added: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def power_slopes(self, values: np.ndarray, extra_power: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Slope and curvature (count,) against the expected power of each of the first `count` values.
 
         The curvature is what is expected of the law without tails (Whittle's). It is larger than that of the law with
@@ -72,7 +73,7 @@ class Likelihood:
         of that. nu: the degrees of freedom.
         """
         places = slice(count)
-        power = self.power[places] + added[places]
+        power = self.power[places] + extra_power[places]
         over_expected = squared(values[places]) / power
         share = OVERLAP_WEIGHT * self.valid[places] / power
         counted = self.exponent[places] * over_expected / (self.tail_scale[places] + over_expected)
@@ -80,17 +81,17 @@ class Likelihood:
 
     @functools.cached_property
     def exponent(self) -> np.ndarray:
-        """Exponent nu + 1 (n,) of the tails (1 + e / tail)^-(nu + 1), where e is a value's power over that expected.
+        """Exponent nu + 1 (n,) of the tails (1 + e / tail_scale)^-(nu + 1).
 
-        nu: the degrees of freedom.
+        e: a value's power over that expected; nu: the degrees of freedom.
         """
         return self.freedom + 1.0
 
 
-def _levels(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+def _levels(size: np.ndarray, power: np.ndarray, tail_scale: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     """Log likelihood (n,) of values of a squared size; in place of the power."""
     tails = size / power
-    tails /= tail
+    tails /= tail_scale
     np.log1p(tails, out=tails)
     tails *= exponents
     np.log(power, out=power)
@@ -102,7 +103,7 @@ def _levels(size: np.ndarray, power: np.ndarray, tail: np.ndarray, exponents: np
 def tail_scale(freedom: np.ndarray) -> np.ndarray:
     """Scale (n,) of tails whose likelihood is highest at the mean of exponential power.
 
-    E[(nu + 1) e / (tail + e)] = 1, where e is exponential and nu are the degrees of freedom (n,).
+    E[(nu + 1) e / (tail_scale + e)] = 1, where e is exponential and nu are the degrees of freedom (n,).
     """
     different, place = np.unique(freedom, return_inverse=True)
     return np.array([_tail_scale(nu) for nu in different])[place] if len(freedom) else freedom
@@ -116,11 +117,11 @@ def _tail_scale(nu: float) -> float:
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")
-def minus_log_likelihood(size, power, tail, exponents, valid):
-    """Sum of log(power) + exponent log(1 + size / power / tail) over those values (n,) that are valid.
+def minus_log_likelihood(size, power, tail_scale, exponents, valid):
+    """Sum of log(power) + exponent log(1 + size / power / tail_scale) over those values (n,) that are valid.
 
     It is minus the log likelihood, but for a constant and for OVERLAP_WEIGHT, of values of this squared size where
-    this power is expected; where `tail` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
+    this power is expected; where `tail_scale` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
     Sums of logarithms are logarithms of products; what the addition rounds off is carried along (Kahan).
     """
     total, lost = 0.0, 0.0
@@ -135,5 +136,5 @@ def minus_log_likelihood(size, power, tail, exponents, valid):
             total = new
             powers, over, exponent = 1.0, 1.0, exponents[i]
         powers *= power[i]
-        over *= 1.0 + size[i] / (power[i] * tail[i])
+        over *= 1.0 + size[i] / (power[i] * tail_scale[i])
     return total + (np.log(powers) + exponent * np.log(over) - lost)

@@ -32,8 +32,11 @@ class BlockSet:
         return tuple((flight, state, chosen.tobytes()) for flight, state, chosen in self.pieces)
 
 
-class AddedPower(NamedTuple):
-    """Power (n,) that effects add to that expected of the gap, unit^2/Hz, and nats that the commands' floor costs."""
+class LoopChange(NamedTuple):
+    """What effects of the loop change.
+
+    power (n,): what they add to that expected of the gap, unit^2/Hz; cost: nats that the commands' floor costs.
+    """
 
     power: np.ndarray
     cost: float
@@ -42,12 +45,12 @@ class AddedPower(NamedTuple):
 class Modelled(NamedTuple):
     """A hypothesis on some blocks.
 
-    gap (n,): what its mean effects leave, unit/sqrt(Hz); added (n,): power that its effects add to that expected of the
-    gap, unit^2/Hz; cost: nats that the commands' floor costs.
+    gap (n,): what its mean effects leave, unit/sqrt(Hz); extra_power (n,): what its effects add to the power expected
+    of the gap, unit^2/Hz; cost: nats that the commands' floor costs.
     """
 
     gap: np.ndarray
-    added: np.ndarray
+    extra_power: np.ndarray
     cost: float
 
 
@@ -92,14 +95,14 @@ class Problem:
         of_loop = self.loop_power([*mean, *(t.active() for t in random)], uncertain_floor or bool(random))
         return Modelled(self.values(mean), self.random_power(random) + of_loop.power, of_loop.cost)
 
-    def loop_power(self, active: Sequence[Active], uncertain_floor: bool = False) -> AddedPower:
+    def loop_power(self, active: Sequence[Active], uncertain_floor: bool = False) -> LoopChange:
         """What effects of the loop add to the floors of torque and commands.
 
         uncertain_floor: as in `modelled`.
         """
         commands = self.flat.commands
         power, cost = commands.power([a for a in active if not a.gate], uncertain_floor)
-        return AddedPower(np.concatenate([self.torque_power(active), power - commands.elements.floor]), cost)
+        return LoopChange(np.concatenate([self.torque_power(active), power - commands.elements.floor]), cost)
 
     def torque_power(self, active: Sequence[Active]) -> np.ndarray:
         """Power (replay,) that effects of the loop add to the floor of the torque, the first part of `loop_power`."""

@@ -39,7 +39,7 @@ class ParameterSlopes(NamedTuple):
 class SpectraSlopes:
     """First-order changes of the spectra of `problem` by the k parameters of mean effects.
 
-    at (k,): scaled parameters at which they were taken, those of nonlinear parameters at the last call of `moved_to`;
+    at (k,): scaled parameters at which all slopes were last taken; nonlinear ones may be newer.
     by_parameter: k of them.
     """
 
@@ -56,21 +56,22 @@ class SpectraSlopes:
         if anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any()):
             return slopes_at(self.problem, self.mean, x)
         stale = [i for i, s in enumerate(self.by_parameter) if s.nonlinear]
-        taken = dict(zip(stale, _taken(self.problem, self.mean, x, stale), strict=True))
-        return replace(self, by_parameter=[taken.get(i, s) for i, s in enumerate(self.by_parameter)])
+        newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale), strict=True))
+        return replace(self, by_parameter=[newer.get(i, s) for i, s in enumerate(self.by_parameter)])
 
-    def power_equations(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, uncertain_floor: bool,
-                        ) -> tuple[np.ndarray, np.ndarray]:
+    def power_equations(self, x: np.ndarray, values: np.ndarray, extra_power: np.ndarray | float,
+                        uncertain_floor: bool) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
-        values, added: the gap, and the power over the floor, flattened; uncertain_floor: as in `Problem.modelled`.
+        values, extra_power: the gap, and the power over the floor, flattened; uncertain_floor: see
+        `Problem.modelled`.
         """
         problem = self.problem
         active, rises = active_at(self.mean, x), np.array([s.rise for s in self.by_parameter])
         gradient, information = problem.flat.commands.slopes(active, rises, uncertain_floor)
         powers = np.array([s.torque_power for s in self.by_parameter])
         if powers.any():
-            slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(added, values.shape),
+            slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(extra_power, values.shape),
                                                            problem.flat.replay_count)
             gradient = gradient + powers @ slope
             information = information + (powers * curvature) @ powers.T
@@ -79,10 +80,10 @@ class SpectraSlopes:
 
 def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray) -> SpectraSlopes:
     """The slopes by all parameters of mean effects at scaled ones x (k,)."""
-    return SpectraSlopes(problem, mean, x.copy(), _taken(problem, mean, x, range(len(x))))
+    return SpectraSlopes(problem, mean, x.copy(), _slopes_of(problem, mean, x, range(len(x))))
 
 
-def _taken(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int]) -> list[ParameterSlopes]:
+def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int]) -> list[ParameterSlopes]:
     """The slopes by some of the parameters at scaled parameters x (k,), by differences over STEP within the bounds."""
     if not which:
         return []

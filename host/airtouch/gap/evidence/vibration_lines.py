@@ -15,6 +15,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, minus_log_likelihood
 from airtouch.gap.flights.blocks import hann_window
+from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signals.channels import FORCE
@@ -119,7 +120,7 @@ class _Sample:
 
     def __init__(self, data: Data, powers: list[np.ndarray]) -> None:
         blocks = np.concatenate([b[AIR][:, :, FORCE] for b in data.base])
-        chosen = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).astype(int)) if len(blocks) else []
+        chosen = evenly_spaced(range(len(blocks)), MOST_BLOCKS)
         self.over_floor, self.floor = _over_floor(data, blocks[chosen])
         two_sided_power = np.concatenate(powers)[chosen]
         self.two_sided_power = {h: widened(two_sided_power, h) for h in SPREADS_HZ}
@@ -152,11 +153,11 @@ def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """
     strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
-    tail, exponents, valid = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
+    tail_scale, exponents, valid = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
     def likelihood(strength: float) -> float:
         """Log likelihood of lines of a strength (power), without OVERLAP_WEIGHT and but for a constant."""
-        return -minus_log_likelihood(size, 1.0 + strength * flat, tail, exponents, valid)
+        return -minus_log_likelihood(size, 1.0 + strength * flat, tail_scale, exponents, valid)
 
     levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))

@@ -24,13 +24,13 @@ NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and scatter (nepers) 
 class Powers(NamedTuple):
     """Residuals of a part of the flights, value by value (n,).
 
-    over_expected: power over the expected power; freedom, tail: of the law (`evidence.likelihood.Likelihood`); cell:
-    number of the cell.
+    over_expected: power over the expected power; freedom, tail_scale: of the law (`evidence.likelihood.Likelihood`);
+    cell: number of the cell.
     """
 
     over_expected: np.ndarray
     freedom: np.ndarray
-    tail: np.ndarray
+    tail_scale: np.ndarray
     cell: np.ndarray
 
 
@@ -54,18 +54,18 @@ def power_factors(powers: Powers, middle: np.ndarray, spread: np.ndarray) -> tup
 
     middle, spread (CELLS,): of the normal prior of the logarithm. In a cell without values the factor is the prior's.
     """
-    e, nu, tail, cell = powers
+    e, nu, tail_scale, cell = powers
     out = middle.copy()
     count = np.bincount(cell, minlength=CELLS)
     precision = 1.0 / np.maximum(spread ** 2, NOTHING)
     known = np.bincount(cell, information(nu), CELLS)
     for _ in range(UPDATES):
         scaled = e * np.exp(-out[cell])
-        push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), CELLS)
+        push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail_scale + scaled) - 1.0), CELLS)
         out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * known + precision), -LONGEST, LONGEST)
     out[count == 0] = middle[count == 0]
     scaled = e * np.exp(-out[cell])
-    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail)), CELLS)
+    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail_scale)), CELLS)
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
@@ -101,9 +101,9 @@ def _above_chance(gained: np.ndarray, stronger: np.ndarray, pool: np.ndarray, si
 
 def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
     """Logarithm (CELLS,) of the powers' factors where all bands of a sensor but that of the means share one."""
-    e, nu, tail, cell = powers
+    e, nu, tail_scale, cell = powers
     use = ABOVE_MEANS[cell]
-    relative = Powers((e * np.exp(-middle[cell]))[use], nu[use], tail[use], SENSOR[cell][use])
+    relative = Powers((e * np.exp(-middle[cell]))[use], nu[use], tail_scale[use], SENSOR[cell][use])
     common, _ = power_factors(relative, *NO_PRIOR)
     return middle + np.where(ABOVE_MEANS, common[SENSOR], 0.0)
 

@@ -28,7 +28,7 @@ class PartResiduals:
     def __init__(self, data: Data, part: BlockSet, terms: Sequence[Term]) -> None:
         self.problem = problem = problem_of(data, part)
         modelled = problem.modelled(terms)
-        self.values, self.power = modelled.gap, problem.elements.power + modelled.added
+        self.values, self.power = modelled.gap, problem.elements.power + modelled.extra_power
         self.cells = problem.flat.cells
         self.regressors = regressors_of(data, part, problem)
 
@@ -41,8 +41,8 @@ class PartResiduals:
         """
         places = regressors.places
         elements, power = self.problem.elements, self.power[places]
-        nu, tail = elements.freedom[places], elements.tail_scale[places]
-        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(residual) / power) / power
+        nu, tail_scale = elements.freedom[places], elements.tail_scale[places]
+        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail_scale + squared(residual) / power) / power
         weighted = regressors.columns.conj().T * weights
         return 2.0 * (weighted @ regressors.columns).real, 2.0 * (weighted @ values).real
 
@@ -59,8 +59,9 @@ class PartResiduals:
             normal, right = self.normal_equations(regressors, values, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
             residual = values - regressors.columns @ x
-        nu, tail = self.problem.elements.freedom[regressors.places], self.problem.elements.tail_scale[regressors.places]
-        tails = (nu + 1.0) * np.log1p(squared(residual) / self.power[regressors.places] / tail)
+        elements, places = self.problem.elements, regressors.places
+        over_expected = squared(residual) / self.power[places]
+        tails = (elements.freedom[places] + 1.0) * np.log1p(over_expected / elements.tail_scale[places])
         return residual, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, residuals: np.ndarray) -> Powers:

@@ -99,8 +99,9 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
-    left = left_over(data, part, terms)
-    block, levels = left.problem.flat.air.block_of_value, left.log_likelihoods()[:left.problem.flat.replay_count]
+    remainder = left_over(data, part, terms)
+    flat = remainder.problem.flat
+    block, levels = flat.air.block_of_value, remainder.log_likelihoods()[:flat.replay_count]
     in_air = block >= 0
     return np.bincount(block[in_air], levels[in_air])
 

@@ -44,7 +44,7 @@ class Follows(IntEnum):
     ONE_ROTOR = 14  #: its thrust beyond a quarter of the weight
 
 
-#: by what the signal is of; the others are 1, the time, and those of SCALE
+#: groups of signals by the quantity they come from; CONSTANT, TIME and the keys of SCALE are in neither
 OF_MOTION = (Follows.VELOCITY, Follows.SPEED, Follows.BODY_RATE, Follows.TILT, Follows.POSITION,
              Follows.SQUARED_VELOCITY)
 OF_THRUST = (Follows.THRUST, Follows.ROLL_THRUST, Follows.PITCH_THRUST, Follows.ONE_ROTOR)

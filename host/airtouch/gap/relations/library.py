@@ -143,7 +143,7 @@ def packed(library: Library) -> bytes:
 
 
 def read(content: bytes) -> Library:
-    """The library in the bytes of a file."""
+    """The library in the bytes of a file; raises ValueError where it has not one number of SHARES for each class."""
     with np.load(io.BytesIO(content)) as file:
         words = json.loads(str(file["words"]))
         arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
@@ -151,6 +151,8 @@ def read(content: bytes) -> Library:
         EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in PARTS},
                     readout=_readout(words["readouts"][i], i, arrays))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
+    if any(len(arrays[name]) != len(classes) for name in SHARES):
+        raise ValueError(f"a library of {len(classes)} classes must have as many of {', '.join(SHARES)}")
     return Library(
         words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
         arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
@@ -176,7 +178,7 @@ def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Libra
     another mission, of another simulator or of a real vehicle do not.
     """
     known = [f for f in nominal if f is not None]
-    found = shipped()
-    if not known or len(known) < len(nominal) or replace(load(found.vehicle), name=vehicle.name) != vehicle:
+    library = shipped()
+    if not known or len(known) < len(nominal) or replace(load(library.vehicle), name=vehicle.name) != vehicle:
         return None
-    return found if found.lies_as_nominal(found.coordinates(np.array(known))) else None
+    return library if library.lies_as_nominal(library.coordinates(np.array(known))) else None

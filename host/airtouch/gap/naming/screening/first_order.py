@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, gap_spectra
-from airtouch.gap.evidence.fit import PRIOR_UNITS, strongest
+from airtouch.gap.evidence.fit import PRIOR_UNITS, LeftOver, strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
-from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet, Problem, problem_of
+from airtouch.gap.evidence.problem import TWO_FOLDS, Problem
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -20,23 +20,6 @@ STEP = 0.25  #: change of a scaled parameter, in natural steps, over which the s
 REWEIGHTINGS = 3  #: least-squares fits, each with the weights of what the one before left; chosen
 NOTHING = 1e-9  #: unit/sqrt(Hz), up to which a change of a spectrum counts as rounding; chosen, far above rounding
 UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any that is fitted; chosen
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """What a hypothesis, fitted on the other half of the flights, leaves of this one.
-
-    problem: how likely the n flattened values of this half are; values (n,): what is left of them, complex; residual
-    (n,): the same less the flights' offsets; extra_power (n,): what the hypothesis adds to their expected power;
-    log_likelihood: of the residual; offset_cost: nats that the offsets cost.
-    """
-
-    problem: Problem
-    values: np.ndarray
-    residual: np.ndarray
-    extra_power: np.ndarray
-    log_likelihood: float
-    offset_cost: float
 
 
 @dataclass(frozen=True)
@@ -51,19 +34,11 @@ class FirstOrder:
     variances: Sequence[np.ndarray]
 
 
-def remainder_of(data: Data, part: BlockSet, terms: Sequence[Term]) -> Remainder:
-    """What effects with these parameters leave of a part of the flights."""
-    problem = problem_of(data, part)
-    gap, added, _ = problem.modelled(terms)
-    residual, cost = without_offsets(problem, gap, added)
-    return Remainder(problem, gap, residual, added, problem.likelihood(residual, added), cost)
-
-
-def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Term], base: Sequence[Term] = (),
+def judge_means(data: Data, remainders: Sequence[LeftOver], terms: Sequence[Term], base: Sequence[Term] = (),
                 ) -> FirstOrder:
-    """Mean effects to first order, fitted to what is left of one half, judged on what is left of the other.
+    """Mean effects to first order, fitted to the remainder of one half, judged on that of the other.
 
-    base: its effects, free to change.
+    remainders: what a base, fitted to the other half, leaves of each half; base: its effects, free to change.
     """
     mean, mean_of_base = _in_the_replay(terms), _in_the_replay(base)
     tables = [[column(data, half.problem, t, i) for t in (*mean, *mean_of_base) for i in range(len(t.free))]
@@ -74,8 +49,8 @@ def judge_means(data: Data, remainders: Sequence[Remainder], terms: Sequence[Ter
     for train, test in TWO_FOLDS:
         x, variance = _least_squares(remainders[train], tables[train], bounds)
         held_out = remainders[test]
-        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.values)))
-        after, cost = without_offsets(held_out.problem, held_out.values + moved, held_out.extra_power)
+        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(held_out.gap)))
+        after, cost = without_offsets(held_out.problem, held_out.modelled.gap + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
             + held_out.offset_cost
         fitted.append(x[:k])
@@ -88,17 +63,17 @@ def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
     return [t for t in terms if t.shows_in == MEAN and not t.signature.commands_only]
 
 
-def judge_random(remainders: Sequence[Remainder], term: Term) -> tuple[float, np.ndarray]:
+def judge_random(remainders: Sequence[LeftOver], term: Term) -> tuple[float, np.ndarray]:
     """Held-out nats of a random effect beside a base, and its scaled strength (k,), the mean of both halves.
 
     The base stays as it is.
     """
     gain, strengths = 0.0, []
     for train, test in TWO_FOLDS:
-        fitted = strongest(remainders[train].problem, term, remainders[train].residual, remainders[train].extra_power)
-        problem, residual, before = remainders[test].problem, remainders[test].residual, remainders[test].extra_power
-        gain += problem.likelihood(residual, before + problem.random_power([fitted])) \
-            - problem.likelihood(residual, before)
+        fitted = strongest(remainders[train].problem, term, remainders[train].gap, remainders[train].extra_power)
+        held_out = remainders[test]
+        power = held_out.extra_power + held_out.problem.random_power([fitted])
+        gain += held_out.problem.likelihood(held_out.gap, power) - held_out.log_likelihood
         strengths.append(fitted.scaled(fitted.values))
     return gain, np.mean(strengths, axis=0)
 
@@ -142,7 +117,7 @@ def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([low, -wide]), np.concatenate([high, wide])
 
 
-def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[np.ndarray, np.ndarray],
+def _least_squares(half: LeftOver, table: Sequence[np.ndarray], bounds: tuple[np.ndarray, np.ndarray],
                    ) -> tuple[np.ndarray, np.ndarray]:
     """Scaled parameters (k,) that explain the values of a half best, and their variances (k,).
 
@@ -150,14 +125,14 @@ def _least_squares(half: Remainder, table: Sequence[np.ndarray], bounds: tuple[n
     """
     size, columns, constants = len(table), np.array(table), half.problem.offsets
     prior = np.concatenate([np.full(size, PRIOR_UNITS), [c.spread for c in constants]])
-    x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.values
+    x, offsets, values = np.zeros(size), np.zeros(len(constants)), half.modelled.gap
     for _ in range(REWEIGHTINGS):
         weights = weights_of(half.problem, values, half.extra_power)
         equations = normal_equations(columns, prior, values, weights, np.concatenate([x, offsets]), constants)
         change, covariance = bounded_step(equations, x, bounds)
         x = np.clip(x + change[:size], *bounds)
         offsets = offsets + change[size:]
-        values = half.values + x @ columns
+        values = half.modelled.gap + x @ columns
         for amount, (places, column, _) in zip(offsets, constants, strict=True):
             values[places] -= amount * column
     return x, np.diag(covariance)

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airtouch.gap.evidence.fit import LeftOver, left_over
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.records import Candidate, Charges, Strength
-from airtouch.gap.naming.screening.first_order import Remainder, judge_means, judge_random, remainder_of, shows
+from airtouch.gap.naming.screening.first_order import judge_means, judge_random, shows
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
@@ -31,7 +32,7 @@ class RoundStart:
 
     trial: Trial
     base: Candidate | None
-    remainders: Sequence[Remainder]
+    remainders: Sequence[LeftOver]
 
     @property
     def gain(self) -> float:
@@ -65,7 +66,7 @@ class Screened:
 def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
     """What a round begins from, each half as the fit on the other half leaves it."""
     fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
-    remainders = [remainder_of(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.halves)]
+    remainders = [left_over(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.halves)]
     return RoundStart(trial, base, remainders)
 
 
