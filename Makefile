@@ -24,7 +24,7 @@ setup: .venv/.kernels  ## make .venv with everything in it
 
 .venv/.kernels: .venv/.packages $(SOURCES)
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
-	@echo "Compiling the simulator: half a minute the first time"
+	@echo "Compiling what is not compiled yet of the simulator"
 	@$(BIN)/python -c "import keras, matplotlib.pyplot, sklearn.ensemble" 2> /dev/null & \
 	  $(BIN)/python -c "from airtouch.simulation import compiled; compiled.compile_all()" && wait
 	@touch $@

@@ -19,5 +19,9 @@ if ! "$python" -m venv .venv 2>/dev/null; then
 fi
 # --no-compile: of 17,000 modules some 4,000 are ever used; Python compiles these when they are first imported
 echo "Installing pinned packages into .venv (about 2 GB, a minute or two); pip says what it fetches..."
-.venv/bin/python -m pip install --no-compile --quiet --disable-pip-version-check -c tools/constraints.txt "setuptools>=80,<83" wheel
+.venv/bin/python -m pip install --no-compile --quiet --disable-pip-version-check -c tools/constraints.txt "setuptools>=80,<83" wheel numpy scipy numba click
+# a minute of one processor, while the other fetches the rest; what fails here is tried again by `make setup`, and told
+PYTHONPATH=host .venv/bin/python -c "from airtouch.simulation import compiled; compiled.compile_all()" > /dev/null 2>&1 &
+compiling=$!
 .venv/bin/python -m pip install --no-compile --progress-bar on --disable-pip-version-check -c tools/constraints.txt --no-build-isolation --editable ".[plots,parquet,pandas,ulog,ros,train,dataset,map,vision,test,bench,scale,fly,flash]"
+wait "$compiling" || true
