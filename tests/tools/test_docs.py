@@ -89,15 +89,18 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
     def table(start):
         return re.search(r"^\| flights \|.*\n\|[-|]+\n((?:\|.*\n)+)", page[page.index(start):], re.M).group(1)
 
-    view, build, nominal = map(table, ("nothing was fitted on", "were built on.", "**Every nominal flight"))
+    view, build, nominal, unknown_scatter = map(table, (
+        "nothing was fitted on", "were built on.", "**Every nominal flight", "**The same in flights whose scatter"))
 
     def total(rows, truth):
         counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()
                   if f"| {truth} |" in line and line.startswith("| neural") and "--partner" not in line]
         return " of ".join(str(sum(map(int, column))) for column in zip(*counts, strict=True))
 
-    nominal_counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in nominal.splitlines()]
-    nominal_sum = " of ".join(str(sum(map(int, column))) for column in zip(*nominal_counts, strict=True))
+    def whole(rows):
+        counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()]
+        return " of ".join(str(sum(map(int, column))) for column in zip(*counts, strict=True))
+
     results = (DOCS / "results.md").read_text("utf-8")
     goals = page[page.index("## Goals"):page.index("## Flight by flight")].splitlines()
     for truth, sign in (("none", "same, rules only"), ("ground effect", "effect named"),
@@ -105,7 +108,8 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
         goal_lines = "".join(line for line in goals if sign in line)
         assert total(view, truth) in goal_lines and total(view, truth) in results, truth
         assert total(build, truth) in results and (truth == "none" or total(build, truth) in goal_lines), truth
-    assert nominal_sum in page[:page.index("## Flight by flight")] and nominal_sum in results
+    for rows_of_part in (nominal, unknown_scatter):
+        assert whole(rows_of_part) in page[:page.index("## Flight by flight")] and whole(rows_of_part) in results
 
 
 def test_every_page_can_be_reached_from_the_readme():
