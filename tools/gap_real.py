@@ -58,8 +58,7 @@ def _delay_clock(path: str, seconds: float) -> FlightLog:
 def diagnose_case(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
-    out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
-           "baseline": len(case.baseline), "partner": len(case.partner), "effects": []}
+    out = {**identity(case), "truth": case.truth, "condition": case.condition, "effects": []}
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
                              before=_LAST.get((case.vehicle, case.baseline)),
@@ -85,23 +84,25 @@ def quick(cases: list[Case]) -> list[Case]:
 def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     """Cases with their diagnoses, by `jobs` processes; those in the file `store` are read, others appended to it."""
     answer_of = {_key(c): c for c in json_lines.read(store)}
-    todo = sorted((c for c in cases if _key_of(c) not in answer_of), key=lambda c: (c.row, c.vehicle, c.baseline))
+    todo = sorted((c for c in cases if _key(identity(c)) not in answer_of),
+                  key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
         for i, case in enumerate(pool.map(diagnose_case, todo)):
             answer_of[_key(case)] = case
             json_lines.append(store, [case])
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
-    return [answer_of[_key_of(c)] for c in cases]
+    return [answer_of[_key(identity(c))] for c in cases]
+
+
+def identity(case: Case) -> dict:
+    """What tells the answer to a case from others: row, flight, numbers of baseline flights and of partners' logs."""
+    return {"row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
+            "partner": len(case.partner)}
 
 
 def _key(answer: dict) -> tuple:
-    """What tells a kept answer from others: row, flight, numbers of baseline flights and of partners' logs."""
+    """The `identity` of an answer as a key; files of before 2026-11-26 have no number of partners."""
     return answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0)
-
-
-def _key_of(case: Case) -> tuple:
-    """`_key` of the answer to a case."""
-    return case.row, Path(case.flight).name, len(case.baseline), len(case.partner)
 
 
 def main(arguments: list[str] | None = None) -> int:

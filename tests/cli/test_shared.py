@@ -9,8 +9,8 @@ from airtouch.errors import AirTouchError
 
 def test_every_item_comes_once_and_the_bar_says_how_many_are_done(capsys):
     assert list(with_bar(["a", "b", "c"], "letters")) == ["a", "b", "c"]
-    said = capsys.readouterr()
-    assert "letters" in said.err and "3/3" in said.err and said.out == ""
+    printed = capsys.readouterr()
+    assert "letters" in printed.err and "3/3" in printed.err and printed.out == ""
 
 
 def test_the_bar_of_an_unfinished_run_does_not_say_that_all_is_done(capsys):

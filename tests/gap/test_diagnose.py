@@ -57,13 +57,13 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
 @pytest.mark.parametrize(("nominal", "a_candidate"), [(0, False), (1, True), (4, True)])
 def test_a_wake_is_no_candidate_without_nominal_flights(monkeypatch, nominal, a_candidate):
     """As a vehicle that shakes by itself looks like one in a wake that fills the flight."""
-    seen = []
+    tried = []
     nothing = PartOfSelection([], SimpleNamespace(terms=()), {}, {})
-    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, *_: seen.append(set(candidates)) or nothing)
+    monkeypatch.setattr(diagnosis, "select", lambda data, candidates, *_: tried.append(set(candidates)) or nothing)
     monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(shrink=SimpleNamespace(
         before=1.0, share=Quantity(0.0))))
     study = SimpleNamespace(simulated=False, loop=None, nominal_count=nominal)
     diagnosis.selection_and_gap(SimpleNamespace(study=study), ("mass",))
-    (candidates,) = seen
+    (candidates,) = tried
     assert ("downwash" in candidates) is a_candidate
     assert "mass" not in candidates and {"motor_noise", "gust", "ground_effect"} <= candidates

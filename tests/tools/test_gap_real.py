@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,49 +15,40 @@ def test_a_few_recorded_flights_of_each_kind(flights, capsys):
     assert all(row in table for row in ("swarm, ns", "crazypad", "peers"))
 
 
-def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, capsys):
-    def blind(case):
-        return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": case.flight.split("/")[-1],
-                "baseline": len(case.baseline), "effects": [], "verdict": "none"}
+@pytest.fixture
+def diagnosed(monkeypatch):
+    """The cases that are diagnosed, each of which is answered with none, in this process."""
+    out = []
 
-    monkeypatch.setattr(gap_real, "diagnose_case", blind)
+    def none(case):
+        out.append(case)
+        return {**gap_real.identity(case), "truth": case.truth, "condition": case.condition, "effects": [],
+                "verdict": "none"}
+
+    monkeypatch.setattr(gap_real, "diagnose_case", none)
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+    return out
+
+
+def test_a_diagnosis_that_always_says_none_is_noticed(flights, diagnosed, capsys):
     assert gap_real.main([str(flights), "--quick"]) == 1
-    assert "wrong, more than" in capsys.readouterr().err
+    assert "wrong, more than" in capsys.readouterr().err and diagnosed
 
 
-def test_a_kept_answer_is_that_of_as_many_baseline_flights_and_partners(tmp_path, monkeypatch):
-    asked = []
-
-    def counted(case):
-        asked.append(case)
-        return {"row": case.row, "truth": case.truth, "flight": case.flight, "baseline": len(case.baseline),
-                "partner": len(case.partner), "effects": [], "verdict": "none"}
-
-    monkeypatch.setattr(gap_real, "diagnose_case", counted)
-    monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+def test_a_kept_answer_is_that_of_as_many_baseline_flights_and_partners(tmp_path, diagnosed):
     whole = cases.Case("swarm", "none", "v", "a.csv", ("b.csv", "c.csv", "d.csv"))
-    asks = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),))]
-    for case in asks:
+    asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),))]
+    for case in asked:
         for _ in range(2):
             (answer,) = gap_real.diagnoses([case], tmp_path / "kept.jsonl", 1)
             assert (answer["baseline"], answer["partner"]) == (len(case.baseline), len(case.partner))
-    assert asked == asks, "each once"
+    assert diagnosed == asked, "each once"
 
 
-def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(flights, monkeypatch):
-    seen = []
-
-    def blind(case):
-        seen.append(case)
-        return {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
-                "baseline": len(case.baseline), "effects": [], "verdict": "none"}
-
-    monkeypatch.setattr(gap_real, "diagnose_case", blind)
-    monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
+def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(flights, diagnosed):
     assert gap_real.main([str(flights), "--rows", "nominal", "--most-baseline", "3"]) == 0
     whole = {c.flight: c.baseline for c in cases.nominal(flights, "build")}
-    assert {c.flight: c.baseline for c in seen} == {flight: baseline[:3] for flight, baseline in whole.items()}
+    assert {c.flight: c.baseline for c in diagnosed} == {flight: baseline[:3] for flight, baseline in whole.items()}
     with pytest.raises(SystemExit):
         gap_real.main([str(flights), "--most-baseline", "-1"])
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
-from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, RED, TITLE_AT, Room, limit, panes, png, style
 
 BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with the named effects, and of its floor
 #: changes of `style.STYLE` for plots that are read on a phone
@@ -19,8 +19,8 @@ PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
-BELOW_IN, RIGHT_IN = 0.5, 0.15  #: inch, room below the lowest pane and to the right of all
-TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
+#: of a plot with a legend above each pane, and of one with titles and one legend above all
+LEGENDS, TITLES = Room(left_in=0.85, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: colour behind the curves of each phase that is shaded
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
@@ -30,7 +30,7 @@ def signals(signal: Signal) -> bytes:
     """PNG of one channel of one flight up to a frequency: measured, modelled, and below their difference."""
     rows = 1 if signal.measured is None else 2
     with style(PHONE):
-        figure, axes = _panes(rows, 1.6, left_in=0.85, above_in=0.35)
+        figure, axes = _column(rows, 1.6, LEGENDS)
         if signal.measured is not None:
             axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
             axes[0].plot(signal.time_s, signal.measured - signal.before, color=BEFORE, lw=1.0, label="model")
@@ -56,7 +56,7 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     """PNG of the gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
     rows = len(shown)
     with style(PHONE):
-        figure, axes = _panes(rows, 1.35, legend_in=0.25)
+        figure, axes = _column(rows, 1.35, TITLES)
         for ax, spectrum in zip(axes, shown, strict=True):
             for label, power, colour, width in (("floor", spectrum.floor, FLOOR, 1.6),
                                                 ("before", spectrum.before, BEFORE, 1.3),
@@ -75,7 +75,7 @@ def commands(curves: MeanSpectra) -> bytes:
     """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis."""
     f = curves.frequency_hz
     with style(PHONE):
-        figure, axes = _panes(len(curves.flown), 1.2, legend_in=0.25)
+        figure, axes = _column(len(curves.flown), 1.2, TITLES)
         for ax, (name, flown) in zip(axes, curves.flown.items(), strict=True):
             if name in curves.nominal:
                 ax.loglog(f, curves.nominal[name], color=FLOOR, lw=1.6, label="baseline flights")
@@ -88,17 +88,11 @@ def commands(curves: MeanSpectra) -> bytes:
         return png(figure, PHONE_DPI)
 
 
-def _panes(rows: int, pane_in: float, *, left_in: float = 0.75, above_in: float = 0.3, legend_in: float = 0.0,
-           ) -> tuple[Figure, np.ndarray]:
-    """A figure of a fixed layout, and its panes (rows,) one below another: to find a layout, matplotlib draws twice.
-
-    pane_in: height of each pane, inch; left_in, above_in: room beside and above each; legend_in: above all.
-    """
-    height_in = BELOW_IN + rows * (pane_in + above_in) + legend_in
-    figure = Figure(figsize=(WIDTH_IN, height_in))
-    grid = {"left": left_in / WIDTH_IN, "right": 1.0 - RIGHT_IN / WIDTH_IN, "bottom": BELOW_IN / height_in,
-            "top": 1.0 - (above_in + legend_in) / height_in, "hspace": above_in / pane_in}
-    return figure, figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
+def _column(rows: int, pane_in: float, room: Room) -> tuple[Figure, np.ndarray]:
+    """A figure, and its panes (rows,) one below another, each pane_in inch high."""
+    height_in = room.below_in + rows * (pane_in + room.above_in) + room.top_in
+    figure, axes = panes((WIDTH_IN, height_in), rows, 1, room)
+    return figure, axes[:, 0]
 
 
 def _legend(figure: Figure, ax: Axes) -> None:

@@ -3,7 +3,7 @@
 import io
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -12,6 +12,35 @@ from matplotlib.figure import Figure
 
 GREEN, BLUE, RED, GREY = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
 STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
+
+TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
+
+
+class Room(NamedTuple):
+    """Room for labels and titles, inch: left of, below and above a pane, right of all, and at the top of all."""
+
+    left_in: float
+    below_in: float
+    above_in: float
+    right_in: float = 0.15
+    top_in: float = 0.0
+
+
+def panes(size_in: tuple[float, float], rows: int, columns: int, room: Room,
+          sharey: Literal["none", "row"] = "none") -> tuple[Figure, np.ndarray]:
+    """A figure of a fixed layout, and its panes (rows, columns): to find a layout, matplotlib draws twice.
+
+    size_in: width and height, inch; room: below the lowest panes alone, as all share the x axis; sharey: whether the
+    panes of a row have one y axis.
+    """
+    width_in, height_in = size_in
+    pane_width_in = (width_in - room.right_in) / columns - room.left_in
+    pane_height_in = (height_in - room.below_in - room.top_in) / rows - room.above_in
+    grid = {"left": room.left_in / width_in, "right": 1.0 - room.right_in / width_in,
+            "bottom": room.below_in / height_in, "top": 1.0 - (room.above_in + room.top_in) / height_in,
+            "wspace": room.left_in / pane_width_in, "hspace": room.above_in / pane_height_in}
+    figure = Figure(figsize=size_in)
+    return figure, figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False, gridspec_kw=grid)
 
 
 def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:

@@ -1,22 +1,17 @@
 """Plots of a twin beside the recorded flights, each as the bytes of a PNG."""
 
-from typing import Literal
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from airtouch.parameters import SAMPLE_RATE_HZ
-from airtouch.report.style import BLUE, GREEN, GREY, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, TITLE_AT, Room, panes, png, style
 from airtouch.twin.comparison.curves import AFTER, BEFORE, AroundEdges, Signals
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, UNITS
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES
 
 WIDTH_IN = 7.2  #: inch, width of a plot
-#: inch, room left of, below and above a pane, for tick labels, the axis' label and the title; and right of all
-LEFT_IN, BELOW_IN, ABOVE_IN, RIGHT_IN = 0.6, 0.5, 0.3, 0.15
-TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
+ROOM = Room(left_in=0.6, below_in=0.5, above_in=0.3)
 #: (label, colour) of each of a pair
 SOURCES = (("recorded", GREEN), ("simulated", BLUE))
 
@@ -24,7 +19,7 @@ SOURCES = (("recorded", GREEN), ("simulated", BLUE))
 def overlaid(pair: tuple[Signals, Signals]) -> bytes:
     """PNG of all twelve channels of a recorded flight and its twin, from 2 s before the entry to 2 s after the exit."""
     with style():
-        figure, axes = _panes(6, 2, 10.5)
+        figure, axes = panes((WIDTH_IN, 10.5), 6, 2, ROOM)
         for k, axis in enumerate(axes.T.ravel()):
             for flight, (label, colour) in zip(pair, SOURCES, strict=True):
                 axis.plot(flight.time_s, flight.channels[:, k], color=colour, lw=0.7, label=label)
@@ -43,7 +38,7 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
     """
     time = (np.arange(BEFORE + AFTER) - BEFORE) / SAMPLE_RATE_HZ
     with style():
-        figure, axes = _panes(len(NAMES), 2, 15.0, sharey="row")
+        figure, axes = panes((WIDTH_IN, 15.0), len(NAMES), 2, ROOM, sharey="row")
         for column, (kind, pair) in enumerate(kinds.items()):
             for around, (label, colour) in zip(pair, SOURCES, strict=True):
                 for k, axis in enumerate(axes[:, column]):
@@ -63,7 +58,7 @@ def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
     """
     place = np.arange(len(BANDS_HZ))
     with style():
-        figure, grid = _panes(4, 3, 9.0, below_in=0.8)
+        figure, grid = panes((WIDTH_IN, 9.0), 4, 3, ROOM._replace(below_in=0.8))
         axes = grid.ravel()
         for k in range(ch.DOWN):
             for quartiles, (label, colour) in zip(pair, SOURCES, strict=True):
@@ -76,20 +71,6 @@ def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
             axis.tick_params(labelbottom=True)  # also of the pane above the empty one
             axis.set_xlabel("Hz")
         return png(figure)
-
-
-def _panes(rows: int, columns: int, height_in: float, below_in: float = BELOW_IN,
-           sharey: Literal["none", "row"] = "none") -> tuple[Figure, np.ndarray]:
-    """A figure of a fixed layout, and its panes (rows, columns): to find a layout takes matplotlib seconds.
-
-    below_in: room below the lowest panes, inch; sharey: whether the panes of a row have one y axis.
-    """
-    figure = Figure(figsize=(WIDTH_IN, height_in))
-    pane_width_in = (WIDTH_IN - RIGHT_IN) / columns - LEFT_IN
-    pane_height_in = (height_in - below_in) / rows - ABOVE_IN
-    grid = {"left": LEFT_IN / WIDTH_IN, "right": 1.0 - RIGHT_IN / WIDTH_IN, "bottom": below_in / height_in,
-            "top": 1.0 - ABOVE_IN / height_in, "wspace": LEFT_IN / pane_width_in, "hspace": ABOVE_IN / pane_height_in}
-    return figure, figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False, gridspec_kw=grid)
 
 
 def _quartiles(axis: Axes, x: np.ndarray, quartiles: np.ndarray, colour: str, label: str) -> None:

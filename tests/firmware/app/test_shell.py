@@ -56,9 +56,9 @@ def shells(headers, tmp_path_factory):
                *sanitized.SANITIZERS, "-DCONFIG_PLATFORM_CF2", f"-I{headers}", *(f"-I{i}" for i in INCLUDES)]
     core = []
     for flags, sources in ((command[1:], CORE), (sanitized.FLAGS, PORTABLE)):
-        made, error = objects.compiled(compiler, flags, sources)
+        compiled, error = objects.compiled(compiler, flags, sources)
         assert not error, error[:3000]
-        core += made
+        core += compiled
     for name, (flags, sources) in BUILDS.items():
         process = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core,
                                   "-lm", "-o", folder / name], capture_output=True, text=True)

@@ -4,28 +4,10 @@ import numpy as np
 import pytest
 
 from airtouch.gap.answer.followed_signals import followed_signals
-from airtouch.gap.answer.unexplained import ratios_of_blocks
-from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, starts
 from airtouch.simulation import signals as at
-from gap_flights import VEHICLE, flight, noise
-from made_diagnosis import cell
-
-STUDY = declared_study(VEHICLE, ())
-SECONDS = 40.0
-CELL = cell("force_x", "hover", 1.0, band_hz=(2.0, 6.0))
-
-
-def hover(strength):
-    """A hover whose forward gap is white noise of rms `strength` (n,) or one number, m/s^2."""
-    force = noise(SECONDS, 1.0, 1) * np.broadcast_to(strength, 4000)[:, None] * [1.0, 0.0, 0.0]
-    return flight(SECONDS, force)
-
-
-def ratio_of(one):
-    """Rms over the floor of CELL in each block of a flight."""
-    return ratios_of_blocks(one, residual(one, VEHICLE), CELL)
+from gap_flights import flight
+from shaken_hover import STUDY, hover, ratio_of
 
 
 def test_signal_that_the_power_follows_is_named():

@@ -12,18 +12,18 @@ from made_diagnosis import cell, diagnosis
 
 def test_effect_that_does_not_close_the_headline_cell_is_not_its_cause():
     cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
-    said = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
-    assert said[1] == "The effect named, motor noise (probability 93%), does not close this cell."
-    assert "500 to 475 times the floor" in said[2].replace("  ", " ")
+    _, which, how_far = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
+    assert which == "The effect named, motor noise (probability 93%), does not close this cell."
+    assert "500 to 475 times the floor" in how_far.replace("  ", " ")
 
 
 @pytest.mark.parametrize(("other", "begin"), [(0.2, "The gap lies mostly in lift"),
                                               (9.0, "A part of the gap lies in lift")])
 def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
     cells = [cell("force_z", "hover", 1.0, after=0.1), cell("torque_x", "hover", other, after=other)]
-    said = sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
+    where, which, _ = sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),),
                                           headline=summary.headline(cells, True)))
-    assert said[0].startswith(begin) and said[1].startswith("Its cause is ground effect")
+    assert where.startswith(begin) and which.startswith("Its cause is ground effect")
 
 
 def test_no_cause_is_given_without_a_headline_cell():
@@ -63,8 +63,9 @@ def test_none_says_how_large_the_gap_is(before, size):
 
 def test_an_effect_beside_the_first_is_told_as_one_though_the_headline_is_its_own():
     cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
-    said = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {}))))
-    assert said[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
+    effects = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
+    _, which, _ = sentences(diagnosis(cells, effects=effects))
+    assert which == "Its cause is motor noise (probability 93%), with weak motor beside it."
 
 
 def test_unknown_names_what_comes_nearest_and_closes_nothing():

@@ -7,27 +7,12 @@ import numpy as np
 import pytest
 
 from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst_stretch
-from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.signals.channels import COLUMN, COUNT, residual
+from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.logs.segments import KINDS
-from gap_flights import VEHICLE, flight, noise
+from gap_flights import flight
 from made_diagnosis import cell
-
-STUDY = declared_study(VEHICLE, ())
-SECONDS = 40.0
-CELL = cell("force_x", "hover", 1.0, band_hz=(2.0, 6.0))
-
-
-def hover(strength, seed=1, **more):
-    """A hover whose forward gap is white noise of rms `strength` (n,) or one number, m/s^2."""
-    force = noise(SECONDS, 1.0, seed) * np.broadcast_to(strength, 4000)[:, None] * [1.0, 0.0, 0.0]
-    return flight(SECONDS, force, **more)
-
-
-def ratio_of(one):
-    """Rms over the floor of CELL in each block of a flight."""
-    return ratios_of_blocks(one, residual(one, VEHICLE), CELL)
+from shaken_hover import CELL, STUDY, hover, ratio_of
 
 
 def test_the_ratio_is_the_rms_over_the_floor_of_the_cell():

@@ -96,15 +96,15 @@ def test_power_of_thrust_noise_is_that_of_drawn_noise(steady, time):
 
     The accelerometer is sampled, the gyro's differences are means over a sample.
     """
-    rms, every, step = 0.1, 50, 2e-4
+    rms, per_sample, step = 0.1, 50, 2e-4
     decay = np.exp(-step / time)
     white = np.random.default_rng(8).normal(size=(1_500_000, 4))
     drawn = rms * LIFT_N * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], white, axis=0)
     arm = VEHICLE.arm_m / np.sqrt(2.0)
     front, left, yaw = (np.array([PLACE[i][k] for i in (1, 2, 3, 4)]) for k in range(3))
     turning = drawn @ np.column_stack([left * arm, -front * arm, -yaw * VEHICLE.yaw_torque_over_thrust_m])
-    turning = (turning / np.array(VEHICLE.inertia_kg_m2)).reshape(-1, every, 3).mean(axis=1)
-    lifting = (drawn.sum(axis=1) / VEHICLE.mass_kg)[::every]
+    turning = (turning / np.array(VEHICLE.inertia_kg_m2)).reshape(-1, per_sample, 3).mean(axis=1)
+    lifting = (drawn.sum(axis=1) / VEHICLE.mass_kg)[::per_sample]
     f, power = welch(np.column_stack([lifting, turning]), 100.0, nperseg=LENGTH[AIR], axis=0)
     term = next(t for t in terms("motor_noise") if t.values["time"] == time)
     expected = random_effects.power(steady, replace(term, values={**term.values, "rms": rms}))[0]

@@ -87,17 +87,17 @@ def infer_new_flights():
 
 @pytest.mark.parametrize("effects", [{"mass": {"fraction": 0.1}}, {"imu_noise": {"factor": 1.5}}])
 def test_an_effect_that_a_library_was_built_with_is_named_and_sized(infer_new_flights, effects):
-    found = infer_new_flights(effects)
+    answers = infer_new_flights(effects)
     ((name, ((parameter, true),)),) = ((name, values.items()) for name, values in effects.items())
-    assert [[c.name for c in one.classes] for one in found] == [[name]] * JUDGED
-    assert sum(one.against.is_too_much for one in found) <= 1
-    for value, deviation in (one.readings[name][parameter] for one in found):
+    assert [[c.name for c in one.classes] for one in answers] == [[name]] * JUDGED
+    assert sum(one.against.is_too_much for one in answers) <= 1
+    for value, deviation in (one.readings[name][parameter] for one in answers):
         assert value == pytest.approx(true, rel=0.3) and abs(value - true) < 3.0 * deviation
 
 
 def test_a_library_built_of_few_flights_names_nothing_in_nominal_ones(infer_new_flights):
-    found = infer_new_flights({})
-    assert not any(one.classes for one in found) and sum(one.against.is_too_much for one in found) <= 1
+    answers = infer_new_flights({})
+    assert not any(one.classes for one in answers) and sum(one.against.is_too_much for one in answers) <= 1
 
 
 def test_an_effect_that_a_library_was_built_without_is_left(infer_new_flights):

@@ -128,7 +128,7 @@ class _Sample:
     def gain(self, spread_hz: float, shift: int) -> float:
         """Log likelihood, without OVERLAP_WEIGHT, that lines of the best strength gain over none."""
         shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
-        return _best_strength(self.over_floor, shape)[0]
+        return best_strength(self.over_floor, shape)[0]
 
 
 def _judged() -> np.ndarray:
@@ -145,7 +145,7 @@ def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return over, 1.0 / (1.0 / floor).mean(axis=1)
 
 
-def _best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
+def best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     """Nats, without OVERLAP_WEIGHT, that lines of the best strength gain over none, and that strength (power).
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
@@ -174,6 +174,6 @@ def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]
     for i, (lines_of_flight, gap) in enumerate(zip(power, data.base, strict=True)):
         if len(lines_of_flight):
             over, floor = _over_floor(data, gap[AIR][:, :, FORCE])
-            _, share[i] = _best_strength(over, lines_of_flight[:, _judged()] / floor)
+            _, share[i] = best_strength(over, lines_of_flight[:, _judged()] / floor)
     mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
     return [p * s / mean_share for p, s in zip(power, share, strict=True)]

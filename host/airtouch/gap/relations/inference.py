@@ -16,7 +16,7 @@ from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
-from airtouch.gap.relations.readout import Reading, read_out
+from airtouch.gap.relations.readout import Reading, Readout, read_out
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.simulation.effects import get
 
@@ -90,16 +90,19 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
     An effect of which several parameters act gives none: each was calibrated acting alone.
     """
     count = Counter(best.effect_names)
-    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
     return {effect: read_out(readout, get(effect), strength)
-            for effect, readout, strength in classes if readout is not None and count[effect] == 1}
+            for effect, readout, strength in _calibrated(best) if count[effect] == 1}
 
 
 def _without_sign(best: Hypothesis) -> tuple[str, ...]:
     """The effects of a hypothesis whose strength does not tell their sign."""
-    classes = [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits]
-    return tuple(effect for effect, readout, strength in classes
-                 if readout is not None and not readout.shows_sign(strength))
+    return tuple(effect for effect, readout, strength in _calibrated(best) if not readout.shows_sign(strength))
+
+
+def _calibrated(best: Hypothesis) -> list[tuple[str, Readout, np.ndarray]]:
+    """Effect, readout and strength of each class of a hypothesis whose strength was calibrated."""
+    return [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits
+            if f.effect_class.readout is not None]
 
 
 def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:

@@ -55,22 +55,22 @@ def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
 
     monkeypatch.setattr(comparisons, "_rows_of", rows_of)
     monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: nullcontext(SimpleNamespace(map=map)))
-    both, kept = [group("a", "one", 4), group("b", "one", 3)], tmp_path / "kept.jsonl"
-    first = comparisons.compare_all(both, kept, 1)
+    groups, keep = [group("a", "one", 4), group("b", "one", 3)], tmp_path / "kept.jsonl"
+    first = comparisons.compare_all(groups, keep, 1)
     assert len(first) == 14 and done == ["a", "a, other groups", "b", "b, other groups"]
-    kept.write_text("\n".join(line for line in kept.read_text().splitlines() if '"b1, ' not in line) + "\n")
-    assert comparisons.compare_all(both, kept, 1) == first and done[4:] == ["b, other groups"]
+    keep.write_text("\n".join(line for line in keep.read_text().splitlines() if '"b1, ' not in line) + "\n")
+    assert comparisons.compare_all(groups, keep, 1) == first and done[4:] == ["b, other groups"]
 
 
 def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monkeypatch):
-    seen = []
+    summed = []
     monkeypatch.setattr(scatter_table, "class_scatter",
-                        lambda flights, alike: seen.append((flights, alike)) or Scatter({}, 1.0, (0.0, 0.0)))
+                        lambda flights, alike: summed.append((flights, alike)) or Scatter({}, 1.0, (0.0, 0.0)))
     one = group("a", "one", 2)
     rows = {name + note: {"strengths": {}, "errors": {}, "rate": rate, "passing": {}}
             for name, _ in one.logs for note, rate in (("", 1.0), (", other groups", 2.0))}
     classes, counts = scatter_table.scatter_of_classes([one], rows)
-    (flights, alike), = seen
+    (flights, alike), = summed
     assert sorted(f.rate for f in flights) == [1.0, 1.0, 2.0, 2.0] and [f.rate for f in alike] == [1.0, 1.0]
     assert counts == {"class": "2 flights, 4 comparisons in 1 groups"} and classes["class"].vehicle == "it"
     assert all(isinstance(f, ApparentStrengths) for f in flights)
