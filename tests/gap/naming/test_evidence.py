@@ -56,11 +56,11 @@ def test_halves_that_differ_lower_the_evidence():
     assert sure.strength.variance[2] < 0.01 * doubted.strength.variance[2]
 
     (mass,) = select_from(alike, ("mass",))[0].steps
-    nominal = scattered(mass=[abs(mass.strength.mean[0]) / 8.0])
+    nominal = scattered(mass=[abs(mass.strength.mean[0]) / 14.0])
     (evident,), (deviation,) = (select_from(f, ("mass",), nominal)[0].steps for f in (alike, apart))
-    # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
-    assert evident.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and evident.is_named
+    # Student's density of 8 degrees of freedom, 14 deviations out; the other counts as far as both halves have it
+    assert evident.evidence == pytest.approx(4.5 * np.log1p(14.0 ** 2 / 8.0), rel=0.05) and evident.is_named
     weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (0.4, 0.7))  # shares of the mass
-    assert deviation.evidence == pytest.approx(4.5 * np.log1p((8.0 * weak / between) ** 2 / 8.0), rel=0.1)
+    assert deviation.evidence == pytest.approx(4.5 * np.log1p((14.0 * weak / between) ** 2 / 8.0), rel=0.1)
     assert not deviation.is_named
     assert deviation.gain > LEAST_GAIN

@@ -29,7 +29,7 @@ def select(monkeypatch):
 
     Returns the state, and the names that were judged in each round.
     """
-    def run(candidates, passing=None, screened=(), first_gain=FIRST_GAIN):
+    def run(candidates, passing=None, screened=(), least_evidence=FIRST_GAIN):
         def candidate(name, base_gain=0.0):
             gain, evidence = candidates[name]
             return Candidate(name, (), base_gain + gain, full=name not in screened, evidence=evidence)
@@ -43,7 +43,7 @@ def select(monkeypatch):
 
         rounds, added = [], []
         monkeypatch.setattr(module, "round_of", round_of)
-        trial = SimpleNamespace(policy=replace(POLICY, first_gain=first_gain),
+        trial = SimpleNamespace(policy=replace(POLICY, least_evidence=least_evidence),
                                 data=SimpleNamespace(study=SimpleNamespace(loop=None)))
         return forward(Search(trial, dict.fromkeys(candidates, [()]), lambda _: None), passing), rounds
 
@@ -80,10 +80,16 @@ def test_three_deviations_are_added_and_no_more(select):
     assert names(state)[3:] == [("f", True)] and state.names == ["f"]
 
 
-def test_first_name_beside_a_deviation_needs_first_gain(select):
-    judged = {"deviation": (200.0, 0.0), "named": (LEAST_GAIN - 0.1, FIRST_GAIN)}
+def test_first_name_beside_a_deviation_needs_as_much_gain_as_evidence(select):
+    judged = {"deviation": (200.0, 0.0), "named": (LEAST_GAIN - 0.1, LEAST_GAIN)}
     assert names(select(judged)[0]) == [("deviation", False), ("named", True)]
-    assert names(select(judged, first_gain=LEAST_GAIN)[0]) == [("deviation", False)]
+    assert names(select(judged, least_evidence=LEAST_GAIN)[0]) == [("deviation", False)]
+
+
+def test_how_much_evidence_names_an_effect_depends_on_the_flights(select):
+    judged = {"effect": (100.0, FIRST_GAIN)}
+    assert names(select(judged)[0]) == [("effect", True)]
+    assert names(select(judged, least_evidence=LEAST_GAIN)[0]) == [("effect", False)]
 
 
 def test_random_misfit_is_a_deviation(select):

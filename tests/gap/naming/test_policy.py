@@ -60,5 +60,6 @@ def test_flights_without_a_baseline_count_as_recorded():
     assert replace(alone, unknown=recorded.unknown) == recorded
 
 
-def test_first_gain_without_a_loop():
-    assert (policy(RECORDED).first_gain, policy(RECORDED, loop=False).first_gain) == (8.0, 12.0)
+def test_simulated_flights_with_a_loop_need_less_evidence():
+    assert [policy(SIMULATED, loop=loop).least_evidence for loop in (True, False)] == [8.0, 12.0]
+    assert [policy(RECORDED, loop=loop).least_evidence for loop in (True, False)] == [12.0, 12.0]

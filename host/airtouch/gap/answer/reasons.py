@@ -1,7 +1,6 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
-from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Candidate, Selection, Step
 from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
@@ -47,9 +46,9 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
         return _against_in_words(selection)
     if candidate.gain < least:
         return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
-    if candidate.evidence < FIRST_GAIN:
+    if candidate.evidence < least:
         return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
-                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {FIRST_GAIN:.0f} are needed")
+                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
     if candidate.name == selection.taken_back.name:
         return f"closes {max(selection.taken_back.closed, 0.0):.0%} of the gap, too little to be its cause"
     if selection.named_hypothesis:

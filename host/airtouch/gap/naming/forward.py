@@ -43,7 +43,7 @@ class Search:
     @cached_property
     def least_nats(self) -> Mapping[str, float]:
         """What each candidate must gain to be the first step."""
-        return dict.fromkeys(self.candidates, self.trial.policy.first_gain)
+        return dict.fromkeys(self.candidates, self.trial.policy.least_evidence)
 
 
 class Extension(NamedTuple):
@@ -90,7 +90,8 @@ def forward(search: Search, passing: Candidate | None) -> State:
     """
     state = _begun(search, passing)
     while len(state.names) < MOST_EFFECTS:
-        best = _best_of(_worth_adding(state), state.gain)
+        least = search.trial.policy.least_evidence
+        best = _best_of(_worth_adding(state, least), state.gain, least)
         if best is None:
             break
         state = _added(search, state, best)
@@ -108,22 +109,22 @@ def _begun(search: Search, passing: Candidate | None) -> State:
     return State(steps, extensions, single_effects, {**search.least_nats, passing.name: PASSING_GAIN})
 
 
-def _worth_adding(state: State) -> list[Candidate]:
+def _worth_adding(state: State, least_evidence: float) -> list[Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
     enough = [e.candidate for e in state.extensions.values() if e.candidate.gain - state.gain >= e.required_gain]
     if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
-        return [c for c in enough if c.evidence >= FIRST_GAIN]
+        return [c for c in enough if c.evidence >= least_evidence]
     return enough
 
 
-def _best_of(candidates: Sequence[Candidate], before: float) -> Candidate | None:
+def _best_of(candidates: Sequence[Candidate], before: float, least_evidence: float) -> Candidate | None:
     """The best of the candidates that were fitted in full; None where there is none.
 
     Likelihoods of real flights are too sure of themselves (TEMPERATURE). So of two that gain nearly as much the one is
     better whose strength is the rarer in nominal flights. A deviation that nominal flights have as well is added before
     an effect with evidence only where it gains more by a share MISFIT_SHARE_DEVIATION, as no model is exact.
 
-    before: nats that the last step gains over no effect.
+    before: nats that the last step gains over no effect; least_evidence: nats of evidence that a name needs.
     """
     full = [c for c in candidates if c.full]
 
@@ -131,10 +132,10 @@ def _best_of(candidates: Sequence[Candidate], before: float) -> Candidate | None
         return candidate.gain / TEMPERATURE + min(candidate.evidence, CERTAIN)
 
     best = max(full, key=merit, default=None)
-    if best is None or best.evidence >= FIRST_GAIN:
+    if best is None or best.evidence >= least_evidence:
         return best
     least = before + (1.0 - MISFIT_SHARE_DEVIATION) * (best.gain - before)
-    as_good = [c for c in full if c.evidence >= FIRST_GAIN and c.gain >= least]
+    as_good = [c for c in full if c.evidence >= least_evidence and c.gain >= least]
     return max(as_good, key=merit, default=best)
 
 
@@ -146,7 +147,8 @@ def _added(search: Search, state: State, best: Candidate) -> State:
         added = {s.name for s in state.steps}
         single_effects = {**single_effects, **{n: c for n, c in beside_last.items() if n not in added}}
     left_by_another = bool(state.names) and is_random_misfit(search.trial, state.steps[-1], best)
-    steps = (*state.steps, Step.of(best, is_named=best.evidence >= FIRST_GAIN and not left_by_another))
+    enough = best.evidence >= search.trial.policy.least_evidence
+    steps = (*state.steps, Step.of(best, is_named=enough and not left_by_another))
     after = replace(state, steps=steps, single_effects=single_effects)
     if len(after.names) >= MOST_EFFECTS:  # nothing is added to these
         return after
@@ -167,5 +169,5 @@ def _extensions(search: Search, steps: Sequence[Step], before: Mapping[str, Cand
     worth = {n: v for n, v in search.candidates.items() if any_named or n in gained}
     sure = {n for n, c in before.items() if c.full and c.evidence >= SURE_EVIDENCE and not is_random(n)}
     best = round_of(trial, worth, steps[-1], search.progress, promising=sure)
-    return {n: Extension(c, least_further_gain(trial, steps[-1], c) if any_named else trial.policy.first_gain)
+    return {n: Extension(c, least_further_gain(trial, steps[-1], c) if any_named else trial.policy.least_evidence)
             for n, c in best.items()}
