@@ -18,7 +18,7 @@ from gap_flights import VEHICLE, flight
 
 
 def test_without_a_response_torque_counts_in_the_means_alone():
-    """Whoever makes the data: the arm of the declared vehicle, the seconds of a known wake."""
+    """Of data of any part of the diagnosis: the declared vehicle, the seconds of a known wake."""
     data = Data(declared_study(VEHICLE, ()), [flight(20.0)])
     keep = problem_of(data, whole_of(data)).flat.layout.keep[AIR]
     assert data.means_only and keep[:FIRST_BIN, TORQUE].all() and not keep[FIRST_BIN:, TORQUE].any()

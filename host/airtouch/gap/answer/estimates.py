@@ -34,7 +34,8 @@ from airtouch.gap.signatures.term import Term
 #: fraction of a parameter by which the replay may be wrong: strong effects in eight simulated flights came out up to
 #: 0.26 % off, rms 0.14 % (`python tools/simulation/replay_error.py`)
 REPLAY_ERROR = 0.002
-#: fraction of a parameter by which the model of a random effect's spectrum may be wrong; chosen
+#: fraction of a parameter by which the model of a random effect's spectrum may be wrong; chosen. A larger number makes
+#: the intervals wider
 SPECTRUM_ERROR = 0.1
 #: fraction of a parameter by which the loop's model may be wrong: replayed inertia and late sensors lay 27 and 29 %
 #: off, the median of nine flights of two opened sealed sets

@@ -15,8 +15,10 @@ from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
-SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
-RESTARTS = 12  #: of a fit of several parameters, at most; chosen
+#: nats that another shape of an effect must gain on all the data; chosen. A larger number more often keeps the shape
+#: that the halves of the data chose
+SHAPE_PRICE = 1.0
+RESTARTS = 12  #: most restarts of a fit of several parameters; chosen for time. A larger number can only gain
 #: lower bound of the divisor of a random part, the effect's strength; chosen, far below any that is named
 LEAST_DIVISOR = 1e-6
 

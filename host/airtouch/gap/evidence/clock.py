@@ -12,10 +12,13 @@ from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 
-#: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
+#: least fraction of lost samples that nominal flights are taken to have, without a model of the loop and with one; both
+#: chosen, as a few flights may have lost none. A larger number overlooks small losses
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
-SAMPLES_OF_ONE = 2.0  #: samples that count as one independent value of being lost; chosen
-CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
+#: samples that count as one independent value of being lost; chosen, as losses come in runs. A larger number gives a
+#: loss less evidence
+SAMPLES_OF_ONE = 2.0
+CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen. A larger number gives a jitter less evidence
 
 
 class TimesFault(NamedTuple):
