@@ -7,8 +7,8 @@ import pytest
 
 from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.flattened import flattened
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, problem_of, whole_of
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE

@@ -22,8 +22,9 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import CORRELATION_S, nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, strength_variance
+from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop

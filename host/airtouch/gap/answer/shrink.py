@@ -19,7 +19,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import CELL_GAIN, LeftOver, cell_gains, left_over
+from airtouch.gap.evidence.judge import CELL_GAIN, LeftOver, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink

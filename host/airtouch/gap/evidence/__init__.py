@@ -26,6 +26,6 @@ floor is corrected anew under each hypothesis, which costs nats beside the sum (
 **How.** `data` holds the spectra of some flights and keeps what is worked out of them. A part of their blocks is
 `flattened` to one array of values (`layout`, by `cells` of channel and band). A `problem` is these values under
 hypotheses. `fit` finds the parameters: of mean effects by `gauss_newton` (`slopes`, `least_squares`), of random ones by
-their strength. `clock` judges what shows in the log's times alone. `against` is the evidence against the named effects,
-whoever measures it.
+their strength (`random_strength`). `judge` says how likely other blocks are under them. `clock` judges what shows in
+the log's times alone. `against` is the evidence against the named effects, whoever measures it.
 """

@@ -27,11 +27,11 @@ SENSOR_AXES = 3  #: channels of one sensor (x, y and z), which follow one anothe
 
 
 class CellParts(NamedTuple):
-    """The parts of cells' numbers: view, band and channel, integers or arrays (n,) of them."""
+    """The parts of cells' numbers: view, band and channel, integers (n,); of one number one integer each."""
 
-    view: np.ndarray | int
-    band: np.ndarray | int
-    channel: np.ndarray | int
+    view: np.ndarray
+    band: np.ndarray
+    channel: np.ndarray
 
 
 class CellPlace(NamedTuple):
@@ -42,7 +42,7 @@ class CellPlace(NamedTuple):
     band_hz: tuple[float, float]
 
 
-def cell_numbers(view: np.ndarray | int, band: np.ndarray | int, channel: np.ndarray | int) -> np.ndarray:
+def cell_numbers(view: np.ndarray | int, band: np.ndarray, channel: np.ndarray) -> np.ndarray:
     """Numbers of the cells of views, bands and channels, which broadcast together."""
     return band * COUNT + channel + VIEW_STRIDE * view
 
@@ -56,7 +56,7 @@ def parts_of(cell: np.ndarray | int) -> CellParts:
 def channel_cells() -> np.ndarray:
     """For each cell (CELLS,) the number of the first cell of its view and channel, all bands together."""
     view, _, channel = parts_of(np.arange(CELLS))
-    return cell_numbers(view, 0, channel)
+    return cell_numbers(view, np.zeros_like(channel), channel)
 
 
 def sensor_cells() -> np.ndarray:
@@ -71,7 +71,7 @@ def sensor_cells() -> np.ndarray:
 def band_cells() -> np.ndarray:
     """For each cell (CELLS,) the number of the first cell of its view and band, all channels together."""
     view, band, _ = parts_of(np.arange(CELLS))
-    return cell_numbers(view, band, 0)
+    return cell_numbers(view, band, np.zeros_like(band))
 
 
 def above_means() -> np.ndarray:

@@ -8,6 +8,7 @@ of single rotors are apart, are found from the flights: two numbers for all of t
 up as their phases happen to stand, so that flights of one vehicle differ: each has its own share of the power.
 """
 
+import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -38,6 +39,7 @@ RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: lines are looked for above it, as forces of other origin are strong below; chosen
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
 FINER = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)  #: multiples of the best that are tried then, up to its neighbours
+AROUND = 3  #: bins on either side of the rough place in which the place is refined; chosen, more than the rough step
 MOST_BLOCKS = 40  #: most blocks in which the place of lines is looked for; chosen for time
 
 
@@ -106,7 +108,10 @@ def speeds(flight: Flight, study: Study) -> np.ndarray:
 
 
 def _search(data: Data) -> Lines:
-    """The place and spread of the lines that explain some blocks of all flights best: on a coarse grid, then a fine."""
+    """The place and spread of the lines that explain some blocks of all flights best.
+
+    First the place at one spread, in every other bin, then place and spread together around it.
+    """
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
     powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
@@ -116,10 +121,9 @@ def _search(data: Data) -> Lines:
     sample = _Sample(data, powers)
     if not len(sample.over_floor):
         return Lines([folded(widened(z, 0.0)) for z in powers], 0, 0.0)
-    rough_spread, shifts = SPREADS_HZ[1], range(-reach, reach + 1, 2)
-    rough = max(shifts, key=lambda s: sample.gain(rough_spread, s))
-    fine_grid = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
-    spread, shift = max(fine_grid, key=lambda x: sample.gain(*x))
+    rough = max(range(-reach, reach + 1, 2), key=lambda shift: sample.gain(SPREADS_HZ[1], shift))
+    around = range(max(rough - AROUND, -reach), min(rough + AROUND, reach) + 1)
+    spread, shift = max(itertools.product(SPREADS_HZ, around), key=lambda place: sample.gain(*place))
     power = [folded(widened(z, spread), shift) for z in powers]
     return Lines(_with_flight_shares(data, power), int(shift), spread)
 
@@ -146,12 +150,19 @@ def _judged() -> np.ndarray:
     return (f >= LOWEST_HZ) & (f < f[-1])
 
 
-def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Power (blocks, bins) of the three axes over their floor, mean of them, and that floor (bins,)."""
+class _OverFloor(NamedTuple):
+    """Power (blocks, bins) of the accelerometer over its floor, mean of three axes, and that floor (bins,), PSD."""
+
+    over: np.ndarray
+    floor: np.ndarray
+
+
+def _over_floor(data: Data, blocks: np.ndarray) -> _OverFloor:
+    """The power of blocks over the floor in the bins of `_judged`. blocks: spectra (blocks, bins, 3) of the forces."""
     floor = data.study.floor.power[AIR][_judged(), FORCE]
     with np.errstate(invalid="ignore"):
         over = np.nan_to_num(np.abs(blocks[:, _judged()]) ** 2 / floor).mean(axis=2)
-    return over, 1.0 / (1.0 / floor).mean(axis=1)
+    return _OverFloor(over, 1.0 / (1.0 / floor).mean(axis=1))
 
 
 class BestStrength(NamedTuple):

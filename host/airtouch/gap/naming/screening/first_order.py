@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, gap_spectra
-from airtouch.gap.evidence.fit import PRIOR_UNITS, LeftOver, strongest
+from airtouch.gap.evidence.fit import PRIOR_UNITS
+from airtouch.gap.evidence.judge import LeftOver
 from airtouch.gap.evidence.least_squares import (
     Bounds,
     bounded_step,
@@ -20,6 +21,7 @@ from airtouch.gap.evidence.least_squares import (
     without_offsets,
 )
 from airtouch.gap.evidence.problem import TWO_FOLDS, Problem
+from airtouch.gap.evidence.random_strength import strongest
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
