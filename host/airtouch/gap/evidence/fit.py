@@ -88,7 +88,9 @@ def fit(data: Data, part: BlockSet, terms: Sequence[Term], start: np.ndarray | N
 
 
 def converged(data: Data, part: BlockSet, best: FittedTerms) -> FittedTerms:
-    """A fit, begun anew where it ended until that gains less than SETTLED; the likeliest of them.
+    """The likeliest of fits that begin where the one before ended, until one gains less than SETTLED.
+
+    best: the first of them, which is returned as it is where its mean effects have one parameter or none.
 
     Parameters that trade against each other, as a battery's charge and capacity, lie along a bent valley, which one fit
     leaves off half way: strengths of seven simulated batteries came out up to a third too small.
