@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import fit, judge
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select

@@ -32,8 +32,8 @@ def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch)
     assert control(data, selection, gap) is None
 
 
-def test_the_vehicle_as_declared_is_an_arm_of_its_own(pushed):
-    """Against the same study it closes as much; against none there is one arm."""
+def test_the_gap_is_also_closed_with_the_vehicle_as_declared(pushed):
+    """With the same study it closes as much; with none the answer's own is the only one."""
     data, selection, gap = pushed
     answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
     assert shrink_by_vehicle(None, data.flights, selection, answer) == {"declared": gap.shrink}

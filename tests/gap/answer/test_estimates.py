@@ -21,9 +21,10 @@ from airtouch.gap.answer.estimates import (
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.evidence.clock import CORRELATION_S, clock_gain
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters, strength_variance
+from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail_scale
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.policy import policy_of

@@ -1,18 +1,16 @@
-"""The effects named: fitted until nothing more is gained, in the shape that was flown, with their random parts."""
+"""The effects named: in the shape that was flown, with their random parts."""
 
 from dataclasses import replace
 
 import pytest
 
-from airtouch.gap.answer.named_effects import best_shape, converged, with_random_part
+from airtouch.gap.answer.named_effects import best_shape, with_random_part
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.flights.flight import without_columns
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import random_part_of, terms
 from airtouch.simulation.effects import EFFECTS
-from gap_flights import VEHICLE, fly
+from gap_flights import fly
 
 
 def unsteady(strength, part_strength, turbulence):
@@ -48,20 +46,6 @@ def test_a_part_without_power_divides_nothing_by_zero():
 def test_a_random_part_of_another_effect_changes_nothing():
     effect = NamedEffect("mass", {"fraction": Quantity(0.1)})
     assert with_random_part(effect, random_part_of("ground_effect")) is effect
-
-
-def test_a_fit_goes_on_until_it_stands_still(study):
-    """A battery's strength, charge and capacity lie along a bent valley; from its bottom nothing more is gained."""
-    true = {"strength": 1.3, "charge": 0.7, "capacity": 1.0}
-    data = Data(study, [without_columns(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
-    blocks, term = whole_of(data), terms("battery_sag")[0].refined()
-    start = fit(data, blocks, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
-    result = converged(data, blocks, start)
-    refit = fit(data, blocks, result.terms, result.scaled)
-    level = judge(data, blocks, result.terms)
-    assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
-    assert judge(data, blocks, refit.terms) < level + SETTLED
-    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED
 
 
 @pytest.mark.parametrize("fade", [0.0, 0.06])

@@ -17,7 +17,7 @@ from airtouch.gap.answer.shrink import (
 )
 from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, VIEW_STRIDE, cell_numbers
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains
+from airtouch.gap.evidence.judge import CELL_GAIN, cell_gains
 from airtouch.gap.evidence.problem import problem_of
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.clock import LEAST_JITTER_S

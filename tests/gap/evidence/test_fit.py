@@ -1,16 +1,15 @@
-"""Fits of effects: wherever they begin, they end where the likelihood is highest; the strength of a random one."""
-
-from dataclasses import replace
+"""Fits of effects: wherever they begin, they end where the likelihood is highest."""
 
 import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import LEAST_STRENGTH, fit, judge, strongest
-from airtouch.gap.evidence.problem import problem_of, whole_of
+from airtouch.gap.evidence.fit import SETTLED, converged, fit
+from airtouch.gap.evidence.judge import judge
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights.flight import without_columns
 from airtouch.gap.signatures import candidates
-from gap_flights import fly
-from hovers import FLOOR, hover
+from gap_flights import VEHICLE, fly
 
 
 @pytest.mark.parametrize("start", [0.05, 3.0])
@@ -26,26 +25,15 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
     assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
 
 
-@pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])
-def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
-    """Against the best of a thousand strengths by the whole likelihood; one is less than the floor has."""
-    data = Data(FLOOR, [hover(1, louder=louder, length_s=12.0)])
-    problem = problem_of(data, whole_of(data))
-    (noise,) = candidates.terms("imu_noise")
-    values, other = problem.elements.base, beside * problem.elements.power
-    found = strongest(problem, noise, values, other)
-    strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
-    terms = [noise.fitted(np.full(1, x)) for x in strengths]
-    levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
-    best = strengths[int(np.argmax(levels))]
-    assert noise.scaled(found.values)[0] == pytest.approx(best, rel=0.01)
-    level = problem.likelihood(values, other + problem.random_power([found]))
-    assert level > max(levels) - 1e-2 and (best > 2.0 * LEAST_STRENGTH) == (louder > 1.0)
-
-
-def test_a_random_effect_that_adds_no_power_stays_as_it_is():
-    data = Data(FLOOR, [hover(1, length_s=12.0)])
-    problem = problem_of(data, whole_of(data))
-    (noise,) = candidates.terms("imu_noise")
-    elsewhere = replace(noise, gate=(("another flight", 0.0, 12.0),))
-    assert strongest(problem, elsewhere, problem.elements.base, np.zeros(len(problem.elements.base))) is elsewhere
+def test_a_fit_goes_on_until_it_stands_still(study):
+    """A battery's strength, charge and capacity lie along a bent valley; from its bottom nothing more is gained."""
+    true = {"strength": 1.3, "charge": 0.7, "capacity": 1.0}
+    data = Data(study, [without_columns(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
+    blocks, term = whole_of(data), candidates.terms("battery_sag")[0].refined()
+    start = fit(data, blocks, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
+    result = converged(data, blocks, start)
+    refit = fit(data, blocks, result.terms, result.scaled)
+    level = judge(data, blocks, result.terms)
+    assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
+    assert judge(data, blocks, refit.terms) < level + SETTLED
+    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED

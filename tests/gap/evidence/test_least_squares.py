@@ -8,12 +8,13 @@ from scipy.optimize import lsq_linear, minimize_scalar
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.flattened import Offset
-from airtouch.gap.evidence.least_squares import bounded_step, normal_equations, weights_of, without_offsets
+from airtouch.gap.evidence.least_squares import Bounds, bounded_step, normal_equations, weights_of, without_offsets
 from airtouch.gap.evidence.problem import problem_of, whole_of
 from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.command_view import LikelihoodSlopes
 from hovers import FLOOR, hover
 
-FREE = np.full(3, -9.0), np.full(3, 9.0)
+FREE = Bounds(np.full(3, -9.0), np.full(3, 9.0))
 
 
 @pytest.fixture
@@ -74,7 +75,8 @@ def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(sy
     rng = np.random.default_rng(1)
     jacobian, misfit = rng.normal(size=(8, 3)), rng.normal(size=8)
     equations = normal_equations(columns, prior, values, weights, np.zeros(3))
-    step, _ = bounded_step(equations.with_power(jacobian.T @ misfit, jacobian.T @ jacobian), np.zeros(3), FREE)
+    elsewhere = LikelihoodSlopes(jacobian.T @ misfit, jacobian.T @ jacobian)
+    step, _ = bounded_step(equations.with_power(elsewhere), np.zeros(3), FREE)
     both = np.linalg.lstsq(np.vstack([rows, jacobian]), np.concatenate([aim, np.zeros(3), misfit]), rcond=None)[0]
     np.testing.assert_allclose(step, both, rtol=1e-9)
     damped, _ = bounded_step(equations, np.zeros(3), FREE, damping=1.0)

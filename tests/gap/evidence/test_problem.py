@@ -7,8 +7,8 @@ import pytest
 
 from airtouch.gap.evidence import problem
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.flattened import flattened
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, problem_of, whole_of
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.signals.channels import TORQUE
@@ -18,7 +18,7 @@ from gap_flights import VEHICLE, flight
 
 
 def test_without_a_response_torque_counts_in_the_means_alone():
-    """Whoever makes the data: the arm of the declared vehicle, the seconds of a known wake."""
+    """Of data of any part of the diagnosis: the declared vehicle, the seconds of a known wake."""
     data = Data(declared_study(VEHICLE, ()), [flight(20.0)])
     keep = problem_of(data, whole_of(data)).flat.layout.keep[AIR]
     assert data.means_only and keep[:FIRST_BIN, TORQUE].all() and not keep[FIRST_BIN:, TORQUE].any()

@@ -64,7 +64,7 @@ def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, uncert
         return problem.likelihood(values, of_loop.power) - of_loop.cost
 
     added = problem.loop_power(active_at(MEAN, AT), uncertain_floor).power
-    gradient, information = slopes.power_equations(AT, values, added, uncertain_floor)
+    gradient, information = slopes.power_slopes(AT, values, added, uncertain_floor)
     for i in range(len(AT)):
         expected = central(level, i)
         assert gradient[i] == pytest.approx(expected, rel=0.03)

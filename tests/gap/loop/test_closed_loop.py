@@ -8,8 +8,9 @@ from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.edges import edge_response
-from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.flights import flight
 from airtouch.gap.loop import command_spectra, controller, identify, loop_model, noise_spectra
 from airtouch.gap.loop.axis_plant import axis_plant
@@ -52,8 +53,8 @@ def held_out_gain(study, flights, name):
     for term in terms(name):
         gain, values = 0.0, []
         for train, test in (halves, halves[::-1]):
-            result = fit.fit(data, train, (term,))
-            gain += fit.judge(data, test, result.terms) - fit.judge(data, test, ())
+            result = fit(data, train, (term,))
+            gain += judge(data, test, result.terms) - judge(data, test, ())
             values.append(result.terms[0].values)
         best = max(best, (gain, {k: np.mean([v[k] for v in values]) for k in values[0]}), key=lambda b: b[0])
     return best

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from airtouch.gap.diagnosis import diagnose_with_study
-from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.nameless import model
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import WIDEST
@@ -63,8 +64,8 @@ def test_an_effect_with_its_name_beats_the_model_without(study):
     data = Data(study, fly(1, 47, {"com_offset": {"x": 0.001, "y": 0.0}}))
     parts = halves(data)
     (term,) = candidates.terms("com_offset")
-    fits = [fit.fit(data, p, (term,)) for p in parts]
-    effect_gain = sum(fit.judge(data, parts[1 - k], f.terms) - fit.judge(data, parts[1 - k], ())
+    fits = [fit(data, p, (term,)) for p in parts]
+    effect_gain = sum(judge(data, parts[1 - k], f.terms) - judge(data, parts[1 - k], ())
                       for k, f in enumerate(fits))
     before = sum(model.held_out_gains(data, parts, [(), ()]))
     after = sum(model.held_out_gains(data, parts, [f.terms for f in fits]))
@@ -75,7 +76,7 @@ def beside(study, term, values, seed):
     """What columns gain beside an effect, without and with those that the effect itself makes."""
     data = Data(study, fly(1, seed, {term.name: values}))
     parts = halves(data)
-    fits = [fit.fit(data, p, [term]).terms for p in parts]
+    fits = [fit(data, p, [term]).terms for p in parts]
     gain = model.held_out_gains(data, parts, fits)[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(model, "allowed_columns", lambda *_: np.ones(WIDEST, bool))

@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import cell_in_words, shortfall
 from airtouch.gap.evidence.cells import CELLS, REST_VIEW, VIEW_STRIDE, place_of
-from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.over_prediction import over_prediction_by_channel, over_prediction_of

@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import t as student
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import policy
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, passing_effects

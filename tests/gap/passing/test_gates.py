@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.policy import PASSING_GAIN

@@ -28,9 +28,10 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
 
 def shrink_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
                       ) -> dict[str, Shrink]:
-    """The shrink with the vehicle as its file declares it ("declared") and as calibrated on a baseline ("calibrated").
+    """How far the effects named close the gap with each of two models of the vehicle; the JSON's `arms`.
 
-    The effects named are fitted anew beside the declared vehicle. Without a baseline the answer's own is "declared".
+    "declared": the vehicle as its file declares it, the effects fitted anew beside it; "calibrated": the vehicle as
+    calibrated on the baseline flights, from which the answer is. Without a baseline the answer itself is "declared".
 
     declared: the study of the vehicle as declared, None where the answer is held against that already; judged: the
     flights that the answer comes from; answer: names an effect.

@@ -22,8 +22,9 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import CORRELATION_S, nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, strength_variance
+from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.closed_loop import ClosedLoop
@@ -34,7 +35,8 @@ from airtouch.gap.signatures.term import Term
 #: fraction of a parameter by which the replay may be wrong: strong effects in eight simulated flights came out up to
 #: 0.26 % off, rms 0.14 % (`python tools/simulation/replay_error.py`)
 REPLAY_ERROR = 0.002
-#: fraction of a parameter by which the model of a random effect's spectrum may be wrong; chosen
+#: fraction of a parameter by which the model of a random effect's spectrum may be wrong; chosen. A larger number makes
+#: the intervals wider
 SPECTRUM_ERROR = 0.1
 #: fraction of a parameter by which the loop's model may be wrong: replayed inertia and late sensors lay 27 and 29 %
 #: off, the median of nine flights of two opened sealed sets

@@ -10,16 +10,20 @@ from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.study import Study
 from airtouch.simulation import signals as at
 
-FEWEST_RANKED = 8  #: blocks that do not overlap, from which on a rank correlation is tested; chosen
-CHANCE = 0.01  #: probability of a correlation by chance alone, all signals together (Bonferroni); chosen
+#: least number of blocks that do not overlap for which a rank correlation is tested; chosen. A larger number names no
+#: signal in short flights
+FEWEST_RANKED = 8
+#: probability of a correlation by chance alone, all signals together (Bonferroni); chosen. A larger number names more
+#: signals that the gap does not follow
+CHANCE = 0.01
 LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; far below any measured
 
 
 def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
-    """Names of the signals whose mean over a block ranks like a cell's power (Spearman), the closest first.
+    """Names of the signals whose block means correlate in rank with a cell's power (Spearman), the closest first.
 
-    ratios: flights with the cell's rms over its floor (blocks,), NaN in blocks that do not count. A signal that not
-    every flight has is left out.
+    ratios: flights, each with the cell's rms over its floor (blocks,), NaN in blocks that do not count. A signal that
+    not every flight has is left out.
     """
     from scipy.stats import spearmanr  # slow to import, and seldom needed
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from airtouch.gap.answer.estimates import Estimate, from_spectra, from_times, with_reading
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import SETTLED, FittedTerms, fit, judge
+from airtouch.gap.evidence.fit import FittedTerms, converged, fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.naming.records import Candidate, Selection
 from airtouch.gap.relations.readout import Reading
@@ -15,8 +16,9 @@ from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
-SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data; chosen
-RESTARTS = 12  #: of a fit of several parameters, at most; chosen
+#: nats that another shape of an effect must gain on all the data; chosen. A larger number more often keeps the shape
+#: that the halves of the data chose
+SHAPE_PRICE = 1.0
 #: lower bound of the divisor of a random part, the effect's strength; chosen, far below any that is named
 LEAST_DIVISOR = 1e-6
 
@@ -62,24 +64,6 @@ def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: n
             if gain > level:
                 best, level, chosen[i] = trial, gain, shaped
     return converged(data, all_blocks, best)
-
-
-def converged(data: Data, all_blocks: BlockSet, best: FittedTerms) -> FittedTerms:
-    """The fit, begun anew where it ended until that gains nothing.
-
-    Parameters that trade against each other, as a battery's charge and capacity, lie along a bent valley, which one fit
-    leaves off half way: strengths of seven simulated batteries came out up to a third too small.
-    """
-    level = judge(data, all_blocks, best.terms)
-    for _ in range(RESTARTS if len(best.scaled) > 1 else 0):
-        again = fit(data, all_blocks, best.terms, best.scaled)
-        reached = judge(data, all_blocks, again.terms)
-        if reached > level:
-            best = again
-        if reached < level + SETTLED:
-            break
-        level = reached
-    return best
 
 
 def with_random_part(effect: NamedEffect, part: Term) -> NamedEffect:

@@ -22,11 +22,11 @@ from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_sp
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
-MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen
+MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen; more make a report longer
 #: Hz up to which a signal is drawn at least: the lowest band alone is nearly a constant; chosen, the end of the second
 LEAST_HIGHEST_HZ = 2.0
 #: blocks of nominal flights from which on the power measured there is drawn as the floor of a spectrum; with fewer the
-#: declared noise of the sensors is; chosen
+#: declared noise of the sensors is; chosen. A smaller number draws a floor that is itself noise
 FEWEST_DRAWN_BLOCKS = 9
 LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel's unit squared/Hz; chosen
 

@@ -12,39 +12,44 @@ from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
 
 AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
-#: nats of held-out log likelihood by which two candidates differ that can be told apart; chosen: odds of 20
+#: nats of held-out log likelihood by which two candidates differ that can be told apart; chosen: odds of 20. A larger
+#: number lists more pairs as alike that the flights do tell apart
 TOLD_APART = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
-    """The verdict: "none", "effect" or "unknown", by the first of these that holds:
+    """The verdict, by the first of these rules that holds.
 
-    1. the replay decides, and the gap is at its floor: "none", whatever small differences add up to;
-    2. what is left beside the effects named is more than chance leaves: "unknown";
-    3. no effect is named: "none"; else "effect".
-
-    Rule 1 does not hold where the gap cannot show the effects:
-
-    - every effect named acts in the logged times alone, or passes: the times are no part of the gap, and what passes
-      is seldom in both halves of the data, in whose common part the gap is measured;
-    - in simulated flights, the effects named bring the cells nearer to the floor, from above or from below;
-    - in simulated flights, the logged times are irregular, as no nominal simulated flight's are.
+    1. "none": the gap is at its floor, and nothing acts that the gap cannot show (`_acts_outside_the_gap`). Where the
+       relations of signals decide, this rule is skipped.
+    2. "unknown": more speaks against the effects named than chance allows (`unknown.is_explained`).
+    3. "effect": at least one effect is named.
+    4. "none": no effect is named.
     """
-    if selection.inference is None and _at_its_floor(data, selection, gap):
+    replay_decides = selection.inference is None
+    if replay_decides and gap.shrink.before <= AT_FLOOR and not _acts_outside_the_gap(data, selection, gap):
         return "none"
     if not is_explained(selection):
         return "unknown"
     return "none" if selection.named_hypothesis is None else "effect"
 
 
-def _at_its_floor(data: Data, selection: Selection, gap: Gap) -> bool:
-    """Whether rule 1 of `verdict_of` holds, but for the relations of signals: no gap, where a gap could show."""
+def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
+    """Whether something acts that a gap at its floor cannot show. Any one of three signs is enough.
+
+    1. Every effect named is an error of the logged times or passes. The times are no part of the gap. The gap is
+       measured in what both halves of the data show, and an effect that passes is seldom in both.
+    2. In simulated flights: what the logged times hold beside the effects is more than chance allows.
+    3. In simulated flights: the effects named bring the cells nearer to the floor, be it from below. In recorded
+       flights less power than the floor means calm air.
+    """
     hypothesis = selection.named_hypothesis
-    outside_the_gap = hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms)
-    if gap.shrink.before > AT_FLOOR or outside_the_gap:
+    if hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms):
+        return True
+    if not data.study.simulated:
         return False
-    odd_times = selection.nameless.of_times > against(selection).limit
-    return not data.study.simulated or not (odd_times or nearer(data, selection.halves, hypothesis, gap))
+    irregular_times = selection.nameless.of_times > against(selection).limit
+    return irregular_times or nearer(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

@@ -1,9 +1,14 @@
-"""How far: the gap before and after an effect is in the model, on data that it was not fitted on.
+"""How far an effect closes the gap, on data that it was not fitted to.
 
-Gap is the rms of the whitened spectra (floor 1) over the cells, view by channel by band, in which the other half of the
-data shows one, or in which the effects named gain there. A cell's own floor is 1 by definition: where less is left, the
-flights were calmer than nominal ones by so much, and that is taken off the floor, not off the gap. An energy is the
-square of a whitened value, of mean 1 at the floor.
+An **energy** is the power of one value of the spectra over its floor: 1 on average where nothing acts. The **gap** is
+the root of the mean energy over some cells (channel by band by view), so that its floor is 1. The cells are those in
+which the other half of the data shows a gap, or in which the effects named gain there. The **shrink** (`Shrink`, in the
+JSON `shrink`) is the gap before and after effects are in the model, and the fraction of it above the floor that they
+close.
+
+Where the effects named leave less energy than 1, the flights were flown in calmer air than nominal ones. The missing
+energy, the **deficit**, is added to every energy before and after: the floor of these flights is lower, and what lies
+below 1 is not counted as closed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +19,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import CELL_GAIN, LeftOver, cell_gains, left_over
+from airtouch.gap.evidence.judge import CELL_GAIN, LeftOver, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Quantity, Shrink
@@ -22,31 +27,40 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 
-#: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen. The error is that of
-#: exponential energies of mean 1, of which OVERLAP_WEIGHT of all are independent
+#: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor; chosen against cells that stand
+#: out by chance. A larger number overlooks weak gaps. The error is that of exponential energies of mean 1, of which the
+#: fraction OVERLAP_WEIGHT is independent
 STANDARD_ERRORS = 4.0
-MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen
-FEWEST_VALUES = 12  #: values that a cell needs; chosen
-DRAWS = 400  #: bootstrap samples of the shrink; chosen, the ends of its interval then vary little
-PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws; chosen
+#: energy, in units of the floor, by which a cell must exceed it however many values it has; chosen. A larger number
+#: overlooks weak gaps, a smaller one takes small errors of the floor for gaps
+MARGIN = 0.2
+FEWEST_VALUES = 12  #: values that a cell needs; chosen. A larger number leaves out the lowest bands of short flights
+DRAWS = 400  #: bootstrap samples of the fraction closed; chosen, the ends of its interval then vary little
+#: equal parts of the held-out values, at most, which the bootstrap draws; chosen. With a larger number the parts are
+#: shorter, and neighbours that vary together make the interval too narrow
+PIECES = 24
 SEED = 0  #: of the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
-LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap; chosen
-LEAST_EXCESS = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given; chosen
-JITTER_PIECES = 8  #: parts of a flight, of which every other one is a half of the data; chosen
+LARGEST = 1e4  #: largest energy of a value, so that a spike makes no gap; chosen. A larger number lets one decide
+#: gap above the floor, in units of it, up to which the fraction closed is said to be 0; chosen. A larger number gives
+#: none for small gaps, a smaller one a ratio of two noises
+LEAST_EXCESS = 0.02
+#: parts of a flight, of which every other one is a half of the data; chosen. With a smaller number a slow change of the
+#: jitter counts as what the halves differ by
+JITTER_PIECES = 8
 
 
 @dataclass(frozen=True)
 class Gap:
     """A gap on held-out data, and how far the effects named close it.
 
-    cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; calm: by how much the
-    energy there (floor 1) is below nominal flights' once the effects named are in the model; energies_before
-    (n,): energies without any effect, calm added; shrink: by the effects named.
+    cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; deficit: by how much the
+    mean energy there is below 1 once the effects named are in the model, 0 at least; energies_before (n,): energies
+    without any effect, the deficit added; shrink: by the effects named.
     """
 
     cells: tuple[np.ndarray, np.ndarray]
-    calm: float
+    deficit: float
     energies_before: np.ndarray
     shrink: Shrink
 
@@ -56,17 +70,17 @@ def gap_of(data: Data, parts: Sequence[BlockSet], hypothesis: Candidate | None) 
     terms = _terms(hypothesis)
     cells = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
     after = _energies(data, parts, terms, cells)
-    calm = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
-    before = calm + _energies(data, parts, ((), ()), cells)
-    shrink = shrink_of_jitter(data) if _only_jitter(hypothesis) else _shrink(before, calm + after)
-    return Gap(cells, calm, before, shrink)
+    deficit = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
+    before = deficit + _energies(data, parts, _terms(None), cells)
+    shrink = shrink_of_jitter(data) if _only_jitter(hypothesis) else _shrink(before, deficit + after)
+    return Gap(cells, deficit, before, shrink)
 
 
 def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:
     """How far another hypothesis than the effects named closes the gap of two halves."""
     if _only_jitter(candidate):
         return shrink_of_jitter(data)
-    return _shrink(gap.energies_before, gap.calm + _energies(data, parts, _terms(candidate), gap.cells))
+    return _shrink(gap.energies_before, gap.deficit + _energies(data, parts, _terms(candidate), gap.cells))
 
 
 def _only_jitter(candidate: Candidate | None) -> bool:
@@ -76,7 +90,7 @@ def _only_jitter(candidate: Candidate | None) -> bool:
 
 
 def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:
-    """The shrink from held-out energies (n,) without and with effects."""
+    """The shrink from held-out energies (n,) without and with effects; without any energy the gap is at its floor."""
     if not len(before):
         return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
     return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
@@ -84,10 +98,10 @@ def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:
 
 
 def shrink_of_jitter(data: Data) -> Shrink:
-    """The shrink where only the logged times are odd: how well the jitter of one half predicts the other's.
+    """The shrink where only the logged times are irregular: how well the jitter of one half predicts the other's.
 
-    Gap is the rms of the logged times around regular ones, over that of nominal flights. After: the floor and what the
-    halves differ by. Two numbers give no interval.
+    The gap is the rms of the logged times around regular ones, over that of nominal flights. After an effect is in the
+    model, what is left is the floor and what the halves differ by. Two numbers give no interval.
     """
     floor = nominal_jitter_s(data.study)
     rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
@@ -100,16 +114,17 @@ def shrink_of_jitter(data: Data) -> Shrink:
 
 
 def share_closed(before: float, after: float) -> float:
-    """Share of the gap that is gone, (rms before - rms after) / (rms before - 1), within -1 and 1; the floor is 1.
+    """Fraction of the gap above the floor that is closed, (rms before - rms after) / (rms before - 1), within -1 and 1.
 
-    before, after: energies, the squares of these rms values. A gap of LEAST_EXCESS or less has no share: 0.
+    before, after: mean energies, the squares of these rms values; the floor is 1. The fraction is 0 where the gap is no
+    more than LEAST_EXCESS above the floor.
     """
     over = np.sqrt(before) - 1.0
     return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_EXCESS else 0.0
 
 
 def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
-    """Ends of the share's 90 % interval by block bootstrap of the held-out energies (n,) before and after."""
+    """Ends of the 90 % interval of `share_closed`, by block bootstrap of held-out energies (n,) before and after."""
     pieces = min(PIECES, len(before))
     means_before, means_after = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
     drawn = np.random.default_rng(SEED).integers(0, pieces, (DRAWS, pieces))
@@ -124,7 +139,7 @@ def nearer(data: Data, parts: Sequence[BlockSet], candidate: Candidate | None, g
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
     """
-    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (((), ()), _terms(candidate)))
+    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (_terms(None), _terms(candidate)))
     return within < without
 
 
@@ -151,9 +166,9 @@ def _energies(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Te
 
 def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """For each half, cell number (n,) and energy (n,) over the floor of its values in the cells.
+    """For each half, cell number (n,) and energy (n,) of its values in the cells.
 
-    The energy is what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
+    The energy is that of what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
         remainder = left_over(data, parts[half], terms[1 - half])
@@ -176,5 +191,5 @@ def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarr
 
 
 def _energy(remainder: LeftOver) -> np.ndarray:
-    """Energy (n,) of each value over the floor, LARGEST at most."""
+    """Energy (n,) of each value, LARGEST at most."""
     return np.minimum(squared(remainder.gap) / remainder.power, LARGEST)

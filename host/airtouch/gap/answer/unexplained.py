@@ -18,18 +18,19 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
 
-MOST_CELLS = 5  #: cells that are reported; chosen, what a reader can take in
+MOST_CELLS = 5  #: most cells that are reported; chosen, as many as a reader can take in
 
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
                 ) -> list[OpenCell]:
-    """What the effects leave in the cells with most of the gap before any, with the flight in which it is largest.
+    """What stays open: cells of the map, each with the flight and the seconds of its phase in which most is left.
 
-    The effects are those of the last step, deviations included, with the values fitted to the first half of the data,
-    as `Candidate.terms` has them. The parameters in the answer are fitted to all of it (`named_effects`). So here the
-    second half is held out and the first is not: where halves are whole flights, less is left in those of the first.
+    cells: the headline, then the others, those with the largest gap before any effect first. Of these the first
+    MOST_CELLS are reported, without those on the ground and those of one regime alone.
 
-    cells: the headline, then the others, largest first. The stretch of time lies in the phase of the cell.
+    What is left is measured minus modelled with the effects of the last step, deviations included, at the values fitted
+    to the first half of the data (`Candidate.terms`), not at those of the answer, which are fitted to all of it
+    (`named_effects`). So the second half is held out and the first is not: less is left in the flights of the first.
     """
     terms = selection.last_step.fits[0].terms if selection.last_step and selection.last_step.fits else ()
     active = [t.active() for t in mean_of(terms)]

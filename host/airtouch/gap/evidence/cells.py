@@ -1,7 +1,13 @@
-"""Cells of flattened spectra: each is one channel in one band of frequencies of one view.
+"""Cells of flattened spectra: each is one channel in one band of frequencies of one view, and has a number.
 
-A cell's number is VIEW_STRIDE times the number of its view, plus COUNT times that of its band, plus that of its
-channel.
+    number = VIEW_STRIDE * view + COUNT * band + channel        `cell_numbers`; `parts_of` is its inverse
+
+view: REPLAY_VIEW, REST_VIEW or COMMAND_VIEW; channel: its place in `channels.CHANNELS`, of which there are COUNT; band:
+its place in `blocks.BANDS_HZ`, counted from 0, but from 1 in the command view (COMMAND_FIRST_BAND). So band 0 is the
+one with the means, which the command view does not have.
+
+`channel_cells`, `sensor_cells` and `band_cells` make groups of cells: they give each cell the number of the first cell
+of its group.
 """
 
 from typing import NamedTuple
@@ -12,33 +18,45 @@ from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import CHANNELS, COUNT
 
-REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: numbers of the views: in the air, on the ground, of the commands
-VIEW_STRIDE = 1000  #: numbers that each view has for its cells; chosen, more than any view has
+REPLAY_VIEW, REST_VIEW, COMMAND_VIEW = 0, 1, 2  #: views: of the replay in the air, on the ground, of the commands
+VIEW_STRIDE = 1000  #: numbers that each view has for its cells; chosen, more than any view needs
 CELLS = 3 * VIEW_STRIDE  #: numbers of cells are below it
+COMMAND_FIRST_BAND = 1  #: number of the lowest band in the command view
 NYQUIST_HZ = 0.5 / PERIOD_S  #: end of the highest band
-SENSOR_AXES = 3  #: channels of one sensor (x, y and z), whose numbers follow one another
+SENSOR_AXES = 3  #: channels of one sensor (x, y and z), which follow one another in `channels.CHANNELS`
+
+
+class CellParts(NamedTuple):
+    """The parts of cells' numbers: view, band and channel, integers (n,); of one number one integer each."""
+
+    view: np.ndarray
+    band: np.ndarray
+    channel: np.ndarray
 
 
 class CellPlace(NamedTuple):
-    """Where a cell is: number of its view, name of its channel, ends of its band."""
+    """What a cell stands for: number of its view, name of its channel, ends of its band."""
 
     view: int
     channel: str
     band_hz: tuple[float, float]
 
 
-def cell_numbers(view: int, band: np.ndarray, channel: np.ndarray) -> np.ndarray:
-    """Numbers of the cells of bands and channels, two arrays of integers that broadcast together.
-
-    Bands count from 0, those of the command view from 1: its values hold no means, and `above_means` asks the number.
-    """
+def cell_numbers(view: np.ndarray | int, band: np.ndarray, channel: np.ndarray) -> np.ndarray:
+    """Numbers of the cells of views, bands and channels, which broadcast together."""
     return band * COUNT + channel + VIEW_STRIDE * view
 
 
+def parts_of(cell: np.ndarray | int) -> CellParts:
+    """View, band and channel of cells by their numbers: the inverse of `cell_numbers`."""
+    view, within = np.divmod(cell, VIEW_STRIDE)
+    return CellParts(view, *np.divmod(within, COUNT))
+
+
 def channel_cells() -> np.ndarray:
-    """For each cell (CELLS,) the number that stands for its view and channel, all bands together."""
-    cell = np.arange(CELLS)
-    return cell - cell % VIEW_STRIDE + cell % VIEW_STRIDE % COUNT
+    """For each cell (CELLS,) the number of the first cell of its view and channel, all bands together."""
+    view, _, channel = parts_of(np.arange(CELLS))
+    return cell_numbers(view, np.zeros_like(channel), channel)
 
 
 def sensor_cells() -> np.ndarray:
@@ -46,24 +64,24 @@ def sensor_cells() -> np.ndarray:
 
     A sensor has SENSOR_AXES channels; of the commands thrust, roll and pitch count as one, yaw as another.
     """
-    cell = np.arange(CELLS)
-    return cell - cell % VIEW_STRIDE % COUNT % SENSOR_AXES
+    view, band, channel = parts_of(np.arange(CELLS))
+    return cell_numbers(view, band, channel - channel % SENSOR_AXES)
 
 
 def band_cells() -> np.ndarray:
     """For each cell (CELLS,) the number of the first cell of its view and band, all channels together."""
-    cell = np.arange(CELLS)
-    return cell - cell % VIEW_STRIDE % COUNT
+    view, band, _ = parts_of(np.arange(CELLS))
+    return cell_numbers(view, band, np.zeros_like(band))
 
 
 def above_means() -> np.ndarray:
-    """Whether each cell (CELLS,) is in a band above the lowest, which has the means; every cell of the commands is."""
-    return np.arange(CELLS) % VIEW_STRIDE >= COUNT
+    """Whether each cell (CELLS,) is in a band above band 0, which has the means; every cell of the commands is."""
+    return parts_of(np.arange(CELLS)).band > 0
 
 
 def place_of(cell: int) -> CellPlace:
-    """The place of the cell of a number."""
-    view, place = divmod(cell, VIEW_STRIDE)
-    band, channel = divmod(place, COUNT)
-    low, high = BANDS_HZ[max(band - (view == COMMAND_VIEW), 0):][:2]
+    """What the cell of a number stands for."""
+    view, band, channel = (int(part) for part in parts_of(cell))
+    lowest = COMMAND_FIRST_BAND if view == COMMAND_VIEW else 0
+    low, high = BANDS_HZ[max(band - lowest, 0):][:2]
     return CellPlace(view, CHANNELS[channel].name, (low, min(high, NYQUIST_HZ)))

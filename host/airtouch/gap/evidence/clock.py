@@ -12,10 +12,13 @@ from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 
-#: shares of lost samples in nominal flights at least: without a loop, and with one; both chosen
+#: least fraction of lost samples that nominal flights are taken to have, without a model of the loop and with one; both
+#: chosen, as a few flights may have lost none. A larger number overlooks small losses
 LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
-SAMPLES_OF_ONE = 2.0  #: samples that count as one independent value of being lost; chosen
-CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen
+#: samples that count as one independent value of being lost; chosen, as losses come in runs. A larger number gives a
+#: loss less evidence
+SAMPLES_OF_ONE = 2.0
+CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen. A larger number gives a jitter less evidence
 
 
 class TimesFault(NamedTuple):
@@ -61,19 +64,26 @@ def loss(data: Data) -> TimesFault:
     return TimesFault(share, float(n * (share * np.log(share / nominal) + arrived)))
 
 
-def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
+class MeasuredTerm(NamedTuple):
     """An effect on the logged times with its parameter as measured, and its gain, nats."""
+
+    term: Term
+    gain: float
+
+
+def clock_gain(data: Data, term: Term) -> MeasuredTerm:
+    """The effect with the size of the fault that it stands for: of lost rows or of jitter."""
     fault = loss(data) if term.signature.loses_rows else jitter(data)
-    return term.fitted(np.array([fault.size / term.step(term.free[0])])), fault.gain
+    return MeasuredTerm(term.fitted(np.array([fault.size / term.step(term.free[0])])), fault.gain)
 
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
     """Log likelihood that those effects gain that act on the logged times, among others that do not."""
-    return sum(clock_gain(data, t)[1] for t in terms if t.shows_in == CLOCK)
+    return sum(clock_gain(data, t).gain for t in terms if t.shows_in == CLOCK)
 
 
 def clock_left(data: Data, terms: Sequence[Term]) -> float:
-    """Log likelihood of the logged times that effects do not explain."""
+    """Nats that the logged times gain beyond nominal flights', less those of the faults that effects explain."""
     of_times = [t for t in terms if t.shows_in == CLOCK]
     loss_explained = any(t.signature.loses_rows for t in of_times)
     jitter_explained = any(not t.signature.loses_rows for t in of_times)

@@ -1,4 +1,7 @@
-"""Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says."""
+"""Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says.
+
+COUNT: the channels of `signals.channels`, in whose units the spectra are.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -16,16 +19,20 @@ from airtouch.gap.study import Study
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
-KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights that are not long; chosen for memory
-KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached; chosen for memory
+# Of these three a larger number needs more memory, a smaller one computes more spectra anew.
+KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights that are not long; chosen
+KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached; chosen
 LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are; chosen
-Spectra = dict[str, np.ndarray]  #: of one flight by state, (blocks, bins, COUNT)
+Spectra = dict[str, np.ndarray]  #: of one flight by state (AIR, REST), complex (blocks, bins, COUNT), unit/sqrt(Hz)
 BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Flights with their blocks and the spectra of the gap before any effect is added, each made at its first use."""
+    """Flights with their blocks and the spectra of the gap before any effect is added, each made at its first use.
+
+    study: what nominal flights show; flights: those that are judged; workspace: what is cached of them.
+    """
 
     study: Study
     flights: Sequence[Flight]
@@ -77,10 +84,11 @@ class Data:
 
 
 def gap_spectra(data: Data, active: Sequence[Active], flights: Iterable[int] | None = None) -> list[Spectra]:
-    """Spectra of the gap with effects in the model, by flight and state; commands are the command view's.
+    """Spectra of the gap with effects in the model, by flight and state.
 
-    Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
-    flights: numbers of those that are worked out, all by default; the others' are empty.
+    The channels of the commands are 0: the command view judges them. Where nominal flights show how the gyro follows
+    the commands (`Study.response`), torque is compared with what that leads to expect, else with the replay's.
+    flights: places in `Data.flights` of those that are worked out, all by default; the others' are empty.
     """
     needed = range(len(data.flights)) if flights is None else set(flights)
     return [_gap_of(data, i, active) if i in needed else {} for i in range(len(data.flights))]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
+from airtouch.gap.evidence.cells import COMMAND_FIRST_BAND, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data, Spectra
 from airtouch.gap.evidence.layout import AirBlocks, Layout, Piece
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail_scale
@@ -19,8 +19,10 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, sh
 from airtouch.gap.workspace import Workspace
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-FREEDOM_OF_BLOCK = 3.0  #: degrees of freedom that the floor has from each nominal block; chosen
-LEAST_FREEDOM = 2.0  #: degrees of freedom of the floor, however few its blocks are; chosen
+#: degrees of freedom that each nominal block adds to the floor's; chosen. A larger number trusts a floor of few blocks
+#: more than it may, so that what is only an error of the floor counts as evidence
+FREEDOM_OF_BLOCK = 3.0
+LEAST_FREEDOM = 2.0  #: degrees of freedom of the floor, however few its blocks are; chosen. A larger number errs alike
 
 
 class Offset(NamedTuple):
@@ -35,7 +37,7 @@ class Offset(NamedTuple):
     spread: float
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """What a unit offset adds, complex (k,), at other places (k,), each named once; 0 where it changes nothing."""
+        """What a unit offset adds, complex (k,), to the values at k places, all different; 0 where it changes none."""
         out = np.zeros(len(places), complex)
         _, there, here = np.intersect1d(places, self.places, assume_unique=True, return_indices=True)
         out[there] = self.column[here]
@@ -46,9 +48,10 @@ class Offset(NamedTuple):
 class Elements:
     """What is known of flattened values (n,) before any hypothesis.
 
-    base: the gap without effects, unit/sqrt(Hz), 0 where it is not valid; power: its expected power, unit^2/Hz; valid:
-    bool, False where the log lacks what the value is made of; channel, flight: their numbers; freedom, tail_scale:
-    degrees of freedom and scale of the likelihood's tails.
+    base: complex, the gap without effects, unit/sqrt(Hz), 0 where it is not valid; power: its expected power,
+    unit^2/Hz; valid: bool, False where the log lacks what the value is made of; channel: its place in
+    `channels.CHANNELS`; flight: its place in `Data.flights`; freedom, tail_scale: degrees of freedom and scale of the
+    likelihood's tails.
     """
 
     base: np.ndarray
@@ -105,8 +108,8 @@ class Flattened:
         replay = self.layout.per_bin({state: cell_numbers(view, bands[state], np.arange(COUNT))
                                       for state, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
         elements = self.commands.elements
-        commands = cell_numbers(COMMAND_VIEW, np.digitize(elements.frequency, BANDS_HZ), elements.channel) \
-            if len(self.commands) else np.zeros(0)
+        command_bands = np.digitize(elements.frequency, BANDS_HZ) - 1 + COMMAND_FIRST_BAND
+        commands = cell_numbers(COMMAND_VIEW, command_bands, elements.channel) if len(self.commands) else np.zeros(0)
         return np.concatenate([replay, commands]).astype(int)
 
     def joined(self, replay: np.ndarray, commands: np.ndarray | float = 0.0) -> np.ndarray:

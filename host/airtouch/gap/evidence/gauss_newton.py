@@ -6,20 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of
+from airtouch.gap.evidence.least_squares import Bounds, bounded_step, bounds_of, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
 from airtouch.gap.signatures.term import Term, mean_places
 
-ITERATIONS = 8  #: steps at most; chosen
-LEAST_STEP_GAIN = 0.02  #: nats that a step must gain for the fit to go on; chosen
-TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen
-DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after one that failed; chosen
-FIRST_DAMPING = 0.01 / DAMPING_FACTOR  #: damping after the first step that failed, 0.1 but for its last bit; chosen
-ROUNDING = 1e-9  #: nats that a step must gain at least; chosen, above rounding
-COMMAND_PRIOR = 1.5  #: standard deviation, natural steps, of parameters of effects that only the commands show; chosen
-NEAR_NEUTRAL = 0.05  #: scaled parameter at which a new effect begins: some have no slope at neutral itself; chosen
-#: scaled parameters from which effects of the loop may start; chosen
+ITERATIONS = 8  #: most steps; chosen for time. A smaller number ends more fits before they stand still
+#: nats that a step must gain for the fit to go on; chosen for time. A larger number ends fits too early
+LEAST_STEP_GAIN = 0.02
+#: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen for time. With a smaller number
+#: more steps fail
+TRIES = 5
+DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after an attempt that failed; chosen
+#: damping after the first attempt that failed, 0.1 but for its last bit; chosen. A larger number makes shorter steps
+FIRST_DAMPING = 0.01 / DAMPING_FACTOR
+ROUNDING = 1e-9  #: nats that a step must gain at least, above what rounding may gain; chosen
+#: standard deviation, natural steps, of the prior of parameters that only the commands show; chosen. A larger number
+#: holds them back less
+COMMAND_PRIOR = 1.5
+NEAR_NEUTRAL = 0.05  #: scaled parameter at which a new effect begins, as some have no slope at neutral itself; chosen
+#: scaled parameters at which effects of the loop may begin; chosen. With fewer a fit may end at a lower peak
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
@@ -78,14 +84,15 @@ class _Step(NamedTuple):
 
 
 def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) -> MeanFit:
-    """Mean effects of highest posterior, from scaled parameters x (k,) on, in so many steps at most.
+    """Mean effects of highest posterior, from scaled parameters x (k,) on, in `most` steps at most.
 
-    The slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far
-    from where they were taken, takes them anew.
+    The slopes are kept from step to step, as most effects are close to linear. They are taken anew after a step that
+    failed, or that ended far from where they were taken. The fit ends with a step that gains less than LEAST_STEP_GAIN,
+    or that fails with slopes taken where it began.
     """
     problem, mean = posterior.problem, posterior.mean
-    low, high = limits(mean)
-    x, offsets, covariance = np.clip(x, low, high), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
+    bounds = bounds_of(mean)
+    x, offsets, covariance = np.clip(x, *bounds), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.offsets:
         return MeanFit(x, covariance, problem.elements.base)
     now = posterior.at(x, offsets)
@@ -94,22 +101,21 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
     for _ in range(most):
         slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
         before = now.cost
-        now, covariance, damping, gained = _step(posterior, slopes, now, (low, high), damping)
-        gain = before - now.cost if gained else 0.0
-        if gain < LEAST_STEP_GAIN and (gain > 0.0 or stuck or np.array_equal(now.x, slopes.at)):
+        now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
+        slopes_are_new = stuck or np.array_equal(now.x, slopes.at)
+        if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
             break
-        stuck = gain == 0.0
+        stuck = not gained
     return MeanFit(now.x, covariance, now.values)
 
 
-def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: tuple[np.ndarray, np.ndarray],
-          damping: float) -> _Step:
+def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: Bounds, damping: float) -> _Step:
     """A step, shortened until it gains, TRIES times at most."""
     problem, size = posterior.problem, len(now.x)
     equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior, now.values,
                                  weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
                                  problem.offsets)
-    equations = equations.with_power(*slopes.power_equations(now.x, now.values, now.power, posterior.uncertain_floor))
+    equations = equations.with_power(slopes.power_slopes(now.x, now.values, now.power, posterior.uncertain_floor))
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
@@ -135,7 +141,7 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
 
 def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, place: range) -> np.ndarray:
     """The parameters (k,) with that one of an effect's (`place`) moved to that entry of GRID that is likeliest."""
-    low, high = limits(mean)
+    low, high = bounds_of(mean)
     best, out = -np.inf, x
     for i, amount in itertools.product(place, GRID):
         trial = x.copy()

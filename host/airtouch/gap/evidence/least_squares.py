@@ -1,4 +1,7 @@
-"""Steps of weighted ridge regression on flattened spectra: those of a fit, and the offsets between flights."""
+"""Steps of weighted ridge regression on flattened spectra: those of a fit, and the offsets between flights.
+
+k: scaled parameters of mean effects; m: offsets; n: flattened values.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,21 +10,45 @@ import numpy as np
 
 from airtouch.gap.evidence.flattened import Offset
 from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.signals.command_view import LikelihoodSlopes
 from airtouch.gap.signals.spectra import LEAST_POWER, OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
+OFFSET_STEPS = 2  #: steps by which an offset is found; chosen for time. A larger number comes closer to the likeliest
+
+
+class Bounds(NamedTuple):
+    """Lowest and highest scaled parameters (k,)."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+class BoundedStep(NamedTuple):
+    """A step of parameters and offsets, change (k + m,), and the parameters' covariance (k, k)."""
+
+    change: np.ndarray
+    covariance: np.ndarray
+
+
+class WithoutOffsets(NamedTuple):
+    """The gap (n,) with offsets between flights subtracted, and what these cost, nats: minus the log of their prior."""
+
+    gap: np.ndarray
+    cost: float
+
 
 class NormalEquations(NamedTuple):
-    """Equations of a step of k parameters and m offsets: matrix (k + m, k + m) times the step is right (k + m,)."""
+    """Equations of a step: matrix (k + m, k + m) times the step is right (k + m,)."""
 
     matrix: np.ndarray
     right: np.ndarray
 
-    def with_power(self, gradient: np.ndarray, information: np.ndarray) -> "NormalEquations":
-        """These with gradient (k,) and information (k, k) of the likelihood from the power that parameters change."""
-        k, matrix, right = len(gradient), self.matrix.copy(), self.right.copy()
-        matrix[:k, :k] += information
-        right[:k] += gradient
+    def with_power(self, slopes: LikelihoodSlopes) -> "NormalEquations":
+        """These with what the parameters gain by changing the expected power, as `SpectraSlopes.power_slopes` says."""
+        k, matrix, right = len(slopes.gradient), self.matrix.copy(), self.right.copy()
+        matrix[:k, :k] += slopes.information
+        right[:k] += slopes.gradient
         return NormalEquations(matrix, right)
 
 
@@ -51,19 +78,20 @@ def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarr
     return NormalEquations(matrix, right)
 
 
-def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
-                 damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the equations for a step (k + m,) within bounds; return it and the covariance (k, k) of the parameters.
+def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: Bounds, damping: float = 0.0) -> BoundedStep:
+    """The step that solves the equations, but for parameters at a bound.
 
-    A parameter at a bound that the step would pass stays there, and the others are solved without it.
+    A parameter at a bound that the step would pass stays there, and the others are solved without it. Its variance is
+    that of a parameter beside which all others are known. The end of the step may lie beyond a bound, if it does not
+    begin there: the caller clips it.
 
-    x (k,): parameters where the step begins; bounds (k,) each: lowest and highest; damping: share of the matrix's
-    diagonal that is added to it for the step.
+    x (k,): parameters where the step begins; damping: fraction of the matrix's diagonal that is added to it for the
+    step, but not for the covariance (Levenberg-Marquardt).
     """
     matrix, right = equations
     n, (low, high) = len(x), bounds
     free = np.ones(len(right), bool)
-    # of parameters at a bound it stays so, as if all others were known
+    # what stays of it below is that of parameters at a bound
     covariance = np.diag(1.0 / np.maximum(np.diag(matrix)[:n], LEAST_POWER))
     for _ in range(n + 1):
         change = np.zeros(len(right))
@@ -80,18 +108,20 @@ def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: tuple[np.nda
             covariance[np.ix_(free_parameters, free_parameters)] = inverse[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck
-    return change, covariance
+    return BoundedStep(change, covariance)
 
 
-def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest scaled parameters (k,) of all terms."""
-    pairs = [t.bounds() for t in mean]
-    return (np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])) if pairs \
-        else (np.zeros(0), np.zeros(0))
+def bounds_of(mean: Sequence[Term]) -> Bounds:
+    """The bounds of the scaled parameters of all terms."""
+    of_terms = [Bounds(*t.bounds()) for t in mean]
+    return Bounds(np.concatenate([np.zeros(0), *(b.low for b in of_terms)]),
+                  np.concatenate([np.zeros(0), *(b.high for b in of_terms)]))
 
 
 def weights_of(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> np.ndarray:
-    """Weights (n,) of a least-squares step whose optimum is that of the tailed likelihood; 0 where not valid.
+    """Weights (n,) of a least-squares step whose optimum is that of the likelihood with its tails; 0 where not valid.
+
+    Repeated with weights taken anew, the steps end at that optimum (iteratively reweighted least squares).
 
     values (n,): the gap; extra_power (n,): power over the floor.
     """
@@ -101,21 +131,23 @@ def weights_of(problem: Problem, values: np.ndarray, extra_power: np.ndarray | f
     return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail_scale + over_expected) / power * elements.valid
 
 
-def without_offsets(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> tuple[np.ndarray, float]:
-    """Values less the offsets between flights of highest posterior, and minus the log of these offsets' prior.
+def without_offsets(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> WithoutOffsets:
+    """The gap less the offsets between flights of highest posterior, or close to it.
 
-    An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
+    No two offsets change the same value, so each is found alone, in OFFSET_STEPS steps of weighted ridge regression.
+
+    values (n,): the gap; extra_power (n,): power over the floor.
     """
     elements, exponent = problem.elements, problem.likelihood.exponent
     power, gap, cost = elements.power + extra_power, values.copy(), 0.0
     for places, column, spread in problem.offsets:
         amount = 0.0
         largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.valid[places] / power[places]
-        for _ in range(2):
+        for _ in range(OFFSET_STEPS):
             weights = largest_weight / (elements.tail_scale[places] + squared(gap[places]) / power[places])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
             slope = 2.0 * float(np.vdot(column, weights * gap[places]).real) - amount / spread ** 2
             amount += slope / normal
             gap[places] = values[places] - amount * column
         cost += 0.5 * (amount / spread) ** 2
-    return gap, cost
+    return WithoutOffsets(gap, cost)

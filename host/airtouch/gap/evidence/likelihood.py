@@ -8,6 +8,7 @@ one pass over the values, and one logarithm for many of them.
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import boolean, float64, njit
@@ -16,11 +17,20 @@ from scipy.special import exp1
 
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 
-REPLAY_FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each
+#: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each. A larger number has lighter
+#: tails, so that single loud blocks count as evidence
+REPLAY_FREEDOM = 12.0
 _COLUMN = float64[::1]
-LEAST, MOST = 1e-100, 1e100  #: size of a product of values before its logarithm is taken; chosen, far from overflow
+LEAST, MOST = 1e-100, 1e100  #: sizes of a product at which its logarithm is taken; chosen, far from under- and overflow
 #: tails' scales among which `tail_scale` seeks; chosen, beyond any in use, and exp does not overflow
 BRACKET = 1e-3, 600.0
+
+
+class PowerSlopes(NamedTuple):
+    """Slope (n,) of the log likelihood of each of n values by its expected power; curvature (n,), never negative."""
+
+    slope: np.ndarray
+    curvature: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -65,8 +75,8 @@ class Likelihood:
 
         return at
 
-    def power_slopes(self, values: np.ndarray, extra_power: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Slope and curvature (count,) against the expected power of each of the first `count` values.
+    def power_slopes(self, values: np.ndarray, extra_power: np.ndarray, count: int) -> PowerSlopes:
+        """Slope and curvature by the expected power of each of the first `count` values (n,).
 
         The curvature is what is expected of the law without tails (Whittle's). It is larger than that of the law with
         tails, nu / (nu + 2) of it, by (nu + 2) / nu; so errors of effects that it gives are smaller by up to the root
@@ -77,7 +87,7 @@ class Likelihood:
         over_expected = squared(values[places]) / power
         share = OVERLAP_WEIGHT * self.valid[places] / power
         counted = self.exponent[places] * over_expected / (self.tail_scale[places] + over_expected)
-        return share * (counted - 1.0), share / power
+        return PowerSlopes(share * (counted - 1.0), share / power)
 
     @functools.cached_property
     def exponent(self) -> np.ndarray:

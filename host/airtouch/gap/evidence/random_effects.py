@@ -35,7 +35,7 @@ from airtouch.simulation.effects.effect import Gate
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
-SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen for time
+SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen for time. More estimate it better
 LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by; chosen
 RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
 LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
@@ -194,16 +194,16 @@ def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
     row = prepare(study.vehicle, study.calibration)[0][0]
     thrust = study.vehicle.thrust(data.flights[i].pwm)
     tau, rms = term.values["time"], term.values["rms"]
-    arms = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
-                     -row["rotor_x"] / row["inertia"][1],
-                     np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
+    mixing = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
+                       -row["rotor_x"] / row["inertia"][1],
+                       np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
     aliases = folded_frequencies(f)
     density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
     folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
     folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
     for b, first in enumerate(data.first[i][AIR]):
         size = (thrust[first:first + LENGTH[AIR]] ** 2).mean(axis=0)
-        out[AIR][b, :, LIFT_AND_TORQUE] = folded * (rms ** 2 * (arms ** 2 @ size))
+        out[AIR][b, :, LIFT_AND_TORQUE] = folded * (rms ** 2 * (mixing ** 2 @ size))
     return out
 
 

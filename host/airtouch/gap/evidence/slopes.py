@@ -6,14 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.least_squares import limits
+from airtouch.gap.evidence.least_squares import bounds_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.torque_power import loops_differ
+from airtouch.gap.signals.command_view import LikelihoodSlopes
 from airtouch.gap.signatures.term import Term, mean_places
 from airtouch.simulation.effects import Active
 
-STEP = 0.02  #: change of a scaled parameter over which slopes are taken; chosen
-FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew; chosen
+#: change of a scaled parameter over which slopes are taken; chosen. A larger number sees more of the curvature as
+#: slope, a smaller one more of the rounding
+STEP = 0.02
+#: change of a scaled parameter, of its size or of 1, over which slopes are taken anew; chosen for time. A larger number
+#: keeps slopes that no longer hold, so that steps fail and the fit takes more of them
+FAR = 0.3
 
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
@@ -59,23 +64,23 @@ class SpectraSlopes:
         newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale), strict=True))
         return replace(self, by_parameter=[newer.get(i, s) for i, s in enumerate(self.by_parameter)])
 
-    def power_equations(self, x: np.ndarray, values: np.ndarray, extra_power: np.ndarray | float,
-                        uncertain_floor: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
+    def power_slopes(self, x: np.ndarray, values: np.ndarray, extra_power: np.ndarray | float,
+                     uncertain_floor: bool) -> LikelihoodSlopes:
+        """Slopes of the log likelihood by the k parameters, as far as these change the expected power.
 
-        values, extra_power: the gap, and the power over the floor, flattened; uncertain_floor: see
-        `Problem.modelled`.
+        x (k,): the scaled parameters; values (n,): the gap; extra_power (n,): the power over the floor;
+        uncertain_floor: see `Problem.modelled`.
         """
         problem = self.problem
         active, rises = active_at(self.mean, x), np.array([s.rise for s in self.by_parameter])
-        gradient, information = problem.flat.commands.slopes(active, rises, uncertain_floor)
+        slopes = problem.flat.commands.slopes(active, rises, uncertain_floor)
         powers = np.array([s.torque_power for s in self.by_parameter])
         if powers.any():
-            slope, curvature = problem.likelihood.power_slopes(values, np.broadcast_to(extra_power, values.shape),
-                                                           problem.flat.replay_count)
-            gradient = gradient + powers @ slope
-            information = information + (powers * curvature) @ powers.T
-        return gradient, information
+            by_power = problem.likelihood.power_slopes(values, np.broadcast_to(extra_power, values.shape),
+                                                       problem.flat.replay_count)
+            slopes = LikelihoodSlopes(slopes.gradient + powers @ by_power.slope,
+                                      slopes.information + (powers * by_power.curvature) @ powers.T)
+        return slopes
 
 
 def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray) -> SpectraSlopes:
@@ -87,7 +92,7 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
     """The slopes by some of the parameters at scaled parameters x (k,), by differences over STEP within the bounds."""
     if not which:
         return []
-    _, high = limits(mean)
+    high = bounds_of(mean).high
     before = active_at(mean, x)
     values, power = problem.values(before), problem.torque_power(before)
     out = []

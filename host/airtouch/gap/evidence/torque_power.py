@@ -14,7 +14,7 @@ from airtouch.gap.signatures.signature import signature_of
 from airtouch.simulation.effects import Active
 
 #: relative error of the loop model in a change of the torque by effects that change the loop; chosen
-#: (host/docs/gap-method.md)
+#: (host/docs/gap-method.md). A larger number gives these effects less evidence
 TORQUE_DOUBT = 0.25
 
 

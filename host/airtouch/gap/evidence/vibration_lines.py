@@ -8,7 +8,9 @@ of single rotors are apart, are found from the flights: two numbers for all of t
 up as their phases happen to stand, so that flights of one vehicle differ: each has its own share of the power.
 """
 
+import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,16 +28,19 @@ from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import hover_speed
 
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
-WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one; chosen
+#: rad^2/s, variance that a rotor's phase gains over the commanded one; chosen. A larger number makes wider lines
+WANDER = 0.3
 SPREADS_HZ = (0.0, 1.0, 3.0)  #: spreads of the single rotors' lines around their common place, tried one by one; chosen
-#: relative error of a rotor's speed where the vehicle declares thrust over speed squared; chosen
+#: relative error of a rotor's speed where the vehicle declares thrust over speed squared, or the log has the speed;
+#: chosen. A larger number looks for lines farther from where they should be, and may find others
 KNOWN_SPEED = 0.02
 #: columns of the rotors' logged speeds, 1/min
 RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
-LOWEST_HZ = 3.0  #: below it forces of other origin are strong; chosen
+LOWEST_HZ = 3.0  #: lines are looked for above it, as forces of other origin are strong below; chosen
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
 FINER = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)  #: multiples of the best that are tried then, up to its neighbours
-MOST_BLOCKS = 40  #: blocks in which the place of lines is looked for; chosen for time
+AROUND = 3  #: bins on either side of the rough place in which the place is refined; chosen, more than the rough step
+MOST_BLOCKS = 40  #: most blocks in which the place of lines is looked for; chosen for time
 
 
 @dataclass(frozen=True)
@@ -71,14 +76,20 @@ def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
 
 
 def widened(power: np.ndarray, spread_hz: float) -> np.ndarray:
-    """The same with a phase that walks by WANDER and a frequency that is uncertain by spread_hz (Gaussian)."""
+    """Two-sided power (blocks, BINS) of rotors whose phases walk by WANDER and whose frequencies are uncertain.
+
+    power: that of `two_sided`; spread_hz: standard deviation of the frequency (Gaussian).
+    """
     apart = PERIOD_S * np.minimum(np.arange(BINS), BINS - np.arange(BINS))
     less = np.exp(-0.5 * WANDER * apart - 0.5 * (2.0 * np.pi * spread_hz * apart) ** 2)
     return np.maximum(np.fft.fft(np.fft.ifft(power, axis=1) * less, axis=1).real, 0.0)
 
 
 def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
-    """One-sided PSD (blocks, BINS // 2 + 1) of the real part, moved by `shift` bins before it is folded."""
+    """One-sided PSD (blocks, BINS // 2 + 1) of the real part of what has a two-sided power (blocks, BINS).
+
+    shift: bins by which the power is moved before it is folded.
+    """
     moved = np.roll(power, shift, axis=1)
     half = BINS // 2
     out = 0.25 * (moved[:, :half + 1] + moved[:, -np.arange(half + 1) % BINS])
@@ -97,7 +108,10 @@ def speeds(flight: Flight, study: Study) -> np.ndarray:
 
 
 def _search(data: Data) -> Lines:
-    """The place and spread of the lines that explain some blocks of all flights best: on a coarse grid, then a fine."""
+    """The place and spread of the lines that explain some blocks of all flights best.
+
+    First the place at one spread, in every other bin, then place and spread together around it.
+    """
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
     powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
@@ -107,10 +121,9 @@ def _search(data: Data) -> Lines:
     sample = _Sample(data, powers)
     if not len(sample.over_floor):
         return Lines([folded(widened(z, 0.0)) for z in powers], 0, 0.0)
-    rough_spread, shifts = SPREADS_HZ[1], range(-reach, reach + 1, 2)
-    rough = max(shifts, key=lambda s: sample.gain(rough_spread, s))
-    fine_grid = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
-    spread, shift = max(fine_grid, key=lambda x: sample.gain(*x))
+    rough = max(range(-reach, reach + 1, 2), key=lambda shift: sample.gain(SPREADS_HZ[1], shift))
+    around = range(max(rough - AROUND, -reach), min(rough + AROUND, reach) + 1)
+    spread, shift = max(itertools.product(SPREADS_HZ, around), key=lambda place: sample.gain(*place))
     power = [folded(widened(z, spread), shift) for z in powers]
     return Lines(_with_flight_shares(data, power), int(shift), spread)
 
@@ -128,7 +141,7 @@ class _Sample:
     def gain(self, spread_hz: float, shift: int) -> float:
         """Log likelihood, without OVERLAP_WEIGHT, that lines of the best strength gain over none."""
         shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
-        return best_strength(self.over_floor, shape)[0]
+        return best_strength(self.over_floor, shape).gain
 
 
 def _judged() -> np.ndarray:
@@ -137,16 +150,30 @@ def _judged() -> np.ndarray:
     return (f >= LOWEST_HZ) & (f < f[-1])
 
 
-def _over_floor(data: Data, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Power (blocks, bins) of the three axes over their floor, mean of them, and that floor (bins,)."""
+class _OverFloor(NamedTuple):
+    """Power (blocks, bins) of the accelerometer over its floor, mean of three axes, and that floor (bins,), PSD."""
+
+    over: np.ndarray
+    floor: np.ndarray
+
+
+def _over_floor(data: Data, blocks: np.ndarray) -> _OverFloor:
+    """The power of blocks over the floor in the bins of `_judged`. blocks: spectra (blocks, bins, 3) of the forces."""
     floor = data.study.floor.power[AIR][_judged(), FORCE]
     with np.errstate(invalid="ignore"):
         over = np.nan_to_num(np.abs(blocks[:, _judged()]) ** 2 / floor).mean(axis=2)
-    return over, 1.0 / (1.0 / floor).mean(axis=1)
+    return _OverFloor(over, 1.0 / (1.0 / floor).mean(axis=1))
 
 
-def best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
-    """Nats, without OVERLAP_WEIGHT, that lines of the best strength gain over none, and that strength (power).
+class BestStrength(NamedTuple):
+    """The strength (power) of the likeliest lines, and the nats, without OVERLAP_WEIGHT, that they gain over none."""
+
+    gain: float
+    strength: float
+
+
+def best_strength(over: np.ndarray, shape: np.ndarray) -> BestStrength:
+    """The likeliest strength of lines of a shape, to the nearest that is tried.
 
     over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
     scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
@@ -163,7 +190,7 @@ def best_strength(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     best = int(np.argmax(levels))
     fine = strengths[best] * FINER
     fine_levels = [likelihood(s) for s in fine]
-    return max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))])
+    return BestStrength(max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))]))
 
 
 def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]:
@@ -174,6 +201,6 @@ def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]
     for i, (lines_of_flight, gap) in enumerate(zip(power, data.base, strict=True)):
         if len(lines_of_flight):
             over, floor = _over_floor(data, gap[AIR][:, :, FORCE])
-            _, share[i] = best_strength(over, lines_of_flight[:, _judged()] / floor)
+            share[i] = best_strength(over, lines_of_flight[:, _judged()] / floor).strength
     mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
     return [p * s / mean_share for p, s in zip(power, share, strict=True)]

@@ -18,7 +18,8 @@ import numpy as np
 
 from airtouch.gap.evidence.clock import clock_gain, clock_gains
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, cell_gains, fit, judge, mean_parameters
+from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
+from airtouch.gap.evidence.judge import cell_gains, judge
 from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Candidate, Charges, Strength

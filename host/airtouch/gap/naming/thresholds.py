@@ -10,7 +10,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS, sensor_cells
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import CELL_GAIN
+from airtouch.gap.evidence.judge import CELL_GAIN
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import LEAST_GAIN, MISFIT_SHARE_RANDOM
 from airtouch.gap.naming.records import Candidate

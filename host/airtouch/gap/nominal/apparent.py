@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight

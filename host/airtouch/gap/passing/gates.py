@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, fit, judge
+from airtouch.gap.evidence.fit import FittedTerms, fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import FORCE, YAW, bursts
 from airtouch.gap.passing.stretches import LEAST_BLOCKS, GateTrial, each_block, stretches_of

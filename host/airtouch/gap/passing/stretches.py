@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import fit, judge, left_over
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.judge import judge, left_over
 from airtouch.gap.evidence.layout import AirBlocks
 from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.flights.flight import PERIOD_S

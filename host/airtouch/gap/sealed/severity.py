@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.signatures import candidates

@@ -50,6 +50,20 @@ class CommandElements(NamedTuple):
     freedom: np.ndarray
 
 
+class CommandPower(NamedTuple):
+    """Expected power (elements,) of the commands, and what the correction of their floor costs, nats."""
+
+    power: np.ndarray
+    cost: float
+
+
+class LikelihoodSlopes(NamedTuple):
+    """Gradient (k,) of a log likelihood by k scaled parameters, and its information (k, k), which is never negative."""
+
+    gradient: np.ndarray
+    information: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class CommandView:
     """The commands of some flights: values with their floor, and their expected power under a hypothesis.
@@ -80,19 +94,19 @@ class CommandView:
             at += edge_response.COUNT
         return out
 
-    def power(self, active: Sequence[Active], uncertain_floor: bool = False) -> tuple[np.ndarray, float]:
-        """Expected power (elements,) with the floor's correction fitted anew, and what that costs, nats.
+    def power(self, active: Sequence[Active], uncertain_floor: bool = False) -> CommandPower:
+        """The expected power under effects, the correction of the floor fitted anew.
 
         uncertain_floor: it is as uncertain as random effects make it (`command_floor_correction.UNCERTAIN_FACTOR`).
         """
         loop = self.loop
         if loop is None or not self.powers:
-            return self.elements.floor, 0.0
+            return CommandPower(self.elements.floor, 0.0)
         ratio = loop.ratio(active)
         return self.workspace.cached("power", (ratio.tobytes(), uncertain_floor),
                                      lambda: self._expected(loop.floor, ratio, uncertain_floor), KEPT_POWERS)
 
-    def _expected(self, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> tuple[np.ndarray, float]:
+    def _expected(self, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> CommandPower:
         """`power` where effects multiply the floor of the commands by a ratio, (bins, AXES) each."""
         powers, cost = [], 0.0
         for s in self.powers:
@@ -100,7 +114,7 @@ class CommandView:
             cost += correction.cost
             powers.append(np.broadcast_to(correction.power, s.shape).ravel())
         powers.append(np.ones(len(self.edges) * edge_response.COUNT))
-        return np.concatenate(powers), cost
+        return CommandPower(np.concatenate(powers), cost)
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
         """Rise (bins, AXES) of the logarithm of the expected power between hypotheses; (0, AXES) without spectra."""
@@ -109,8 +123,8 @@ class CommandView:
         return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, uncertain_floor: bool = False,
-               ) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the spectra's log likelihood for k scaled parameters.
+               ) -> LikelihoodSlopes:
+        """Slopes of the spectra's log likelihood by k scaled parameters.
 
         Responses at edges are not in it: their power is 1 under every hypothesis.
 
@@ -119,7 +133,7 @@ class CommandView:
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
         if self.loop is None or not rise.any():
-            return gradient, information
+            return LikelihoodSlopes(gradient, information)
         floor, ratio = self.loop.floor, self.loop.ratio(active)
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
             up, down = (self._log_likelihood(floor, ratio * np.exp(sign * SMALL * rise[i]), uncertain_floor)
@@ -131,7 +145,7 @@ class CommandView:
                 slope = rise[:, :, axis]
                 cross = correction.weight * slope @ smooth_shapes().T
                 information += correction.weight * slope @ slope.T - cross @ correction.covariance @ cross.T
-        return gradient, information
+        return LikelihoodSlopes(gradient, information)
 
     def _log_likelihood(self, floor: np.ndarray, ratio: np.ndarray, uncertain_floor: bool) -> float:
         """Log likelihood of the spectra, less the costs of the floor's correction.

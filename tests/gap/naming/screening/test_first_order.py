@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import left_over
+from airtouch.gap.evidence.judge import left_over
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.screening.first_order import judge_means, judge_random
 from airtouch.gap.signals.channels import COLUMN, COUNT

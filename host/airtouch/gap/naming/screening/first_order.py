@@ -10,9 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data, gap_spectra
-from airtouch.gap.evidence.fit import PRIOR_UNITS, LeftOver, strongest
-from airtouch.gap.evidence.least_squares import bounded_step, limits, normal_equations, weights_of, without_offsets
+from airtouch.gap.evidence.fit import PRIOR_UNITS
+from airtouch.gap.evidence.judge import LeftOver
+from airtouch.gap.evidence.least_squares import (
+    Bounds,
+    bounded_step,
+    bounds_of,
+    normal_equations,
+    weights_of,
+    without_offsets,
+)
 from airtouch.gap.evidence.problem import TWO_FOLDS, Problem
+from airtouch.gap.evidence.random_strength import strongest
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -110,18 +119,18 @@ def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
     return data.workspace.cached("change", (term.name, term.free[i], variant), make)
 
 
-def _bounds(mean: Sequence[Term], others: int) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(mean: Sequence[Term], others: int) -> Bounds:
     """Lowest and highest scaled parameters of mean effects, followed by `others` without bounds, (k + others,) each."""
-    low, high = limits(mean)
+    low, high = bounds_of(mean)
     wide = np.full(others, UNBOUNDED)
-    return np.concatenate([low, -wide]), np.concatenate([high, wide])
+    return Bounds(np.concatenate([low, -wide]), np.concatenate([high, wide]))
 
 
-def _least_squares(half: LeftOver, table: Sequence[np.ndarray], bounds: tuple[np.ndarray, np.ndarray],
+def _least_squares(half: LeftOver, table: Sequence[np.ndarray], bounds: Bounds,
                    ) -> tuple[np.ndarray, np.ndarray]:
     """Scaled parameters (k,) that explain the values of a half best, and their variances (k,).
 
-    table: change (n,) of the spectra per scaled parameter, k of them; bounds: lowest and highest parameters (k,).
+    table: change (n,) of the spectra per scaled parameter, k of them.
     """
     size, columns, constants = len(table), np.array(table), half.problem.offsets
     prior = np.concatenate([np.full(size, PRIOR_UNITS), [c.spread for c in constants]])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.fit import LeftOver, left_over
+from airtouch.gap.evidence.judge import LeftOver, left_over
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.records import Candidate, Charges, Strength

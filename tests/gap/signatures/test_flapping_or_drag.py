@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import problem_of, whole_of
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.policy import LEAST_GAIN
@@ -65,7 +66,7 @@ def test_a_fit_tells_flapping_from_drag_by_its_moment_alone(study, tilt):
     blocks, problem = whole_of(data), problem_of(data, whole_of(data))
 
     def gain(term):
-        return fit.judge(data, blocks, fit.fit(data, blocks, [term]).terms) - fit.judge(data, blocks, ())
+        return judge(data, blocks, fit(data, blocks, [term]).terms) - judge(data, blocks, ())
 
     def energy(*wrenches):
         ours, theirs = (problem.values(activate(w)) for w in (*wrenches, {})[:2])
