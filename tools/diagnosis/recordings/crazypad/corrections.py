@@ -61,9 +61,11 @@ class HoverPowers:
 
         They are relative to the drone's normal flights.
         """
-        normal = np.array([family(r["condition"]) == "normal" for r in self.rows])
-        bases = {d: hover_balance.reference([self.patterns[i] for i in np.flatnonzero(normal & (self.drone == d))])
-                 for d in set(self.drone.tolist())}
+        normal: dict[str, list[HoverPattern]] = {}
+        for r, pattern in zip(self.rows, self.patterns, strict=True):
+            if family(r["condition"]) == "normal":
+                normal.setdefault(r["drone"], []).append(pattern)
+        bases = {drone: hover_balance.reference(patterns) for drone, patterns in normal.items()}
         excess: dict[tuple[str, str], list[np.ndarray]] = {}
         for r, pattern in zip(self.rows, self.patterns, strict=True):
             if family(r["condition"]) in families:
