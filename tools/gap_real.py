@@ -16,6 +16,10 @@ only where --rows names it.
     python tools/gap_real.py [FLIGHTS] --rows swarm --most-baseline 2    # what few baseline flights cost
 
 --most-baseline: each flight against so many of its baseline flights at most, the first of them.
+
+    python tools/gap_real.py [FLIGHTS] --rows swarm --leave-out    # flights whose effect no candidate explains
+
+--leave-out: flights with an effect alone, each without its effect among the candidates. `unknown` is right.
 """
 
 import argparse
@@ -37,7 +41,7 @@ from airtouch.gap.result import Diagnosis
 from airtouch.logs import json_lines, read
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
-from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners
+from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners, without_truths
 from diagnosis.recordings.folder import add_folder
 from diagnosis.recordings.table import answer, print_table
 
@@ -45,8 +49,8 @@ from diagnosis.recordings.table import answer, print_table
 QUICK = {("swarm", "ground_effect"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
          ("crazypad", "slung load"): 1, ("peers", "weak_motor"): 1}
 QUICK_WRONG = 1  #: of the flights of --quick, at most: it tells a broken diagnosis, not a slightly worse one
-#: (vehicle, baseline) -> this process's last diagnosis, whose calibration serves the next case of the same two
-_LAST: dict[tuple[str, tuple[str, ...]], Diagnosis] = {}
+#: (vehicle, baseline, effects left out) -> this process's last diagnosis, whose calibration serves the next such case
+_LAST: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Diagnosis] = {}
 
 
 def _delay_clock(path: str, seconds: float) -> FlightLog:
@@ -59,14 +63,15 @@ def diagnose_case(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
     out = {**identity(case), "truth": case.truth, "condition": case.condition, "effects": []}
+    study = case.vehicle, case.baseline, case.left_out
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
-                             before=_LAST.get((case.vehicle, case.baseline)),
+                             before=_LAST.get(study), without=case.left_out,
                              partner=[_delay_clock(*p) for p in case.partner])
     except AirTouchError as error:
         return {**out, "verdict": "refused", "why": str(error)}
     _LAST.clear()
-    _LAST[case.vehicle, case.baseline] = diagnosis
+    _LAST[study] = diagnosis
     return {**out, "verdict": diagnosis.verdict, "effects": diagnosis.plain()["effects"], "gap": diagnosis.gap,
             "ranking": {r.name: round(r.probability, 4) for r in diagnosis.ranking[:6]},
             "seconds": time.perf_counter() - started}
@@ -85,7 +90,7 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
     """Cases with their diagnoses, by `jobs` processes; those in the file `store` are read, others appended to it."""
     answer_of = {_key(c): c for c in json_lines.read(store)}
     todo = sorted((c for c in cases if _key(identity(c)) not in answer_of),
-                  key=lambda c: (c.row, c.vehicle, c.baseline))
+                  key=lambda c: (c.row, c.vehicle, c.baseline, c.left_out))
     with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
         for i, case in enumerate(pool.map(diagnose_case, todo)):
             answer_of[_key(case)] = case
@@ -95,14 +100,15 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
 
 
 def identity(case: Case) -> dict:
-    """What tells the answer to a case from others: row, flight, numbers of baseline flights and of partners' logs."""
+    """What tells the answer to a case from others: its flight, what it is held against, what is left out."""
     return {"row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
-            "partner": len(case.partner)}
+            "partner": len(case.partner), "left_out": list(case.left_out)}
 
 
 def _key(answer: dict) -> tuple:
-    """The `identity` of an answer as a key; files of before 2026-11-26 have no number of partners."""
-    return answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0)
+    """The `identity` of an answer as a key; files of before 2026-11-26 have neither partners nor effects left out."""
+    return (answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0),
+            tuple(answer.get("left_out", ())))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -119,6 +125,8 @@ def main(arguments: list[str] | None = None) -> int:
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
     parser.add_argument("--most-baseline", type=int, metavar="N",
                         help="most baseline flights of each, the first of them (default: all)")
+    parser.add_argument("--leave-out", action="store_true",
+                        help="flights with an effect alone, without that effect among the candidates")
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
@@ -134,6 +142,8 @@ def main(arguments: list[str] | None = None) -> int:
         cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
     if args.partner:
         cases = with_partners(cases, args.flights)
+    if args.leave_out:
+        cases = list(without_truths(cases))
     cases = [replace(c, baseline=c.baseline[:args.most_baseline]) for c in cases]
     answers = diagnoses(cases, args.keep, args.jobs)
     print_table(answers, args.flights)

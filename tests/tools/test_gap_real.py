@@ -35,13 +35,15 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, diagnosed, capsys
     assert "wrong, more than" in capsys.readouterr().err and diagnosed
 
 
-def test_a_kept_answer_is_that_of_as_many_baseline_flights_and_partners(tmp_path, diagnosed):
+def test_a_kept_answer_is_that_of_the_same_baseline_partners_and_candidates(tmp_path, diagnosed):
     whole = cases.Case("swarm", "none", "v", "a.csv", ("b.csv", "c.csv", "d.csv"))
-    asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),))]
+    asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),)),
+             replace(whole, left_out=("mass",))]
     for case in asked:
         for _ in range(2):
             (answer,) = gap_real.diagnoses([case], tmp_path / "kept.jsonl", 1)
             assert (answer["baseline"], answer["partner"]) == (len(case.baseline), len(case.partner))
+            assert tuple(answer["left_out"]) == case.left_out
     assert diagnosed == asked, "each once"
 
 
@@ -51,6 +53,14 @@ def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(fligh
     assert {c.flight: c.baseline for c in diagnosed} == {flight: baseline[:3] for flight, baseline in whole.items()}
     with pytest.raises(SystemExit):
         gap_real.main([str(flights), "--most-baseline", "-1"])
+
+
+def test_effects_are_left_out_of_the_flights_that_have_them(flights, diagnosed, capsys):
+    assert gap_real.main([str(flights), "--rows", "swarm", "authors", "--leave-out"]) == 0
+    swarm = {c.flight: c.truth for c in cases.swarm(flights, "build") if c.truth != "none"}
+    assert {c.flight: c.left_out for c in diagnosed} == {flight: (truth,) for flight, truth in swarm.items()}
+    assert {c.truth for c in diagnosed} == {"unknown"}
+    assert "without downwash | unknown | 0 of" in capsys.readouterr().out
 
 
 def test_nominal_flights_are_held_against_others_of_their_group(flights):

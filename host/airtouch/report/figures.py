@@ -186,4 +186,4 @@ def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> No
     limit(ax, values)
     ax.set_ylabel(label, fontsize=8)
     if legend:
-        ax.legend(loc="upper left", ncols=3, fontsize=6, frameon=False)
+        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=3, fontsize=7, frameon=False, borderpad=0.1)

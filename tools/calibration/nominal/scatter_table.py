@@ -49,7 +49,7 @@ def text_of(classes: Mapping[str, Scatter], counts: Mapping[str, str]) -> str:
              "# nominal flights held against others; made by tools/calibration/nominal_scatter.py.", ""]
     for name, s in classes.items():
         lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),
-                  f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
+                  f"freedom = {s.freedom:g}", f"fourth_root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
                   f'["{name}".passing]']
         lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing.items()]
         lines.append(f'["{name}".rms]')

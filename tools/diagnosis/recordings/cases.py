@@ -8,6 +8,7 @@ from pathlib import Path
 
 from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.evaluation.data.folds import BUILD_DAYS, BUILD_FOLDS, still_air
+from airtouch.simulation import effects
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 from . import peers as peer_flights
@@ -32,6 +33,7 @@ class Case:
     baseline: tuple[str, ...]
     condition: str = ""
     partner: tuple[tuple[str, float], ...] = ()  #: logs of other vehicles, and when they begin after this flight, s
+    left_out: tuple[str, ...] = ()  #: effects that are no candidates
 
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
@@ -69,6 +71,14 @@ def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
             if swarm_cuts.partners(row, other) and swarm_cuts.overlap(row, other))
         out.append(replace(case, partner=partner))
     return out
+
+
+def without_truths(cases: Iterable[Case]) -> Iterator[Case]:
+    """Cases whose truth is an effect, which is left out of the candidates: to be called `unknown`."""
+    for case in cases:
+        if case.truth in effects.NAMES:
+            yield replace(case, truth="unknown", condition=f"{case.condition} without {case.truth}".lstrip(),
+                          left_out=(case.truth,))
 
 
 def nominal(folder: Path, part: str) -> Iterator[Case]:

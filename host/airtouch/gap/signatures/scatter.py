@@ -20,15 +20,16 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from airtouch.gap.signatures.posterior import LEAST, MOST_STANDARD_DEVIATIONS
+from airtouch.gap.signatures.posterior import LEAST
 
 EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is added to that of every strength
 QUANTILES = 1000  #: of Student's distribution, of which sums of rarities are made; chosen
 STEPS = 12  #: iterations of the compromise between nominal scatter and chance; chosen
 LEAST_SPREAD = 0.05  #: natural steps: scatter of a size at least; chosen
-FALSE_SHARE = 0.01  #: share of nominal flights in which a passing effect may be named; chosen
+FALSE_SHARE = 0.01  #: share of nominal flights in which a passing effect may be named, or the rate be news; chosen
 
 
 @dataclass(frozen=True)
@@ -56,14 +57,23 @@ def size_of(rate: float, strength: np.ndarray) -> float:
     return math.sqrt(math.sqrt(max(rate, 0.0)) * float(np.linalg.norm(strength)))
 
 
+def fourth_root(rates: ArrayLike) -> Any:
+    """Fourth roots of rates, which in nominal flights are nearly normal.
+
+    A rate is about a sum of squares of disturbances, and the fourth root of chi-square is nearly normal for one degree
+    of freedom and for many (Hawkins and Wixley 1986, The American Statistician 40).
+    """
+    return np.power(np.maximum(rates, 0.0), 0.25)
+
+
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate: mean and standard deviation of its square root; passing by effect: of its size, of how unsteady the yaw torque
-    is and of how far pushes point down (`passing.bursts`, `passing.one_sided`). vehicle: whose flights a class of the
-    table was measured on. middle: mean (k,) of the strengths of a random effect, which are never negative; the others'
-    is 0. exact: whether the flights come from the models that effects are fitted with.
+    rate: mean and standard deviation of its fourth root (`fourth_root`); passing by effect: of its size, of how
+    unsteady the yaw torque is and of how far pushes point down (`passing.bursts`, `passing.one_sided`). vehicle: whose
+    flights a class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
+    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -120,11 +130,11 @@ class Scatter:
     def allowed(self, seconds: float, least: float) -> float:
         """Log likelihood that the nameless model may gain in a nominal flight of so many seconds.
 
-        least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
+        least: what would be news in a flight of rate 0, nats. To it comes the rate that a share FALSE_SHARE of nominal
+        flights exceeds, if fourth roots of rates scatter as Student's.
         """
         middle, spread = self.rate
-        deviations = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
-        return least + seconds * (middle + min(deviations, MOST_STANDARD_DEVIATIONS) * spread) ** 2
+        return least + seconds * (middle + float(stdtrit(self.freedom, 1.0 - FALSE_SHARE)) * spread) ** 4
 
     def unusual(self, sizes: Mapping[str, float]) -> float:
         """Log likelihood (Student) by which sizes of passing effects, together, exceed those of nominal flights.
@@ -172,6 +182,6 @@ def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
     text = (resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
-                          tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["passing"].items()},
+                          tuple(entry["fourth_root_rate"]), {k: tuple(v) for k, v in entry["passing"].items()},
                           entry.get("vehicle", ""), {k: np.array(v) for k, v in entry.get("middle", {}).items()})
             for name, entry in tomllib.loads(text).items()}

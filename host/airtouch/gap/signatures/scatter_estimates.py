@@ -10,14 +10,13 @@ from scipy.special import poch
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, standard_deviation, updated
-from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, table
+from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, fourth_root, table
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
 RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen
 POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them; chosen
-LEAST_RATE_SPREAD = 0.3  #: standard deviation at least of the root of a rate, where classes are compared; chosen
-RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that square root: a flight or two may be odd
-WINSOR = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised); chosen
+LEAST_RATE_SPREAD = 0.3  #: standard deviation at least of a rate's fourth root, where classes are compared; chosen
+RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that root: a flight or two may be odd; chosen
 SIMULATED = "simulated"  #: the class of flights of this project's simulator that are all drawn with one trim
 OWN_TRIM = "simulated, trim of its own"  #: of those whose rotors and battery are drawn anew for each, as real ones are
 Pair = tuple[float, float]  #: mean and standard deviation
@@ -49,7 +48,7 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     middle = _updated_middle(update)
     rms = _updated_rms(update, middle, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
     passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
-    rate = updated(own.rate, np.sqrt([f.rate for f in known]), worth)
+    rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=middle, exact=simulated)
 
 
@@ -75,8 +74,7 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
     # of passing effects the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
     passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
-    roots = np.sqrt([f.rate for f in alike])
-    rate = mean_and_deviation(np.minimum(roots, np.quantile(roots, WINSOR)))
+    rate = mean_and_deviation(fourth_root([f.rate for f in alike]))
     return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
 
 
@@ -154,7 +152,8 @@ def _log_likelihood(own: Scatter, baseline: Sequence[ApparentStrengths], wide: f
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
         middle, spread = own.rate
-        total += float(student_log_density(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
+        spread = max(spread, LEAST_RATE_SPREAD)
+        total += float(student_log_density(fourth_root(flight.rate), RATE_FREEDOM, middle, spread))
         for name, (middle, spread) in own.passing.items():
             size = flight.passing.get(name, 0.0)
             total += float(student_log_density(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
