@@ -113,10 +113,11 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=64, help="of each round (default %(default)s)")
     parser.add_argument("--workers", type=int, default=batch.available_cores(),
                         help="processes (default: one a core)")
-    parser.add_argument("--json", type=Path, help="write the figures here, in place of what is there")
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--force", action="store_true", help="replace --json if it is there")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()
-    check_free(options.json, force=True)
+    check_free(options.json, options.force)
     own, other, rotorpy, crazyflow = [], [], [], []
     for _ in with_bar(range(ROUNDS), "rounds"):
         own.append(measure(options.flights, options.workers))
@@ -132,7 +133,7 @@ def main() -> None:
         print("crazyflow is not installed, so it is not compared: python -m venv crazyflow && "
               "crazyflow/bin/pip install crazyflow==0.4.0, then --crazyflow crazyflow/bin/python")
     if options.json:
-        write_bytes(json.dumps(figures, indent=1).encode(), options.json, force=True)
+        write_bytes(json.dumps(figures, indent=1).encode(), options.json, options.force)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ A million inputs of one target take 1 to 8 minutes of processor time, all target
 With clang the engine is libFuzzer, which follows coverage; else a small driver of our own under the C compiler's
 sanitizers, which only mutates the seeds. Everything is under build/fuzz: a corpus that grows from run to run, the
 findings, the logs, and inputs.csv, which says how many inputs each program ran. host/docs/fuzzing.md says what the
-targets promise.
+targets promise. Any Python runs it, without the package: what it cannot do it refuses with SystemExit.
 """
 
 import argparse

@@ -1,6 +1,7 @@
 """An effect from a page of the docs, in a file of its own: flown, withheld, found again by name."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from airtouch.gap.diagnosis import diagnose, diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import apparent
 from airtouch.gap.relations import own_effect
+from airtouch.gap.relations.settings import CalibrationSettings, OwnEffectSettings
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
 from gap_flights import LOOP
@@ -27,8 +29,8 @@ def few_flights(monkeypatch):
     So are two of the nominal flights to say how the effects scatter.
     """
     monkeypatch.setattr(apparent, "FLIGHTS", 2)
-    for name, count in (("PAIRS", 6), ("LEAST_PAIRS", 3), ("CALIBRATION", 4)):
-        monkeypatch.setattr(own_effect, name, count)
+    few = OwnEffectSettings(pairs=6, least_pairs=3, calibration=CalibrationSettings(class_flights=4))
+    monkeypatch.setattr(own_effect, "completed", partial(own_effect.completed, settings=few))
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """A library of relations without any learning: six effects along six axes of their coordinates."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from airtouch.gap.features.feature_space import Standard
@@ -17,10 +19,13 @@ def library():
     classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
                                 np.zeros(0)) for i, n in enumerate(NAMES))
     model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
-    none = np.zeros(len(NAMES))
     return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
-                   NominalDistance(float(Q), np.sqrt(2.0 * Q)), nameless_share=none, second_share=none,
-                   distance_scatter=none, pair_scatter=0.0)
+                   NominalDistance(float(Q), np.sqrt(2.0 * Q)), pair_scatter=0.0)
+
+
+def each_calibrated(of, **shares):
+    """The library with these fields in the calibration of every class."""
+    return of.with_classes(replace(c, calibration=replace(c.calibration, **shares)) for c in of.model.classes)
 
 
 def noise(seed=1):

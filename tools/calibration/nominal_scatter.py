@@ -1,6 +1,6 @@
 """Measures how strong every effect seems to be in nominal flights, for gap/signatures/nominal_scatter.toml.
 
-    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]    # hours
+    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]   # hours
 
 Every nominal flight is compared twice with up to five others of its vehicle, on which the vehicle is calibrated: with
 flights of its own group (drone, day and condition), and with flights of other groups of the same drone. Strengths of
@@ -10,7 +10,8 @@ simulated flights of this project. host/docs/gap-floor.md explains the table.
     python tools/calibration/nominal_scatter.py [FLIGHTS] --passing    # 5 min
 
 measures nothing but passing effects, in the same flights of the same groups. It writes the table that is shipped with
-these figures in place of the old ones. Both write --out; to ship a table, give it the path of the shipped one.
+these figures in place of the old ones. Both write --out; to ship a table, give it the path of the shipped one, and
+--force.
 """
 
 import argparse
@@ -35,15 +36,16 @@ def main() -> None:
     parser.add_argument("flights", nargs="?", type=Path, default=data_folder(),
                         help="of the data sets (default: AIRTOUCH_FLIGHTS or ../shared/flights)")
     parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"),
-                        help="the table, which is replaced if it is there (default %(default)s)")
+                        help="the table (default %(default)s)")
+    parser.add_argument("--force", action="store_true", help="replace --out if it is there")
     parser.add_argument("--keep", type=Path, help="JSON lines; comparisons that it holds are not made again")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
     parser.add_argument("--passing", action="store_true", help="measure passing effects alone")
     args = parser.parse_args()
+    check_free(args.out, args.force)
+    check_free(args.keep, force=True)  # new comparisons are added to it
     check_data_set(args.flights / "airtouch")
     check_data_set(args.flights / "neuralswarm", "baselines.csv")
-    for path in (args.out, args.keep):
-        check_free(path, force=True)
     large_enough = [g for g in nominal_groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
         shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
@@ -51,7 +53,7 @@ def main() -> None:
                        counts_of(shipped.read_text(encoding="utf-8")))
     else:
         text = text_of(*scatter_of_classes(large_enough, compare_all(large_enough, args.keep, args.jobs)))
-    write_bytes(text.encode(), args.out, force=True)
+    write_bytes(text.encode(), args.out, args.force)
     print(text)
 
 

@@ -173,8 +173,9 @@ def main() -> None:
     parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
                         help="decode the flights without this sensor")
     parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/detectors/sensor_figures.py")
+    parser.add_argument("--force", action="store_true", help="replace --json if it is there")
     options = parser.parse_args()
-    check_free(options.json, force=True)
+    check_free(options.json, options.force)
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
     if not flights:
         raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
@@ -192,7 +193,7 @@ def main() -> None:
     show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},
                             "each fold with the settings best on the others")
     if options.json:
-        show_scores.write_json(options.json, result, force=True)
+        show_scores.write_json(options.json, result, options.force)
 
 
 def print_figures(title: str, flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:

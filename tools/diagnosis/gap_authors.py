@@ -12,7 +12,8 @@ from pathlib import Path
 
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import AirTouchError, in_one_line
-from recordings.authors import VEHICLE, questions
+from airtouch.vehicle import DEFAULT_VEHICLE
+from recordings.authors import questions
 from recordings.folder import add_folder
 
 
@@ -27,7 +28,7 @@ def main() -> None:
     for name, (flights, baseline) in questions(options.folder).items():
         print(f"## {name}: {len(flights)} flights, {len(baseline)} nominal", flush=True)
         run = subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle",
-                        VEHICLE, *(["--baseline", *baseline] if baseline else []),
+                        DEFAULT_VEHICLE, *(["--baseline", *baseline] if baseline else []),
                         "--json", str(options.out / f"{name}.json"),
                         "--report", str(options.out / f"{name}.html"), "--force"])
         if run.returncode:

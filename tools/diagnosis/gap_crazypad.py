@@ -27,7 +27,7 @@ from airtouch.gap.balance.priors import PRIORS, STEADY, Priors
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs import json_lines, read
 from airtouch.logs.files import check_free
-from recordings.crazypad.corrections import show_corrections
+from recordings.crazypad.corrections import POWER_NAMES, HoverPowers
 from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_answers
 from recordings.crazypad.labels import VEHICLE, baseline, family, manifest
 from recordings.crazypad.patterns import hover_patterns, likeliest
@@ -95,6 +95,20 @@ def cases_with(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles
         verdict = first if first in ("none", "unknown") else "effect"
         out.append({**row, "verdict": verdict, "effects": effects})
     return out
+
+
+def show_corrections(folder: Path) -> None:
+    """Print the fit of `hover_balance.ANSWER` to both drones and to each, and what it leaves of the powers."""
+    rows = manifest(folder, "build")
+    powers = HoverPowers(rows, hover_patterns(folder, rows, vehicles.load(VEHICLE)))
+    for power_name, drones, (factor, before, after) in powers.fits():
+        print(f"{power_name}, {' and '.join(drones)}: 10^{factor:.2f} for one (m/s)^2; deviation between flights "
+              f"{before.std():.2f}, left {after.std():.2f} ({len(before)} flights)")
+    for families in (["rotor damage"], ["added weight", "slung load"]):
+        means = powers.left_over(families)
+        print(f"{' and '.join(families)}, left over the normal flights, {len(means)} conditions: " + ", ".join(
+            f"{n} {m:.2f} +- {s:.2f}" for n, m, s in zip(POWER_NAMES, means.mean(axis=0), means.std(axis=0, ddof=1),
+                                                         strict=True)))
 
 
 def main() -> None:

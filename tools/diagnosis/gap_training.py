@@ -43,7 +43,6 @@ from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from recordings.authors import VEHICLE
 from recordings.passes import apart_db, pieces
 
 MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis judges on 210 s at most
@@ -71,7 +70,7 @@ def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
             raise AirTouchError(f"{len(close)} flights have the height `low` in the manifest, none with a platform and "
                                 "the free air before it: give other folds with --groups")
         over, before = zip(*cuts, strict=True)
-        craft = vehicle.load(VEHICLE)
+        craft = vehicle.load(vehicle.DEFAULT_VEHICLE)
         whole, near = diagnose(evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
         calibration = near.calibrated[1] if near.calibrated else None
         write_bytes(json.dumps({"all": whole.plain(), "close": near.plain(), "calibration": [

@@ -9,12 +9,17 @@ from airtouch.gap.relations import build, calibration, learning
 from airtouch.gap.relations.build import CLEAR_NAMELESS, PairedFlights, Whitening, _beyond_noise, _scatter_of_nameless
 from airtouch.gap.relations.inference import infer
 from airtouch.gap.relations.learning import Scene, drawings, fly
+from airtouch.gap.relations.settings import BuildSettings, CalibrationSettings
 from airtouch.simulation.effects import activate
 from gap_flights import VEHICLE
 
 #: begins of the names of 28 features that show a mass and noise: 50 nominal flights tell their covariance
 FEW_FEATURES = ("roll power force", "climb power force", "force x follows one", "force y follows one",
                 "force z follows one", "force z follows thrust")
+FEW_FLIGHTS = BuildSettings(
+    nominal_flights=50, nameless_flights=10, flights_of_two=4, flights_per_knot=4, weakest_flights=1,
+    calibration=CalibrationSettings(nominal_flights=12, class_flights=10, with_second=2, flights_of_two=3, tried=1,
+                                    least_flights=4))
 SCENE = Scene("hover", VEHICLE)
 NOT_LEARNED_FROM = 7_000_000  #: number of the first flight that is judged
 JUDGED = 6  #: flights with each effect
@@ -64,19 +69,12 @@ def infer_new_flights():
     """
     declared, whole = flight_features.declared_features(), learning.features
     few = [i for i, f in enumerate(declared) if f.name.startswith(FEW_FEATURES)]
-    counts = {
-        build: {"NOMINAL_FLIGHTS": 50, "NAMELESS_FLIGHTS": 10, "FLIGHTS_OF_TWO": 4, "PER_KNOT": 4,
-                "WEAKEST_FLIGHTS": 1},
-        calibration: {"NOMINAL_FLIGHTS": 12, "CLASS_FLIGHTS": 10, "WITH_SECOND": 2, "FLIGHTS_OF_TWO": 3, "TRIED": 1,
-                      "LEAST_FLIGHTS": 4}}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(flight_features, "declared_features", lambda: tuple(declared[i] for i in few))
         patch.setattr(learning, "features", lambda flight, vehicle: whole(flight, vehicle)[few])
-        for module, numbers in counts.items():
+        for module in (build, calibration):
             patch.setattr(module, "all_drawings", lambda: [d for e in ("mass", "imu_noise") for d in drawings(e)])
-            for name, number in numbers.items():
-                patch.setattr(module, name, number)
-        library = build.build(SCENE)
+        library = build.build(SCENE, FEW_FLIGHTS)
 
         def inferences(effects):
             new = [fly(SCENE, NOT_LEARNED_FROM + i, activate(effects)) for i in range(JUDGED)]

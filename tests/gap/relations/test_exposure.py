@@ -10,7 +10,7 @@ from airtouch.gap.relations.exposure import DISTURBANCE, NAMES, PROPERTY, Follow
 from airtouch.simulation import plant, replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
-from airtouch.vehicle import load
+from airtouch.vehicle import DEFAULT_VEHICLE, load
 
 WEIGHT_N = 0.3
 SAMPLES = 400
@@ -25,30 +25,31 @@ def signals():
     return out
 
 
-def lift(follows, flown, axis=0, time=0.0, seconds=(0.0, 1e9)):
+def lift(follows, flown, axis=0, scale=0.0, rotor=0, seconds=(0.0, 1e9)):
     """Vertical force over time of a disturbance of 1 N along z."""
-    values = dict.fromkeys(NAMES, 0.0) | {"kind": 3.0 * follows + axis, "force_z": 1.0, "time": time,
-                                          "begin": seconds[0], "end": seconds[1]}
+    values = dict.fromkeys(NAMES, 0.0) | {"follows": float(follows), "axis": float(axis), "scale": scale,
+                                          "rotor": float(rotor), "force_z": 1.0, "begin": seconds[0],
+                                          "end": seconds[1]}
     return replay.wrench_of(Active(DISTURBANCE, values), flown, 1)[:, 2]
 
 
-@pytest.mark.parametrize(("follows", "axis", "time", "column", "value", "expected"), [
-    (Follows.CONSTANT, 0, 0.0, at.TIME, 0.0, 1.0),
-    (Follows.VELOCITY, 1, 0.0, at.VELOCITY + 1, 0.6, 2.0),
-    (Follows.SPEED, 0, 0.0, at.VELOCITY + 2, -0.6, 2.0),
-    (Follows.BODY_RATE, 2, 0.0, at.RATES + 2, -0.4, -2.0),
-    (Follows.NEAR_GROUND, 0, 0.1, at.HEIGHT, 0.1, np.exp(-1.0)),
-    (Follows.TIME, 0, 0.0, at.TIME, 5.0, 0.5),
-    (Follows.WAVE, 0, 4.0, at.TIME, 1.0, 1.0),
-    (Follows.TILT, 1, 0.0, at.ROTATION + 5, 0.1, 2.0),
-    (Follows.POSITION, 0, 0.0, at.POSITION, 0.7, 0.7),
-    (Follows.SQUARED_VELOCITY, 0, 0.0, at.VELOCITY, -0.3, -1.0),
-    (Follows.ONE_ROTOR, 0, 2.0, at.THRUST + 2, 0.5 * WEIGHT_N, 1.0),
+@pytest.mark.parametrize(("follows", "more", "column", "value", "expected"), [
+    (Follows.CONSTANT, {}, at.TIME, 0.0, 1.0),
+    (Follows.VELOCITY, {"axis": 1}, at.VELOCITY + 1, 0.6, 2.0),
+    (Follows.SPEED, {}, at.VELOCITY + 2, -0.6, 2.0),
+    (Follows.BODY_RATE, {"axis": 2}, at.RATES + 2, -0.4, -2.0),
+    (Follows.NEAR_GROUND, {"scale": 0.1}, at.HEIGHT, 0.1, np.exp(-1.0)),
+    (Follows.TIME, {}, at.TIME, 5.0, 0.5),
+    (Follows.WAVE, {"scale": 4.0}, at.TIME, 1.0, 1.0),
+    (Follows.TILT, {"axis": 1}, at.ROTATION + 5, 0.1, 2.0),
+    (Follows.POSITION, {}, at.POSITION, 0.7, 0.7),
+    (Follows.SQUARED_VELOCITY, {}, at.VELOCITY, -0.3, -1.0),
+    (Follows.ONE_ROTOR, {"rotor": 2}, at.THRUST + 2, 0.5 * WEIGHT_N, 1.0),
 ])
-def test_the_force_follows_its_signal(follows, axis, time, column, value, expected):
+def test_the_force_follows_its_signal(follows, more, column, value, expected):
     flown = signals()
     flown[:, column] = value
-    assert lift(follows, flown, axis, time) == pytest.approx(np.full(SAMPLES, expected))
+    assert lift(follows, flown, **more) == pytest.approx(np.full(SAMPLES, expected))
 
 
 def test_thrust_is_that_beyond_the_weight_and_its_halves_turn():
@@ -65,7 +66,7 @@ def test_thrust_is_that_beyond_the_weight_and_its_halves_turn():
 
 def test_noise_has_variance_one_and_its_correlation_time():
     flown = np.tile(signals(), (50, 1))
-    noise = lift(Follows.NOISE, flown, time=0.02)
+    noise = lift(Follows.NOISE, flown, scale=0.02)
     assert noise.std() == pytest.approx(1.0, abs=0.05)
     assert np.mean(noise[1:] * noise[:-1]) == pytest.approx(np.exp(-0.5), abs=0.05)
 
@@ -81,7 +82,7 @@ def test_what_has_axes_and_noise_is_drawn_more_often():
     drawn = [exposure.draw(rng)[0] for _ in range(4000)]
     wrenches = [a for a in drawn if a.effect is DISTURBANCE]
     assert len(wrenches) == pytest.approx(3000, abs=150)
-    count = Counter(Follows(int(a.values["kind"]) // 3) for a in wrenches)
+    count = Counter(Follows(int(a.values["follows"])) for a in wrenches)
     for follows in Follows:
         expected = len(wrenches) * {Follows.VELOCITY: 3, Follows.BODY_RATE: 3, Follows.NOISE: 3,
                                     Follows.TILT: 2}.get(follows, 1) / 22
@@ -94,7 +95,7 @@ def test_a_wrench_is_as_long_as_its_range_says():
     rng = np.random.default_rng(2)
     for a in (exposure.draw(rng)[0] for _ in range(1000)):
         if a.effect is DISTURBANCE:
-            force = np.array([a.values[n] for n in NAMES[1:7]])
+            force = np.array([a.values[n] for n in NAMES if n.startswith(("force", "torque"))])
             size = np.linalg.norm([*force[:3], *force[3:] / exposure.LEVER_M])
             assert exposure.FORCE_N[0] * 0.999 < size < exposure.FORCE_N[1] * 1.001
 
@@ -105,9 +106,9 @@ def test_properties_are_those_that_no_effect_of_the_registry_changes():
     assert not {"mass", "inertia", "motor_rise", "actuator_delay", "motor_noise", "gravity"} & set(names)
 
 
-@pytest.mark.parametrize(("which", "factors"), [(-1, [2.0] * 4), (1, [1.0, 2.0, 1.0, 1.0])])
-def test_a_property_changes_in_all_its_elements_or_in_one(which, factors):
-    row, before = (plant.from_vehicle(load(exposure.ANY_VEHICLE)) for _ in range(2))
+@pytest.mark.parametrize(("element", "factors"), [(-1, [2.0] * 4), (1, [1.0, 2.0, 1.0, 1.0])])
+def test_a_property_changes_in_all_its_elements_or_in_one(element, factors):
+    row, before = (plant.from_vehicle(load(DEFAULT_VEHICLE)) for _ in range(2))
     assert PROPERTY.settings is not None
-    PROPERTY.settings(row[0], {"property": exposure.properties().index("rotor_x"), "which": which, "amount": 2.0})
+    PROPERTY.settings(row[0], {"property": exposure.properties().index("rotor_x"), "element": element, "amount": 2.0})
     assert row["rotor_x"][0] == pytest.approx(before["rotor_x"][0] * factors)

@@ -7,11 +7,12 @@ import pytest
 
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.relations import inference
+from airtouch.gap.relations.effect_class import ClassCalibration
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import NominalDistance
 from airtouch.gap.relations.readout import Readout
-from axis_library import NAMES, Q, library, noise
+from axis_library import NAMES, Q, each_calibrated, library, noise
 
 SIZE = (45.0, 30.0, 12.0)
 
@@ -48,8 +49,8 @@ def test_a_name_fails_where_the_flight_lies_off_it_by_more_than_right_names_do(o
 def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
     values = noise() + 45.0 * np.eye(Q)[0]
     values[60:] *= 2.5
-    exact = replace(library(), nameless_share=np.ones(len(NAMES)))  # so that the distance alone speaks
-    inexact = replace(exact, distance_scatter=np.full(len(NAMES), 0.1))
+    exact = each_calibrated(library(), nameless_share=1.0)  # so that the distance alone speaks
+    inexact = each_calibrated(exact, distance_scatter=0.1)
     far, near = (infer(of, values[None]) for of in (exact, inexact))
     assert far.against.nats == pytest.approx(near.against.nats)
     assert far.against.limit < far.against.nats < near.against.limit
@@ -101,7 +102,7 @@ def test_no_more_effects_are_named_than_a_flight_may_have(monkeypatch):
 def test_a_second_effect_needs_a_share_of_the_firsts_evidence():
     """The share that wrong ones gain beside that effect: of 1000 nats, a twentieth is more than the second one has."""
     values = (noise() + 45.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1])[None]
-    with_share = replace(library(), second_share=np.full(len(NAMES), 0.05))
+    with_share = each_calibrated(library(), second_share=0.05)
     assert {c.name for c in infer(library(), values).classes} == {"mass", "wind"}
     assert {c.name for c in infer(with_share, values).classes} == {"mass"}
 
@@ -127,10 +128,9 @@ def test_two_parameters_of_one_effect_have_no_readings():
     """Each was calibrated acting alone."""
     size = np.geomspace(1.0, 100.0, 30)[:, None]
     gains = tuple(replace(c, name=f"controller_gain {p}", effect="controller_gain",
-                          readout=Readout((p,), size, 0.01 * size))
+                          calibration=ClassCalibration(Readout((p,), size, 0.01 * size)))
                   for c, p in zip(library().model.classes[:2], ("rate", "attitude"), strict=True))
-    known = replace(library(), model=replace(library().model, classes=gains), nameless_share=np.zeros(2),
-                    second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    known = library().with_classes(gains)
     rate, attitude = 45.0 * np.eye(Q)[0], 30.0 * np.eye(Q)[1]
     one, both = (infer(known, (noise() + x)[None]) for x in (rate, rate + attitude))
     assert list(one.readings) == ["controller_gain"]
@@ -140,8 +140,7 @@ def test_two_parameters_of_one_effect_have_no_readings():
 def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
     first = library().model.classes[0]
     shapes = (replace(first, shape=1.0), replace(first, shape=2.0, table=np.tile(np.eye(Q)[50], (1, 3, 1))))
-    of = replace(library(), model=replace(library().model, classes=shapes), nameless_share=np.zeros(2),
-                 second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    of = library().with_classes(shapes)
     values = (noise() + 30.0 * np.eye(Q)[0])[None]
     alone = infer(library(), values).evidence["mass"]
     assert infer(of, values).evidence["mass"] == pytest.approx(alone - np.log(2.0))
@@ -158,8 +157,7 @@ def test_probabilities_are_those_of_half_the_evidence():
 def test_another_name_of_the_likeliest_effect_is_not_added_to_it():
     classes = (library().model.classes[0], replace(library().model.classes[1], name="thrust_coefficient",
                                                    effect="thrust_coefficient"))
-    of = replace(library(), model=replace(library().model, classes=classes), nameless_share=np.zeros(2),
-                 second_share=np.zeros(2), distance_scatter=np.zeros(2))
+    of = library().with_classes(classes)
     assert len(infer(of, (noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1])[None]).classes) == 1
 
 
@@ -168,7 +166,7 @@ def test_a_third_effect_is_added_only_where_two_do_not_suffice(monkeypatch):
     monkeypatch.setattr(inference, "NAMELESS_MARGIN", -np.inf)
     for size, count in ((6.5, 2), (30.0, 3)):
         values = noise() + 45.0 * np.eye(Q)[0] + 30.0 * np.eye(Q)[1] + size * np.eye(Q)[2]
-        wide = replace(library(), nameless_share=np.full(len(NAMES), 0.05))
+        wide = each_calibrated(library(), nameless_share=0.05)
         result = infer(wide, values[None])
         assert len(result.classes) == count
         assert not result.against.is_too_much
@@ -183,8 +181,7 @@ def test_names_of_one_thing_count_together():
     names = ["mass", "thrust_coefficient", "battery_sag"]
     spread = [one.knots, one.knots, one.knots + np.array([0.1, *np.zeros(len(one.knots) - 1)])]  # shorter: likelier
     classes = tuple(replace(one, name=n, effect=n, knots=k) for n, k in zip(names, spread, strict=True))
-    shares = {k: np.zeros(3) for k in ("nameless_share", "second_share", "distance_scatter")}
-    alike = replace(library(), model=replace(library().model, classes=classes), **shares)
+    alike = library().with_classes(classes)
     values = (noise() + 45.0 * np.eye(Q)[0])[None]
     result = infer(alike, values)
     assert result.likeliest == "battery_sag"

@@ -1,11 +1,13 @@
 """The shipped library: for which flights it holds, that it is no older than the code, and what it names end to end."""
 
+import io
 import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import axis_library
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import declared_features, features
 from airtouch.gap.naming.by_relations import inference_of
@@ -40,14 +42,19 @@ def test_a_file_holds_what_was_saved(tmp_path):
     assert reloaded.projection == pytest.approx(shipped.projection)
     assert reloaded.effects == shipped.effects
     assert reloaded.pair_scatter == shipped.pair_scatter
-    assert reloaded.distance_scatter == pytest.approx(shipped.distance_scatter)
+    for share in library.SHARES:
+        assert [getattr(c.calibration, share) for c in reloaded.model.classes] \
+            == [getattr(c.calibration, share) for c in shipped.model.classes]
 
 
 @pytest.mark.parametrize("name", library.SHARES)
 def test_a_file_with_a_number_too_few_is_refused(name):
-    shipped = library.shipped()
+    with np.load(io.BytesIO(library.packed(axis_library.library()))) as file:
+        arrays = dict(file)
+    content = io.BytesIO()
+    np.savez(content, **arrays | {name: arrays[name][1:]})
     with pytest.raises(ValueError, match=name):
-        library.read(library.packed(replace(shipped, **{name: getattr(shipped, name)[1:]})))
+        library.read(content.getvalue())
 
 
 def test_the_file_is_of_todays_features_and_effects():

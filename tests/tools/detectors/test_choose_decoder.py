@@ -1,5 +1,6 @@
 """The choice of the decoder's settings, on synthetic detections whose delays, misses and false edges are known."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation.score import TOLERANCE_S
+from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
@@ -72,3 +74,13 @@ def test_settings_are_drawn_from_their_ranges_and_hold_as_told():
     late = np.array([(s.late_entry, s.late_exit) for s in settings])
     assert -0.5 <= late[:, 0].min() < 0.0 < 4.0 < late[:, 0].max() <= 4.5
     assert -4.5 <= late[:, 1].min() < -4.0 and -0.5 < late[:, 1].max() <= 0.0
+
+
+def test_a_file_of_figures_is_replaced_with_force_alone(tmp_path, monkeypatch):
+    figures = tmp_path / "all.json"
+    figures.write_text("{}")
+    monkeypatch.setattr(tool, "need_flights", lambda: tmp_path)
+    for more, refusal in (([], "--force"), (["--force"], "no flights in this folder")):
+        monkeypatch.setattr(sys, "argv", ["choose_decoder.py", str(tmp_path), "--json", str(figures), *more])
+        with pytest.raises(AirTouchError, match=refusal):
+            tool.main()

@@ -40,7 +40,7 @@ def test_each_question_is_one_diagnosis_with_its_flights_baseline_and_files(aske
     for command, name, own, baseline in zip(asked, ("all", "close", "wind"), "aac", ("", "b", "b"), strict=True):
         options = command.index("--vehicle")
         assert command[:options] == ["gap", "diagnose", flights[own]]
-        assert command[options:-5] == ["--vehicle", gap_authors.VEHICLE,
+        assert command[options:-5] == ["--vehicle", gap_authors.DEFAULT_VEHICLE,
                                        *(["--baseline", flights[baseline]] if baseline else [])]
         out = tmp_path / "out/deep" / name
         assert command[-5:] == ["--json", f"{out}.json", "--report", f"{out}.html", "--force"]

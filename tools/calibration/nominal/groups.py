@@ -17,7 +17,6 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as simulated
 from airtouch.vehicle import Vehicle
 
-AUTHORS_VEHICLE = "crazyflie-2.1-flow"  #: the authors' vehicle
 SIMULATED = 4  #: groups of simulated flights; no source: round number
 #: scenarios that draw each flight's rotors and battery, one group each of so many flights; no source: of the shipped
 #: ones those least alike
@@ -46,7 +45,7 @@ def nominal_groups(folder: Path) -> Iterator[Group]:
 
 def authors(folder: Path) -> Iterator[Group]:
     """The authors' flights in still air, of the folds for building: a group for each day, height and angle."""
-    vehicle = vehicles.load(AUTHORS_VEHICLE)
+    vehicle = vehicles.load(vehicles.DEFAULT_VEHICLE)
     build = [file for file in collect([folder]) if file.condition.fold in BUILD_FOLDS]
     for key, alike in still_air(build).items():
         yield Group("crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle,

@@ -3,7 +3,6 @@
 import csv
 from pathlib import Path
 
-VEHICLE = "crazyflie-2.1-flow"  #: the authors' vehicle
 CLOSE = 10  #: low flights diagnosed against high ones; no source: round number, for a minute of time
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.evaluation.data.folds import BUILD_DAYS, BUILD_FOLDS, still_air
 from airtouch.simulation import effects
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 from . import peers as peer_flights
 from . import swarm_cuts
-from .authors import VEHICLE as AUTHORS_VEHICLE
 from .authors import questions
 from .crazypad.labels import VEHICLE as CRAZYPAD_VEHICLE
 from .crazypad.labels import baseline, building, family, manifest
@@ -44,7 +44,7 @@ def authors(folder: Path, part: str) -> Iterator[Case]:
         step = max(len(files) // PER_GROUP, 1)
         for flight in files[::step][:PER_GROUP]:
             others = [f for f in files if f != flight][:OTHERS]
-            yield Case("authors", "none", AUTHORS_VEHICLE, flight, tuple(others))
+            yield Case("authors", "none", DEFAULT_VEHICLE, flight, tuple(others))
 
 
 def swarm(folder: Path, part: str) -> Iterator[Case]:
@@ -88,7 +88,7 @@ def nominal(folder: Path, part: str) -> Iterator[Case]:
     """
     groups: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for group, files in _calm_groups(folder, part).items():
-        groups[AUTHORS_VEHICLE, "the authors'", *group] = files
+        groups[DEFAULT_VEHICLE, "the authors'", *group] = files
     own = folder / "neuralswarm"
     vehicle_and_day = {r["group"]: (r["vehicle"], r["day"]) for r in csv.DictReader((own / "manifest.csv").open())}
     for r in csv.DictReader((own / "baselines.csv").open()):
@@ -116,7 +116,7 @@ def fan(folder: Path, part: str) -> Iterator[Case]:
     flights, calm = questions(folder / "airtouch")["wind"]
     if _in_part(part, True):
         for flight in flights:
-            yield Case("fan", "comes and goes", AUTHORS_VEHICLE, flight, tuple(calm[:OTHERS]))
+            yield Case("fan", "comes and goes", DEFAULT_VEHICLE, flight, tuple(calm[:OTHERS]))
 
 
 def peers(folder: Path, part: str) -> Iterator[Case]:

@@ -15,5 +15,5 @@ speaks against them decides whether they are named. `readout` turns a strength i
 
 **What is learned.** `build` simulates flights with each effect (`learning`) and with nameless disturbances
 (`exposure`), learns the model and stores it in a `library`; `calibration` measures on other flights how far right
-names lie. `own_effect` adds a class of a user's own effect.
+names lie. `own_effect` adds a class of a user's own effect. `settings` holds how many flights each of them takes.
 """

@@ -7,13 +7,15 @@ The flights' seed is no sealed set's (`learning.SEED`), so that the file is the 
 Whitened features (F of them) have the covariance 1 in nominal flights. What is stored is their projection on the Q
 directions in which effects and nameless disturbances move them.
 
-The counts and thresholds below were chosen with the library of 2026-11-24, on flights of `learning.SEED` alone
-(host/docs/looks.md, 12:43 UTC of that day). What other values were tried is not recorded.
+How many flights it takes and how many directions are kept is in `settings`. The thresholds below were chosen with
+the library of 2026-11-24, on flights of `learning.SEED` alone (host/docs/looks.md, 12:43 UTC of that day). What other
+values were tried is not recorded.
 """
 
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,7 @@ from scipy.linalg import solve_triangular
 
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, two_of
-from airtouch.gap.relations.effect_class import ClassFlights, learn_class, stands_out
+from airtouch.gap.relations.effect_class import KNOT, KNOT_FACTOR, ClassFlights, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -33,25 +35,14 @@ from airtouch.gap.relations.learning import (
     disturbed_flights,
     drawn_flights,
     fly,
-    halved,
     scaled,
+    weakest_strength,
 )
 from airtouch.gap.relations.library import STORED, Library, NominalDistance, packed, read, save
+from airtouch.gap.relations.settings import SHIPPED, BuildSettings
 from airtouch.simulation.effects import Active
-from airtouch.vehicle import load
+from airtouch.vehicle import DEFAULT_VEHICLE, load
 
-NOMINAL_FLIGHTS = 5000  #: twice as many as there are features, of which they give the covariance
-NAMELESS_FLIGHTS = 3000  #: flights with a nameless disturbance
-FLIGHTS_OF_TWO = 300  #: flights with two effects
-PER_KNOT = 60  #: flights of a class for each KNOT of its strength (a factor of three); twice as many for a direction
-FACTOR_OF_KNOT = 3.0  #: in strength, that of `effect_class.KNOT`
-WEAKEST_SHIFT = 6.0  #: length of a whitened shift of a class's weakest flights, which hardly shows beside nominal ones
-WEAKEST_FLIGHTS = 3  #: flights whose median gives that length
-HALVINGS = 17  #: of the highest strength, at most, down to the weakest
-DIRECTIONS_OF_NAMELESS = 160  #: directions that are stored for nameless disturbances
-DIRECTIONS_OF_CLASS = 6  #: directions that are stored for each class
-RANK_OF_NAMELESS = 120  #: directions of the scatter of nameless disturbances
-RANK_OF_INTERACTION = 24  #: directions, at most, in which two effects are no sum
 CLEAR_NAMELESS = 3.0  #: length of the shift of a nameless disturbance from which its direction counts
 CLEAR_OF_TWO = 12.0  #: length of the smaller shift of two effects from which their sum is looked at
 
@@ -88,43 +79,48 @@ class PairedFlights:
         return self.drawing.active(float(np.exp(rng.uniform(0.5 * (low + high), high))), rng)
 
 
-def build(scene: Scene, say: Say = lambda _: None) -> Library:
-    """Fly and learn."""
+def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: None) -> Library:
+    """The library of a scene, learned from flights that are simulated there, and calibrated. say: told of each step."""
     say("nominal flights")
-    flown = {i: f for i in range(NOMINAL_FLIGHTS) if (f := fly(scene, i)) is not None}
+    flown = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
     features = np.array(list(flown.values()))
     standard = standard_of(features)
     whitening = Whitening(standard, cholesky_factor(standard(features)))
     nominal = dict(zip(flown, whitening(features), strict=True))
     middle = np.mean(list(nominal.values()), axis=0)
-    paired = [_paired_flights(scene, whitening, nominal, d, say) for d in all_drawings()]
+    paired = []
+    for drawing in all_drawings():
+        say(f"{drawing.name} {drawing.shape or ''}")
+        paired.append(_paired_flights(scene, whitening, nominal, drawing, settings))
     say("flights with nameless disturbances")
     nameless = np.array([whitening(f)[0] - nominal[i]
-                         for i, f in disturbed_flights(scene, NAMELESS_FLIGHTS) if i in nominal])
-    axes = directions([p.shift for p in paired], DIRECTIONS_OF_CLASS, nameless, DIRECTIONS_OF_NAMELESS)
+                         for i, f in disturbed_flights(scene, settings.nameless_flights) if i in nominal])
+    axes = directions([p.shift for p in paired], settings.directions_of_class, nameless,
+                      settings.directions_of_nameless)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
     classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
         p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
-    none = np.zeros(len(classes))
+    scatter_of_nameless = _scatter_of_nameless(nameless @ axes)[:, :settings.rank_of_nameless]
     library = Library(
         scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),
-        LearnedModel(classes, np.zeros((projection.shape[1], 0)), _scatter_of_nameless(nameless @ axes)),
-        NominalDistance(0.0, 1.0), nameless_share=none, second_share=none, distance_scatter=none, pair_scatter=0.0)
+        LearnedModel(classes, np.zeros((projection.shape[1], 0)), scatter_of_nameless),
+        NominalDistance(0.0, 1.0), pair_scatter=0.0)
     say("flights of two effects")
-    library = replace(library, model=replace(library.model, interaction=_interaction(scene, library, paired)))
+    interaction = _interaction(scene, library, paired, settings.flights_of_two)[:, :settings.rank_of_interaction]
+    library = replace(library, model=replace(library.model, interaction=interaction))
     say("calibration")
-    return calibrated(scene, read(packed(library)), say)  # as it will be read, rounded
+    return calibrated(scene, read(packed(library)), settings.calibration, say)  # as it will be read, rounded
 
 
-def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say,
-                    ) -> PairedFlights:
+def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,
+                    settings: BuildSettings) -> PairedFlights:
     """Flights of one class, from strengths that hardly show to the highest; nominal: whitened (F,) by number."""
-    say(f"{drawing.name} {drawing.shape or ''}")
     high = drawing.kind.highest
-    low = min(_weakest(scene, whitening, nominal, drawing), high / FACTOR_OF_KNOT)
+    few = dict(list(nominal.items())[:settings.weakest_flights])
+    low = min(weakest_strength(high, partial(_length_of_shift, scene, whitening, few, drawing)), high / KNOT_FACTOR)
     of_direction = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
-    count = int(of_direction * PER_KNOT * (np.log(high / low) / np.log(FACTOR_OF_KNOT) + 1.0))
+    count = int(of_direction * settings.flights_per_knot * (np.log(high / low) / KNOT + 1.0))
     flown = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
     amount = np.array([scaled(drawing, a) for _, a, _ in flown])
     whitened = whitening(np.array([f for *_, f in flown]))
@@ -132,34 +128,31 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
 
 
-def _weakest(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing) -> float:
-    """The highest strength of a class, halved until it hardly shows."""
-    return halved(drawing.kind.highest, HALVINGS, lambda strength: _length_of_shift(
-        scene, whitening, nominal, drawing, strength) <= WEAKEST_SHIFT)
-
-
 def _length_of_shift(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,
                      strength: float) -> float:
-    """Median length of the whitened shift by a class at a strength, of WEAKEST_FLIGHTS."""
+    """Median length of the whitened shift by a class at a strength; infinite where no flight ends well."""
     lengths = []
-    for i in list(nominal)[:WEAKEST_FLIGHTS]:
+    for i in nominal:
         f = fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))])
         lengths += [] if f is None else [np.linalg.norm(whitening(f)[0] - nominal[i])]
     return float(np.median(lengths)) if lengths else np.inf
 
 
 def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
-    """Directions (Q, r), times the standard deviation, of nameless shifts (n, Q) over their length."""
+    """Directions (Q, r), times the standard deviation, of nameless shifts (n, Q) over their length.
+
+    The direction of the largest one comes first.
+    """
     length = np.linalg.norm(shift, axis=1, keepdims=True)
     unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > CLEAR_NAMELESS]
     _, deviation, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
-    return axes[:RANK_OF_NAMELESS].T * deviation[:RANK_OF_NAMELESS]
+    return axes.T * deviation
 
 
-def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]) -> np.ndarray:
+def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights], count: int) -> np.ndarray:
     """Directions (Q, r), times the standard deviation, of what two effects are beside their sum, over the smaller."""
     relative, noise = [], []
-    for i in range(FLIGHTS_OF_TWO):
+    for i in range(count):
         rng = np.random.default_rng([SEED, Stream.PAIR, i])
         a, b = two_of([p.drawing for p in paired], rng)
         f = fly(scene, i, [paired[j].draw_strong(rng) for j in (a, b)])
@@ -176,12 +169,11 @@ def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]
 def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
     """Directions (Q, r), times the standard deviation, in which values (n, Q) vary more than such a noise may.
 
-    noise: its variance.
+    noise: its variance. The direction of the largest variance comes first.
     """
     many, dimensions = relative.shape
     _, deviation, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
     stands = stands_out(deviation ** 2, noise, dimensions, many)
-    stands[RANK_OF_INTERACTION:] = False
     return axes[stands].T * np.sqrt(deviation[stands] ** 2 - noise)
 
 
@@ -196,16 +188,16 @@ def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tu
 def main() -> None:
     """Build a library and write it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--scenario", default="diagnosis")
-    parser.add_argument("--vehicle", default="crazyflie-2.1-flow")
+    parser.add_argument("out", type=Path, help="file of the library, replaced if it is there")
+    parser.add_argument("--scenario", default="diagnosis", help="what is flown (default %(default)s)")
+    parser.add_argument("--vehicle", default=DEFAULT_VEHICLE, help="name or .toml file (default %(default)s)")
     arguments = parser.parse_args()
-    library = build(Scene(arguments.scenario, load(arguments.vehicle)), lambda text: print(text, flush=True))
+    library = build(Scene(arguments.scenario, load(arguments.vehicle)), say=lambda text: print(text, flush=True))
     save(library, arguments.out)
-    for c, nameless, second, scatter in zip(library.model.classes, library.nameless_share, library.second_share,
-                                            library.distance_scatter, strict=True):
-        print(f"{c.name} {c.shape or ''}: nameless share {nameless:.3f}, second share {second:.3f}, "
-              f"distance scatter {scatter:.3f}")
+    for c in library.model.classes:
+        shares = c.calibration
+        print(f"{c.name} {c.shape or ''}: nameless share {shares.nameless_share:.3f}, "
+              f"second share {shares.second_share:.3f}, distance scatter {shares.distance_scatter:.3f}")
 
 
 if __name__ == "__main__":

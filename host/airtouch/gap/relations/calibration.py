@@ -3,8 +3,9 @@
 `calibrated` does so in three steps: the distance of nominal flights, each class by flights with its effect
 (`calibrate_class`), two effects together (`_scatter_of_two`).
 
-Counts and thresholds without another source were chosen on flights of `learning.SEED` alone (host/docs/looks.md,
-2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not recorded.
+How many flights it takes is in `settings`. Thresholds without another source were chosen on flights of `learning.SEED`
+alone (host/docs/looks.md, 2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not
+recorded.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -15,77 +16,56 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
+from airtouch.gap.relations.effect_class import ClassCalibration
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Library, NominalDistance
 from airtouch.gap.relations.readout import Readout
+from airtouch.gap.relations.settings import CalibrationSettings
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
-NOMINAL_FLIGHTS = 300  #: whose distances are measured
-CLASS_FLIGHTS = 80  #: of each class (host/docs/gap-relations.md, "How far right names lie"); those that show it count
-WITH_SECOND = 12  #: of them, those beside whose effect a second one is tried
-FLIGHTS_OF_TWO = 150  #: flights with two effects (host/docs/gap-relations.md, there)
 FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
 NUMBERS_OF_CLASS = 1000  #: numbers that each class has of its own
 RANGE_OF_TWO = 30.0  #: factor between the highest and the lowest strength of two effects that act together
 HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
 HIGHEST_START = 0.5  #: of the highest strength, from which a class's flights begin at most
-TRIED, SHOWN = 3, 0.5  #: flights at each of these strengths, and the share of them that shows an effect which shows
+SHOWN = 0.5  #: share of the flights at a strength that show the effect, from which on it shows there
 QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
 DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
 LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
-LEAST_FLIGHTS = 12  #: calibration flights that show the effect; with fewer a class gives no parameters
 
 
-def calibrated(scene: Scene, library: Library, say: Say = lambda _: None) -> Library:
-    """The library with its distances, its shares and the calibration of its classes."""
-    library = replace(library, distance=_nominal_distance(scene, library))
+def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, say: Say = lambda _: None) -> Library:
+    """The library with its distances and the calibration of its classes, alone and by two."""
+    library = replace(library, distance=_nominal_distance(scene, library, settings.nominal_flights))
     drawing_of = {(d.name, d.shape): d for d in all_drawings()}
     drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
-    found = []
+    classes = []
     for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
         say(f"calibration of {own.name} {own.shape or ''}")
-        found.append(calibrate_class(scene, library, place, drawing, CLASS_FLIGHTS))
-    library = with_calibrations(library, found)
+        classes.append(replace(own, calibration=calibrate_class(scene, library, place, drawing, settings)))
+    library = library.with_classes(classes)
     say("flights of two effects")
-    return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings))
+    return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings, settings.flights_of_two))
 
 
-@dataclass(frozen=True)
-class ClassCalibration:
-    """What is measured of one class; `Library` says what the numbers are."""
-
-    readout: Readout | None
-    nameless_share: float
-    second_share: float
-    distance_scatter: float
-
-
-def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, count: int) -> ClassCalibration:
-    """Measure the class at a place of the library by so many flights."""
-    shown = _calibration_flights(scene, library, place, drawing, count)
+def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, settings: CalibrationSettings,
+                    ) -> ClassCalibration:
+    """Measure the class at a place of the library."""
+    shown = _calibration_flights(scene, library, place, drawing, settings)
     return ClassCalibration(
-        _readout(drawing, shown), share_of((f.nameless, f.evidence) for f in shown),
+        _readout(drawing, shown, settings.least_flights), share_of((f.nameless, f.evidence) for f in shown),
         share_of((f.second, f.evidence) for f in shown if f.second is not None),
         likeliest_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
                           library.nominal_scatter))
 
 
-def with_calibrations(library: Library, found: Sequence[ClassCalibration]) -> Library:
-    """The library with what was measured of its classes, in their order."""
-    classes = tuple(replace(c, readout=one.readout) for c, one in zip(library.model.classes, found, strict=True))
-    return replace(library, model=replace(library.model, classes=classes),
-                   nameless_share=np.array([one.nameless_share for one in found]),
-                   second_share=np.array([one.second_share for one in found]),
-                   distance_scatter=np.array([one.distance_scatter for one in found]))
-
-
-def _nominal_distance(scene: Scene, library: Library) -> NominalDistance:
-    """`Library.distance`, the standard deviation from the middle two thirds."""
-    flown = [f for i in range(NOMINAL_FLIGHTS) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
+def _nominal_distance(scene: Scene, library: Library, count: int) -> NominalDistance:
+    """`Library.distance` by so many flights, the standard deviation from the middle two thirds."""
+    flown = [f for i in range(count) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
     squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
     return NominalDistance(float(np.median(squared)), float(0.5 * (high - low)))
@@ -123,9 +103,9 @@ class _Fitted:
         return self.hypothesis.evidence > LEAST_EVIDENCE
 
 
-def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Drawing, count: int,
+def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Drawing, settings: CalibrationSettings,
                          ) -> list[CalibrationFlight]:
-    """So many flights of a class from the strength that hardly shows to the highest, of them those that show it."""
+    """Flights of a class from the strength that hardly shows to the highest, of them those that show it."""
     own, high = library.model.classes[place], drawing.kind.highest
     rng = np.random.default_rng([SEED, Stream.CALIBRATION, place])
     first = FIRST_OF_CLASS + NUMBERS_OF_CLASS * place
@@ -137,20 +117,20 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
         flight = _flown(scene, library, next(numbers), [active])
         return None if flight is None else _Fitted(active, flight, flight.with_class(own))
 
-    low = min(_weakest_shown(fitted, high), HIGHEST_START * high)
+    low = min(_weakest_shown(fitted, high, settings.tried), HIGHEST_START * high)
     shown: list[CalibrationFlight] = []
-    for strength in np.exp(rng.uniform(np.log(low), np.log(high), count)):
+    for strength in np.exp(rng.uniform(np.log(low), np.log(high), settings.class_flights)):
         one = fitted(strength)
         if one is not None and one.shows:
-            shown.append(_measured(library, drawing, one, with_second=len(shown) < WITH_SECOND))
+            shown.append(_measured(library, drawing, one, with_second=len(shown) < settings.with_second))
     return shown
 
 
-def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float) -> float:
-    """The highest strength of a class, halved until fewer than half of its flights show it."""
+def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float, tried: int) -> float:
+    """The highest strength of a class, halved until fewer than half of its flights show it; tried: flights at each."""
     def hides(strength: float) -> bool:
         """Whether fewer than half of the flights at a strength show the class; False where none ends well."""
-        ended = [one for one in (fitted(strength) for _ in range(TRIED)) if one is not None]
+        ended = [one for one in (fitted(strength) for _ in range(tried)) if one is not None]
         return bool(ended) and float(np.mean([one.shows for one in ended])) < SHOWN
 
     return halved(highest, HALVINGS, hides)
@@ -191,19 +171,19 @@ def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndar
     return float(np.exp(minimize_scalar(against, bounds=(np.log(LEAST_SCATTER), 0.0), method="bounded").x))
 
 
-def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight]) -> Readout | None:
-    """Calibration of a class by flights that show it; None where too few do."""
-    if len(shown) < LEAST_FLIGHTS:
+def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight], least: int) -> Readout | None:
+    """The readout of a class from flights that show it; None where fewer than `least` do."""
+    if len(shown) < least:
         return None
     amount = np.array([f.amount for f in shown])
     free = np.abs(amount).max(axis=0) > 0.0
     return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
 
 
-def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing]) -> float:
-    """`Library.pair_scatter`: by flights with two effects, each hypothesis started from either."""
+def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing], count: int) -> float:
+    """`Library.pair_scatter` by so many flights with two effects, each hypothesis started from either."""
     excess, evidence, of_classes = [], [], []
-    for i in range(FLIGHTS_OF_TWO):
+    for i in range(count):
         rng = np.random.default_rng([SEED, Stream.CALIBRATION_PAIR, i])
         a, b = two_of(drawings, rng)
         active = [d.active(log_uniform(d.kind.highest / RANGE_OF_TWO, d.kind.highest, rng), rng)
@@ -218,7 +198,7 @@ def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing])
             continue  # the weaker one does not show
         excess.append(library.excess(flight.squared_distance(both)))
         evidence.append(both.evidence)
-        of_classes.append(library.scatter(max(library.distance_scatter[[a, b]]), both.evidence))
+        of_classes.append(library.scatter(max(c.calibration.distance_scatter for c in (one, two)), both.evidence))
     return likeliest_scatter(np.array(excess), np.array(evidence), np.array(of_classes))
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from airtouch.gap.relations.readout import Readout
 
 SMALLEST = 1e-300  #: length that a division or a logarithm may have at least
-KNOT = float(np.log(3.0))  #: between two knots of a curve, in the logarithm of the strength
+KNOT_FACTOR = 3.0  #: of strength, between two knots of a curve
+KNOT = float(np.log(KNOT_FACTOR))
 LEAST_SHIFT = 0.5  #: shift along a class's own direction below which a flight says nothing of the curve
 LEAST_WEIGHED = 5.0  #: length of a shift below which errors of the curve are weighed as at that length
 CLEAR = 40.0  #: length of a shift from which the scatter about the curve stands over that of nominal flights
@@ -30,6 +31,23 @@ CHANCE = 1.2
 
 
 @dataclass(frozen=True)
+class ClassCalibration:
+    """What `calibration` measures of a class on flights that it was not learned from; by default nothing.
+
+    readout: what its strengths are in the effect's units; None where too few flights show the effect.
+    The others are fractions of the evidence for the class. nameless_share, second_share: what a nameless disturbance,
+    or a second effect, gains beside the class; four of five flights with it have at most so much. distance_scatter:
+    scatter of the nats by which a flight with the class lies farther from it than nominal flights from none, beside
+    the scatter of nominal flights.
+    """
+
+    readout: Readout | None = None
+    nameless_share: float = 0.0
+    second_share: float = 0.0
+    distance_scatter: float = 0.0
+
+
+@dataclass(frozen=True)
 class EffectClass:
     """One class: the expected shift as a curve along the strength, and the scatter of single flights about it.
 
@@ -39,7 +57,6 @@ class EffectClass:
     parameter and one more, even in the sign, where there are two signs.
     axes (Q, r), variances (r,): directions of a flight's distance from the curve, and variances along them, over the
     squared length of the shift.
-    readout: what its strengths are in the effect's units, where that is known.
     """
 
     name: str
@@ -51,7 +68,7 @@ class EffectClass:
     table: np.ndarray
     axes: np.ndarray
     variances: np.ndarray
-    readout: Readout | None = None
+    calibration: ClassCalibration = ClassCalibration()
 
     @property
     def of_one_parameter(self) -> bool:

@@ -21,7 +21,7 @@ from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, wrench
 from airtouch.simulation.effects import NAMES as PACKAGE
 from airtouch.simulation.random_generator import normal
-from airtouch.vehicle import load
+from airtouch.vehicle import DEFAULT_VEHICLE, load
 
 
 class Follows(IntEnum):
@@ -72,49 +72,51 @@ LEFT_OUT = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_vol
 SPEED_SCALE_MPS, RATE_SCALE_RADPS, TIME_SCALE_S, TILT_SCALE = 0.3, 0.2, 10.0, 0.05
 THRUST_SCALE, DIFFERENCE_SCALE = 0.05, 0.02
 FOR_EVER = 1e9  #: s, beyond any flight; and beyond any parameter
-ANY_VEHICLE = "crazyflie-2.1-flow"  #: one on which it is tried which properties effects change
 
-#: parameters of the wrench; kind: three times a `Follows`, and the axis (0 to 2); time: its SCALE, or number of a rotor
-NAMES = ("kind", "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "time", "begin", "end")
-KIND, FORCE, TIME, BEGIN, END = (NAMES.index(n) for n in ("kind", "force_x", "time", "begin", "end"))
+#: parameters of the wrench. follows: a `Follows`; axis (0 to 2), scale (as in SCALE), rotor (0 to 3): of those signals
+#: that have one; force (N) and torque (N m) where the signal is 1; begin, end (s): when it acts
+NAMES = ("follows", "axis", "scale", "rotor", "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z",
+         "begin", "end")
+FOLLOWS, AXIS, SCALE_OF, ROTOR, FORCE, BEGIN, END = map(
+    NAMES.index, ("follows", "axis", "scale", "rotor", "force_x", "begin", "end"))
 
 
 @jit
-def _of_motion(kind, axis, s):
+def _of_motion(follows, axis, s):
     """Signal of one of OF_MOTION: a velocity, a turning rate, a tilt or a place; axis: 0 to 2."""
     v = at.VELOCITY
-    if kind == Follows.VELOCITY:
+    if follows == Follows.VELOCITY:
         return s[v + axis] / SPEED_SCALE_MPS
-    if kind == Follows.SPEED:
+    if follows == Follows.SPEED:
         return math.sqrt(s[v] * s[v] + s[v + 1] * s[v + 1] + s[v + 2] * s[v + 2]) / SPEED_SCALE_MPS
-    if kind == Follows.SQUARED_VELOCITY:
+    if follows == Follows.SQUARED_VELOCITY:
         return s[v] * abs(s[v]) / SPEED_SCALE_MPS ** 2
-    if kind == Follows.BODY_RATE:
+    if follows == Follows.BODY_RATE:
         return s[at.RATES + axis] / RATE_SCALE_RADPS
-    if kind == Follows.TILT:
+    if follows == Follows.TILT:
         return s[at.ROTATION + 2 + 3 * min(axis, 1)] / TILT_SCALE
     return s[at.POSITION]
 
 
 @jit
-def _of_thrust(kind, rotor, s):
+def _of_thrust(follows, rotor, s):
     """Signal of one of OF_THRUST: thrust over the weight, of all rotors, between two sides or of one; rotor: 0 to 3."""
     weight, t = s[at.MASS] * s[at.GRAVITY], at.THRUST
-    if kind == Follows.THRUST:
+    if follows == Follows.THRUST:
         return ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / THRUST_SCALE
-    if kind == Follows.ROLL_THRUST:
+    if follows == Follows.ROLL_THRUST:
         return (s[t + 2] + s[t + 3] - s[t] - s[t + 1]) / weight / DIFFERENCE_SCALE
-    if kind == Follows.PITCH_THRUST:
+    if follows == Follows.PITCH_THRUST:
         return (s[t] + s[t + 3] - s[t + 1] - s[t + 2]) / weight / DIFFERENCE_SCALE
-    return 4.0 * s[t + min(rotor, 3)] / weight - 1.0
+    return 4.0 * s[t + rotor] / weight - 1.0
 
 
 @jit
-def _of_scale(kind, scale, s, memory, stream):
+def _of_scale(follows, scale, s, memory, stream):
     """Signal of one of SCALE, whose height (m), period (s) or correlation time (s) is `scale`."""
-    if kind == Follows.NEAR_GROUND:
+    if follows == Follows.NEAR_GROUND:
         return math.exp(-s[at.HEIGHT] / scale)
-    if kind == Follows.WAVE:
+    if follows == Follows.WAVE:
         return math.sin(2.0 * math.pi * s[at.TIME] / scale)
     keep = math.exp(-s[at.STEP] / scale)
     memory[0] = keep * memory[0] + math.sqrt(1.0 - keep * keep) * normal(stream)
@@ -126,17 +128,17 @@ def _disturbance(p, s, memory, stream, out):
     """Force and torque in proportion to a signal x that is about 1 in an ordinary flight."""
     if s[at.TIME] < p[BEGIN] or s[at.TIME] > p[END]:
         return
-    kind = int(p[KIND]) // 3
-    if kind == Follows.CONSTANT:
+    follows = int(p[FOLLOWS])
+    if follows == Follows.CONSTANT:
         x = 1.0
-    elif kind == Follows.TIME:
+    elif follows == Follows.TIME:
         x = s[at.TIME] / TIME_SCALE_S
-    elif kind in OF_MOTION:
-        x = _of_motion(kind, int(p[KIND]) - 3 * kind, s)
-    elif kind in OF_THRUST:
-        x = _of_thrust(kind, int(p[TIME]), s)
+    elif follows in OF_MOTION:
+        x = _of_motion(follows, int(p[AXIS]), s)
+    elif follows in OF_THRUST:
+        x = _of_thrust(follows, int(p[ROTOR]), s)
     else:
-        x = _of_scale(kind, p[TIME], s, memory, stream)
+        x = _of_scale(follows, p[SCALE_OF], s, memory, stream)
     for i in range(6):
         out[i] += p[FORCE + i] * x
 
@@ -152,15 +154,16 @@ DISTURBANCE = Effect("disturbance", "a nameless force and torque", tuple(_number
 
 def _change(row, values) -> None:
     """Scale a property of the plant's row, or add to it."""
-    name, which, amount = properties()[int(values["property"])], int(values["which"]), values["amount"]
+    name, element, amount = properties()[int(values["property"])], int(values["element"]), values["amount"]
     own = np.array(row[name], float)
-    here = np.ones(own.shape, bool) if not own.shape or which < 0 else np.arange(len(own)) == which % len(own)
+    here = np.ones(own.shape, bool) if not own.shape or element < 0 else np.arange(len(own)) == element % len(own)
     row[name] = own + amount * here if name in ADDED else own * np.where(here, amount, 1.0)
 
 
-#: property: its place in `properties`; which: element of one with several, -1 for all; amount: factor, or what is added
+#: property: its place in `properties`, as parameters are numbers; element: of a property with several, -1 for all;
+#: amount: factor, or what is added
 PROPERTY = Effect("property", "a property of the plant that no effect changes",
-                  tuple(_number(n) for n in ("property", "which", "amount")), settings=_change)
+                  tuple(_number(n) for n in ("property", "element", "amount")), settings=_change)
 
 
 @cache
@@ -176,7 +179,7 @@ def _changed() -> set[str]:
     out: set[str] = set()
     for effect in (EFFECTS[n] for n in PACKAGE if n in EFFECTS):
         if effect.settings is not None:
-            before, after = (plant.from_vehicle(load(ANY_VEHICLE)) for _ in range(2))
+            before, after = (plant.from_vehicle(load(DEFAULT_VEHICLE)) for _ in range(2))
             moved = {p.name: min(p.default + 0.1 * (p.high - p.low), p.high) for p in effect.parameters}
             effect.settings(after[0], moved)
             out |= {n for n in plant.DTYPE.names or () if n != "firmware" and np.any(before[n] != after[n])}
@@ -193,8 +196,8 @@ def _drawn_property(rng: np.random.Generator) -> Active:
     place = int(rng.integers(len(properties())))
     name, size = properties()[place], log_uniform(*FACTOR, rng)
     amount = ADDED[name] * size / FACTOR[1] if name in ADDED else np.exp(size * rng.choice([-1, 1]))
-    which = float(rng.integers(-1, 4))
-    return Active(PROPERTY, {"property": float(place), "which": which, "amount": float(amount)})
+    element = float(rng.integers(-1, 4))
+    return Active(PROPERTY, {"property": float(place), "element": element, "amount": float(amount)})
 
 
 def _drawn_wrench(rng: np.random.Generator) -> Active:
@@ -203,10 +206,10 @@ def _drawn_wrench(rng: np.random.Generator) -> Active:
     direction = _direction(rng)
     direction *= log_uniform(*FORCE_N, rng) / np.linalg.norm(direction)
     direction[3:] *= LEVER_M
-    time = log_uniform(*SCALE[follows], rng) if follows in SCALE else float(rng.integers(4))
+    scale, rotor = (log_uniform(*SCALE[follows], rng), 0) if follows in SCALE else (0.0, int(rng.integers(4)))
     begin = float(rng.uniform(*BEGIN_S))
     seconds = (0.0, FOR_EVER) if rng.random() < WHOLE_FLIGHT_SHARE else (begin, begin + float(rng.uniform(*DURATION_S)))
-    values = (3 * follows + axis, *direction, time, *seconds)
+    values = (follows, axis, scale, rotor, *direction, *seconds)
     return Active(DISTURBANCE, dict(zip(NAMES, map(float, values), strict=True)))
 
 

@@ -101,18 +101,18 @@ def _without_sign(best: Hypothesis) -> tuple[str, ...]:
 
 def _calibrated(best: Hypothesis) -> list[tuple[str, Readout, np.ndarray]]:
     """Effect, readout and strength of each class of a hypothesis whose strength was calibrated."""
-    return [(f.effect_class.effect, f.effect_class.readout, f.strength) for f in best.fits
-            if f.effect_class.readout is not None]
+    return [(c.effect, c.calibration.readout, f.strength) for c, f in zip(best.classes, best.fits, strict=True)
+            if c.calibration.readout is not None]
 
 
 def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """What speaks against effects, by the measure that is nearer to its limit or farther beyond."""
-    return max(_nameless(flight, best, library), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
+    return max(_nameless(flight, best), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
+def _nameless(flight: FlightHypotheses, best: Hypothesis) -> Against:
     """What a nameless disturbance gains beside effects."""
-    of_classes = library.largest(library.nameless_share, best.classes)
+    of_classes = max((c.calibration.nameless_share for c in best.classes), default=0.0)
     share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
     return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
                    of_distance=False)
@@ -120,7 +120,7 @@ def _nameless(flight: FlightHypotheses, best: Hypothesis, library: Library) -> A
 
 def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
-    scatter = library.largest(library.distance_scatter, best.classes)
+    scatter = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
     share = float(np.hypot(scatter, library.pair_scatter * (len(best.fits) > 1)))
     return Against(library.excess(flight.squared_distance(best)), MOST_SCATTERS * library.scatter(share, best.evidence),
                    of_distance=True)
@@ -149,19 +149,19 @@ def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Lib
     while len(best.fits) < MOST_EFFECTS and (against is None or against.is_too_much):
         larger = _with_one_more(flight, beam)
         first = _by_thing(larger, library) if larger else None
-        if first is None or first.evidence < _required_of_one_more(flight, best, library):
+        if first is None or first.evidence < _required_of_one_more(flight, best):
             break
         best, beam, against = first, [first], _against(flight, first, library)
     return best, _against(flight, best, library) if against is None else against
 
 
-def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis, library: Library) -> float:
+def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
     """Evidence, nats, that a hypothesis with one more effect than this one must have.
 
-    It must gain LEAST_EVIDENCE and what wrong second effects gain beside those classes (`Library.second_share`), and
-    explain the flight better than a nameless disturbance in the place of the effect would.
+    It must gain LEAST_EVIDENCE and what wrong second effects gain beside those classes, and explain the flight better
+    than a nameless disturbance in the place of the effect would.
     """
-    share = library.largest(library.second_share, best.classes)
+    share = max(c.calibration.second_share for c in best.classes)
     return max(best.evidence + LEAST_EVIDENCE + share * best.evidence,
                flight.nameless_evidence(best) + NAMELESS_MARGIN)
 

@@ -19,6 +19,8 @@ from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
 from airtouch.vehicle import Vehicle
 
 SEED = 8_000_000  #: of all flights that are learned from; nobody draws sealed sets from it
+WEAKEST_SHIFT = 6.0  #: length of the shift of a class's weakest flights, which hardly shows beside nominal ones; chosen
+HALVINGS = 17  #: of the highest strength, at most, down to the weakest; chosen
 Say = Callable[[str], None]  #: what a long run reports its progress to
 
 
@@ -96,6 +98,14 @@ def halved(highest: float, most: int, hides: Callable[[float], bool]) -> float:
             break
         strength /= 2.0
     return strength
+
+
+def weakest_strength(highest: float, length_of_shift: Callable[[float], float]) -> float:
+    """The highest strength of a class, halved until it shifts flights by WEAKEST_SHIFT or less.
+
+    length_of_shift: of flights at a strength, in standard deviations of nominal ones; infinite where none ends well.
+    """
+    return halved(highest, HALVINGS, lambda strength: length_of_shift(strength) <= WEAKEST_SHIFT)
 
 
 def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, SupportsIndex
 import numpy as np
 
 from airtouch.gap.features.feature_space import Standard
-from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.effect_class import ClassCalibration, EffectClass
 from airtouch.gap.relations.hypotheses import LearnedModel
 from airtouch.gap.relations.readout import Readout
 from airtouch.logs.files import write_bytes
@@ -21,8 +21,8 @@ from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
 FARTHEST_NOMINAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
-SHARES = ("nameless_share", "second_share", "distance_scatter")  #: fields of a library with one number for each class
-PARTS = ("knots", "table", "axes", "variances")  #: arrays of a class
+PARTS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
+SHARES = ("nameless_share", "second_share", "distance_scatter")  #: of a calibration; arrays of all classes in a file
 STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its scatter
 #: ends of the names of the arrays that are stored in float32
 EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
@@ -41,11 +41,7 @@ class Library:
 
     projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
     less the middle.
-    nameless_share, second_share (classes,): nats that a nameless disturbance, or a second effect, gains beside
-    the class, over the evidence for it; four of five flights with it have at most so much.
-    distance_scatter (classes,): scatter of the nats by which a flight with the class lies farther from it than nominal
-    flights from none, over the evidence, beside the scatter of nominal flights.
-    pair_scatter: the same of two effects, beside those of their classes.
+    pair_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
     """
 
     scenario: str
@@ -55,9 +51,6 @@ class Library:
     middle: np.ndarray
     model: LearnedModel
     distance: NominalDistance
-    nameless_share: np.ndarray
-    second_share: np.ndarray
-    distance_scatter: np.ndarray
     pair_scatter: float
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
@@ -94,15 +87,6 @@ class Library:
         """Names of the effects of the registry that it has classes of."""
         return frozenset(c.effect for c in self.model.classes)
 
-    def largest(self, numbers: np.ndarray, classes: Iterable[EffectClass]) -> float:
-        """Largest number of some classes, 0 of none. numbers (classes,): one for each class of the library."""
-        return max((float(numbers[self._places[c.name, c.shape]]) for c in classes), default=0.0)
-
-    @cached_property
-    def _places(self) -> Mapping[tuple[str, float | None], int]:
-        """Places of the classes by their name and shape."""
-        return {(c.name, c.shape): i for i, c in enumerate(self.model.classes)}
-
     @cached_property
     def choice_cost(self) -> Mapping[str, float]:
         """Nats that the choice among its classes costs each effect."""
@@ -111,10 +95,11 @@ class Library:
     def without(self, names: Iterable[str]) -> "Library":
         """The library without the classes of some effects."""
         left_out = frozenset(names)
-        keep = np.array([c.effect not in left_out for c in self.model.classes])
-        classes = tuple(c for c in self.model.classes if c.effect not in left_out)
-        return replace(self, model=replace(self.model, classes=classes), nameless_share=self.nameless_share[keep],
-                       second_share=self.second_share[keep], distance_scatter=self.distance_scatter[keep])
+        return self.with_classes(c for c in self.model.classes if c.effect not in left_out)
+
+    def with_classes(self, classes: Iterable[EffectClass]) -> "Library":
+        """The library with these classes in place of its own."""
+        return replace(self, model=replace(self.model, classes=tuple(classes)))
 
 
 def save(library: Library, path: Path) -> None:
@@ -127,15 +112,16 @@ def packed(library: Library) -> bytes:
     model = library.model
     arrays = {"standard.middle": library.standard.middle, "standard.deviation": library.standard.deviation,
               "projection": library.projection, "middle": library.middle, "interaction": model.interaction,
-              "nameless": model.nameless, **{name: getattr(library, name) for name in SHARES}}
+              "nameless": model.nameless,
+              **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARES}}
     for i, c in enumerate(model.classes):
         arrays |= {f"{i}.{part}": getattr(c, part) for part in PARTS}
-        if c.readout is not None:
-            arrays |= {f"{i}.strength": c.readout.strength, f"{i}.amount": c.readout.amount}
+        if (readout := c.calibration.readout) is not None:
+            arrays |= {f"{i}.strength": readout.strength, f"{i}.amount": readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
              "pair_scatter": library.pair_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
-             "readouts": [c.readout and c.readout.parameters for c in model.classes]}
+             "readouts": [(r := c.calibration.readout) and r.parameters for c in model.classes]}
     rounded: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(EXACT) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
     np.savez_compressed(file, **rounded, words=np.array(json.dumps(words)))
@@ -147,17 +133,17 @@ def read(content: bytes) -> Library:
     with np.load(io.BytesIO(content)) as file:
         words = json.loads(str(file["words"]))
         arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
+    if any(len(arrays[name]) != len(words["classes"]) for name in SHARES):
+        raise ValueError(f"a library of {len(words['classes'])} classes must have as many of {', '.join(SHARES)}")
     classes = tuple(
         EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in PARTS},
-                    readout=_readout(words["readouts"][i], i, arrays))
+                    calibration=ClassCalibration(_readout(words["readouts"][i], i, arrays),
+                                                 **{share: float(arrays[share][i]) for share in SHARES}))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
-    if any(len(arrays[name]) != len(classes) for name in SHARES):
-        raise ValueError(f"a library of {len(classes)} classes must have as many of {', '.join(SHARES)}")
     return Library(
         words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
         arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
-        distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"],
-        **{name: arrays[name] for name in SHARES})
+        distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"])
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:

@@ -10,19 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.relations.build import HALVINGS, WEAKEST_SHIFT
-from airtouch.gap.relations.calibration import HIGHEST_START, ClassCalibration, calibrate_class, with_calibrations
-from airtouch.gap.relations.effect_class import ClassFlights, learn_class
-from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, halved, scaled
+from airtouch.gap.relations.calibration import HIGHEST_START, calibrate_class
+from airtouch.gap.relations.effect_class import ClassCalibration, ClassFlights, EffectClass, learn_class
+from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled, weakest_strength
 from airtouch.gap.relations.library import SHARES, Library
+from airtouch.gap.relations.settings import OWN_EFFECT, OwnEffectSettings
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
 from airtouch.simulation.effects import get
 from airtouch.vehicle import Vehicle
-
-PAIRS = 40  #: flights with the effect, and as many without, of which its class is learned; chosen for time
-CALIBRATION = 24  #: flights by which the class is calibrated; chosen for time
-LEAST_PAIRS = 20  #: of PAIRS that must end well; chosen
 
 
 class Pair(NamedTuple):
@@ -36,52 +32,48 @@ class Pair(NamedTuple):
     nominal: np.ndarray
 
 
-def completed(library: Library, vehicle: Vehicle, names: Iterable[str]) -> Library:
+def completed(library: Library, vehicle: Vehicle, names: Iterable[str],
+              settings: OwnEffectSettings = OWN_EFFECT) -> Library:
     """The library with a class of each of these effects that it lacks; not of one whose flights seldom end well.
 
     vehicle: as declared, that of the library. Takes about ten seconds an effect.
     """
     scene = Scene(library.scenario, vehicle)
     for name in sorted(set(names) - library.effects):
-        library = _with_class(library, scene, name)
+        library = _with_class(library, scene, name, settings)
     return library
 
 
-def _with_class(library: Library, scene: Scene, name: str) -> Library:
+def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSettings) -> Library:
     """The library with a class of one more effect, learned and calibrated; as it is if too few flights end well."""
     drawing = Drawing(name, kinds_of(get(name))[name])
     high = drawing.kind.highest
-    low = min(_weakest(library, scene, drawing), HIGHEST_START * high)
-    strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()])) for i in range(PAIRS)]
+    low = min(weakest_strength(high, partial(_length_of_shift, library, scene, drawing)), HIGHEST_START * high)
+    strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()]))
+                 for i in range(settings.pairs)]
     flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
     pairs = [p for p in flown if p is not None]
-    if len(pairs) < LEAST_PAIRS:
+    if len(pairs) < settings.least_pairs:
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))
     amount = amount[:, np.abs(amount).max(axis=0) > 0.0]
     own = learn_class(name, name, None, ClassFlights(amount, flight - nominal, flight))
-    known = [ClassCalibration(c.readout, *shares) for c, *shares in zip(
-        library.model.classes, library.nameless_share, library.second_share, library.distance_scatter, strict=True)]
-    uncalibrated = with_calibrations(
-        replace(library, model=replace(library.model, classes=(*library.model.classes, own))),
-        [*known, ClassCalibration(None, 0.0, 0.0, 0.0)])
-    found = calibrate_class(scene, uncalibrated, len(known), drawing, CALIBRATION)
-    return with_calibrations(uncalibrated, [*known, _at_least(found, known)])
+    known = library.model.classes
+    calibration = calibrate_class(scene, library.with_classes([*known, own]), len(known), drawing, settings.calibration)
+    return library.with_classes([*known, replace(own, calibration=_at_least(calibration, known))])
 
 
-def _at_least(found: ClassCalibration, known: Sequence[ClassCalibration]) -> ClassCalibration:
-    """A calibration with shares no smaller than any known one's: a curve through few flights is less exact."""
-    return ClassCalibration(found.readout, *(max(getattr(one, name) for one in (found, *known)) for name in SHARES))
+def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> ClassCalibration:
+    """A calibration with shares no smaller than those of the known classes: a curve through few flights is less exact.
+    """
+    every = (calibration, *(c.calibration for c in known))
+    return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in every) for name in SHARES))
 
 
-def _weakest(library: Library, scene: Scene, drawing: Drawing) -> float:
-    """The highest strength of an effect, halved until it moves the coordinates of a flight by WEAKEST_SHIFT or less."""
-    def hides(strength: float) -> bool:
-        """Whether a flight at a strength is moved that little; False where it does not end well."""
-        pair = _pair(library, scene, drawing, (0, strength))
-        return pair is not None and float(np.linalg.norm(pair.flight - pair.nominal)) <= WEAKEST_SHIFT
-
-    return halved(drawing.kind.highest, HALVINGS, hides)
+def _length_of_shift(library: Library, scene: Scene, drawing: Drawing, strength: float) -> float:
+    """By how much an effect at a strength moves the coordinates of one flight; infinite where it does not end well."""
+    pair = _pair(library, scene, drawing, (0, strength))
+    return np.inf if pair is None else float(np.linalg.norm(pair.flight - pair.nominal))
 
 
 def _pair(library: Library, scene: Scene, drawing: Drawing, numbered: tuple[int, float]) -> Pair | None:

@@ -15,7 +15,7 @@ from airtouch.simulation.compiled import jit
 
 warnings.filterwarnings("ignore", "First-class function type feature is experimental")
 
-PARAMETERS = 10  #: an effect's parameters in compiled code, at most
+PARAMETERS = 12  #: an effect's parameters in compiled code, at most
 MEMORY = 12  #: numbers that an effect may keep from step to step
 SIGNATURE = types.void(float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1])
 WrenchFunction = types.FunctionType(SIGNATURE)
@@ -108,7 +108,7 @@ class Effect:
                 else p.neutral + strength * (values[p.name] - p.neutral) for p in self.parameters}
 
     def vector(self, values: Mapping[str, float]) -> np.ndarray:
-        """The parameters (10,) as compiled code gets them."""
+        """The parameters (PARAMETERS,) as compiled code gets them."""
         out = np.zeros(PARAMETERS)
         out[:len(self.parameters)] = [values[p.name] for p in self.parameters]
         return out

@@ -1,52 +1,82 @@
 """How unsteadiness and heave in hover follow the corrections of the estimated velocity, on CrazyPAD.
 
-The fit of `hover_balance.ANSWER`: `python tools/diagnosis/gap_crazypad.py FOLDER --corrections`.
+The fit of `hover_balance.ANSWER`, which `python tools/diagnosis/gap_crazypad.py FOLDER --corrections` prints.
 """
 
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
+from airtouch.gap.balance.hover_pattern import HoverPattern
 
-from .labels import VEHICLE, family, manifest
-from .patterns import hover_patterns
+from .labels import family
 
-POWER_NAMES = ("unsteady", "heave")  #: of the powers of a `HoverPattern`, as they are printed
+POWER_NAMES = ("unsteady", "heave")  #: of the powers of a `HoverPattern`
 
 
-def show_corrections(folder: Path) -> None:
-    """Print the fit of `hover_balance.ANSWER` to both drones and to each, and the rest of the powers by family."""
-    rows = manifest(folder, "build")
-    vehicle = vehicles.load(VEHICLE)
-    patterns = hover_patterns(folder, rows, vehicle)
-    power, corrections = np.array([p.power for p in patterns]), np.array([p.corrections for p in patterns])
-    drone = np.array([r["drone"] for r in rows])
-    for k, power_name in enumerate(POWER_NAMES):
-        for names in (sorted(set(drone)), *([d] for d in sorted(set(drone)))):
-            masks = [drone == d for d in names]
-            powers, variances = [power[m, k] for m in masks], [10.0 ** corrections[m, k] for m in masks]
-            factor, before, after = corrections_fit(powers, variances, float(np.log10(hover_balance.ANSWER[k])))
-            print(f"{power_name}, {' and '.join(names)}: 10^{factor:.2f} for one (m/s)^2; deviation between flights "
-                  f"{before.std():.2f}, left {after.std():.2f} ({len(before)} flights)")
-    normal = np.array([family(r["condition"]) == "normal" for r in rows])
-    bases = {d: hover_balance.reference([patterns[i] for i in np.flatnonzero(normal & (drone == d))])
-             for d in set(drone)}
-    excess = np.array([bases[d].difference(p)[hover_balance.POWER] for d, p in zip(drone, patterns, strict=True)])
-    for families in (["rotor damage"], ["added weight", "slung load"]):
-        pairs = sorted({(r["condition"], r["drone"]) for r in rows if family(r["condition"]) in families})
-        means = np.array([np.mean([a for a, r in zip(excess, rows, strict=True)
-                                   if (r["condition"], r["drone"]) == pair], axis=0) for pair in pairs])
-        print(f"{' and '.join(families)}, left over the normal flights, {len(pairs)} conditions: " + ", ".join(
-            f"{n} {m:.2f} +- {s:.2f}" for n, m, s in zip(POWER_NAMES, means.mean(axis=0),
-                                                         means.std(axis=0, ddof=1), strict=True)))
+class CorrectionsFit(NamedTuple):
+    """How one power of some drones follows the corrections.
+
+    factor: log10 of the power for one (m/s)^2 of corrections; before, after (flights,): scatter of log10 power without
+    and with the corrections.
+    """
+
+    factor: float
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class HoverPowers:
+    """Powers in hover with the corrections of the estimated velocity.
+
+    rows: the manifest's; patterns: of each flight.
+    """
+
+    rows: Sequence[dict[str, str]]
+    patterns: Sequence[HoverPattern]
+
+    @property
+    def drone(self) -> np.ndarray:
+        """Drone of each flight."""
+        return np.array([r["drone"] for r in self.rows])
+
+    def fits(self) -> Iterator[tuple[str, list[str], CorrectionsFit]]:
+        """Name of a power, drones, and the fit to them: of each power for all drones together and for each alone."""
+        power = np.array([p.power for p in self.patterns])
+        corrections = np.array([p.corrections for p in self.patterns])
+        drones = sorted(set(self.drone.tolist()))
+        for k, power_name in enumerate(POWER_NAMES):
+            for names in (drones, *([d] for d in drones)):
+                masks = [self.drone == d for d in names]
+                powers, variances = [power[m, k] for m in masks], [10.0 ** corrections[m, k] for m in masks]
+                yield power_name, names, corrections_fit(powers, variances, float(np.log10(hover_balance.ANSWER[k])))
+
+    def left_over(self, families: Sequence[str]) -> np.ndarray:
+        """Mean powers (conditions, 2), log10, of the conditions of these families, less what the fit explains.
+
+        They are relative to the drone's normal flights.
+        """
+        normal: dict[str, list[HoverPattern]] = {}
+        for r, pattern in zip(self.rows, self.patterns, strict=True):
+            if family(r["condition"]) == "normal":
+                normal.setdefault(r["drone"], []).append(pattern)
+        bases = {drone: hover_balance.reference(patterns) for drone, patterns in normal.items()}
+        excess: dict[tuple[str, str], list[np.ndarray]] = {}
+        for r, pattern in zip(self.rows, self.patterns, strict=True):
+            if family(r["condition"]) in families:
+                excess.setdefault((r["condition"], r["drone"]), []).append(
+                    bases[r["drone"]].difference(pattern)[hover_balance.POWER])
+        return np.array([np.mean(excess[condition], axis=0) for condition in sorted(excess)])
 
 
 def corrections_fit(powers: list[np.ndarray], corrections: list[np.ndarray], start: float,
-                    ) -> tuple[float, np.ndarray, np.ndarray]:
-    """log10 of the power for one (m/s)^2 of corrections, and the scatter (flights,) of log10 power before and after.
+                    ) -> CorrectionsFit:
+    """How a power follows the corrections.
 
     powers: log10, (flights,) of each drone; corrections: (flights,) of each drone, (m/s)^2. Each drone has a power of
     its own beside. start: of the first figure, log10.
@@ -57,4 +87,4 @@ def corrections_fit(powers: list[np.ndarray], corrections: list[np.ndarray], sta
                                for y, own, c in zip(powers, x[:-1], corrections, strict=True)])
 
     solution = least_squares(residual, [*(y.min() for y in powers), start]).x
-    return float(solution[-1]), np.concatenate([y - y.mean() for y in powers]), residual(solution)
+    return CorrectionsFit(float(solution[-1]), np.concatenate([y - y.mean() for y in powers]), residual(solution))

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import t as student
 
 from airtouch.gap.balance.hover_pattern import HoverPattern
-from tools.diagnosis import gap_crazypad_balance as balance
+from tools.diagnosis.recordings.crazypad import balance
 
 
 def test_a_cut_rotor_is_commanded_more_in_all_four():
