@@ -7,7 +7,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
 from airtouch.gap.answer.controls import control, shrink_by_vehicle
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
+from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, gap_of
@@ -103,7 +103,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += signs_not_shown(selection)
     say("how far")
     result = _answer(data, selection, gap)
-    notes += at_end_of_range(result.effects)
+    notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
                    calibrated=calibrated)
 

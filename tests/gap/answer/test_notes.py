@@ -1,9 +1,12 @@
 """Notes on the effects named: parameters at the end of their range, signs that do not show."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
-from airtouch.gap.answer.notes import at_end_of_range, signs_not_shown
+from airtouch.gap.answer.named_effects import with_random_part
+from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.signatures.candidates import random_part_of
 
 
 def test_a_parameter_at_the_end_of_its_range_is_told():
@@ -15,6 +18,19 @@ def test_a_parameter_at_the_end_of_its_range_is_told():
     assert note.startswith("motor_lag: factor is at the end of its range (5)")
     assert len(at_end_of_range([named("wind", x=10.0, y=0.0, z=-10.0)])) == 2
     assert not at_end_of_range([named("downwash", strength=1.0, turbulence=0.0), named("motor_lag", factor=1.0)])
+
+
+def test_a_wake_that_shakes_more_than_a_simulator_can_be_given_is_told():
+    """The strength of a mean too weak for its random part is raised until the turbulence is within its range."""
+    def wake(turbulence):
+        effect = NamedEffect("downwash", {k: Quantity(v) for k, v in {"strength": 1e-4, "turbulence": 0.0}.items()})
+        part = random_part_of("downwash")
+        part = replace(part, values={**part.values, "strength": 1.0, "turbulence": turbulence})
+        return with_random_part(effect, part)
+
+    (note,) = mostly_random([NamedEffect("mass", {"fraction": Quantity(0.1)}), wake(0.05)])
+    assert note.startswith("downwash: it shakes at least 5 times as much as it pushes")
+    assert mostly_random([wake(0.0)]) == [] and mostly_random([wake(1e-4)]) == []
 
 
 def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():

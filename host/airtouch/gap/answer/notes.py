@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 
-from airtouch.gap.naming.judging import at_bound
+from airtouch.gap.naming.judging import NEAR_BOUND, at_bound
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.candidates import term_of
+from airtouch.gap.signatures.term import parameter_of
+from airtouch.simulation.effects import get
 
 
 def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
@@ -17,6 +19,20 @@ def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
         notes += [f"{effect.name}: {name} is at the end of its range ({effect.parameters[name].value:.4g}): the true"
                   " one lies beyond it, or something else is behind the gap"
                   for name, end in zip(term.signature.free, ends, strict=True) if end]
+    return notes
+
+
+def mostly_random(effects: Sequence[NamedEffect]) -> list[str]:
+    """A note on each effect whose mean is too small for its random part, with which `with_random_part` raises it."""
+    notes = []
+    for effect in effects:
+        turbulence = effect.parameters.get("turbulence")
+        if turbulence is None:
+            continue
+        most = parameter_of(get(effect.name), "turbulence").high
+        if turbulence.value >= NEAR_BOUND * most:
+            notes.append(f"{effect.name}: it shakes at least {most:g} times as much as it pushes, the most that a"
+                         " simulator can be given; its strength is the least that shakes as much as the flights do")
     return notes
 
 
