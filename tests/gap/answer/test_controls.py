@@ -1,7 +1,9 @@
 """What the answer is compared with: a wrong effect, which closes nothing, and the vehicle as declared."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from airtouch.gap.answer.controls import control, shrink_by_vehicle
@@ -40,3 +42,15 @@ def test_the_gap_is_also_closed_with_the_vehicle_as_declared(pushed):
     both = shrink_by_vehicle(FLOOR, data.flights, selection, answer)
     assert both["calibrated"] == gap.shrink
     assert both["declared"].share.value == pytest.approx(gap.shrink.share.value, abs=0.02)
+
+
+def test_a_jitter_is_measured_in_the_logged_times_with_either_vehicle():
+    """A vehicle changes no times: both runs have the same gap. No wrong effect has one in them."""
+    late = 0.004 * np.random.default_rng(4).normal(size=3000)
+    selection, data = select_from([replace(hover(2), clock_s=late)], ("time_jitter", "mass"))
+    gap = gap_of(data, selection.halves, selection.named_hypothesis)
+    assert [s.name for s in selection.named_steps] == ["time_jitter"] and gap.shrink.before > 2.0
+    answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
+    both = shrink_by_vehicle(FLOOR, data.flights, selection, answer)
+    assert both["declared"] == both["calibrated"] == gap.shrink
+    assert control(data, selection, gap) is None

@@ -23,6 +23,13 @@ def test_the_ratio_is_the_rms_over_the_floor_of_the_cell():
     assert not len(ratio_of(flight(1.0)))
 
 
+def test_a_channel_that_a_log_lacks_has_no_ratio():
+    """Zeros would say that a flight without a gyro has no gap in the rates."""
+    gap = np.full((4000, COUNT), 0.5)
+    gap[:, COLUMN["rate_x"]] = np.nan
+    assert np.isnan(ratios_of_blocks(hover(0.0), gap, replace(CELL, channel="rate_x"))).all()
+
+
 def test_a_command_is_held_against_the_floor_of_its_cell():
     """The replay's own floor says nothing of commands, whose floor is that of the loop."""
     one, gap = hover(0.0), np.zeros((4000, COUNT))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from airtouch.gap.answer.ranking import alike_of
-from airtouch.gap.answer.shrink import Gap, gap_of, shrink_of
+from airtouch.gap.answer.shrink import Gap, gap_of, is_only_jitter, shrink_of, shrink_of_jitter
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
@@ -16,7 +16,13 @@ from airtouch.gap.study import Study
 
 
 def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
-    """The gap with a deliberately wrong effect in the model; None where none of WRONG is wrong."""
+    """The gap with a deliberately wrong effect in the model.
+
+    None where none of WRONG is wrong, or where jitter alone is named: its gap is that of the logged times, which no
+    other effect changes.
+    """
+    if is_only_jitter(selection.named_hypothesis):
+        return None
     right = {name for group in alike_of(selection) for name in group} | {s.name for s in selection.named_steps}
     variants = candidates.all_candidates()
     name = next((n for n in WRONG if n in variants and n not in right), None)
@@ -41,6 +47,8 @@ def shrink_by_vehicle(declared: Study | None, judged: Sequence[Flight], selectio
     if declared is None:
         return {"declared": overall}
     data = Data(declared, judged)
+    if is_only_jitter(selection.named_hypothesis):
+        return {"declared": shrink_of_jitter(data), "calibrated": overall}
     parts = halves(data)
     terms = tuple(t for t in selection.named_hypothesis.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.named_hypothesis.fits[0].terms if selection.named_hypothesis.fits else ())

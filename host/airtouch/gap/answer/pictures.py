@@ -19,7 +19,7 @@ from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen; more make a report longer
@@ -135,7 +135,7 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
     for start, stop in stretches(flight):
         here = values[start:stop]
         if bands < len(MAP_BANDS_HZ):
-            here = filtered(np.nan_to_num(here[:, None]))[:bands].sum(axis=0)[:, 0]
+            here = low_passed(np.nan_to_num(here[:, None]), bands)[:, 0]
         out[start:stop] = here
     return out
 

@@ -72,18 +72,18 @@ def gap_of(data: Data, parts: Sequence[BlockSet], hypothesis: Candidate | None) 
     after = _energies(data, parts, terms, cells)
     deficit = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
     before = deficit + _energies(data, parts, _terms(None), cells)
-    shrink = shrink_of_jitter(data) if _only_jitter(hypothesis) else _shrink(before, deficit + after)
+    shrink = shrink_of_jitter(data) if is_only_jitter(hypothesis) else _shrink(before, deficit + after)
     return Gap(cells, deficit, before, shrink)
 
 
 def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:
     """How far another hypothesis than the effects named closes the gap of two halves."""
-    if _only_jitter(candidate):
+    if is_only_jitter(candidate):
         return shrink_of_jitter(data)
     return _shrink(gap.energies_before, gap.deficit + _energies(data, parts, _terms(candidate), gap.cells))
 
 
-def _only_jitter(candidate: Candidate | None) -> bool:
+def is_only_jitter(candidate: Candidate | None) -> bool:
     """Whether a hypothesis moves the logged times and does nothing else."""
     return candidate is not None and bool(candidate.terms) \
         and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in candidate.terms)

@@ -55,11 +55,11 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
 def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
     """Rms of a cell's channel and band over the cell's floor, in each block (blocks,) in the air.
 
-    gap (n, COUNT): the flight, measured minus modelled.
+    gap (n, COUNT): the flight, measured minus modelled. NaN where the log lacks the channel.
     """
     begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
-    if not len(begin):
-        return np.zeros(0)
+    if not len(begin) or not np.isfinite(gap[:, c]).any():
+        return np.full(len(begin), np.nan)
     density = np.abs(short_time_spectra(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
     gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
     return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
@@ -68,11 +68,12 @@ def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:
     """Flights with their ratios (blocks,), NaN in blocks of which most is another phase.
 
-    Where no block of any flight is mostly of the phase, all count.
+    Where no block of any flight is mostly of the phase, all count. Flights without a number are left out.
     """
     place = KINDS.index(phase)
     within = [(f, np.where(_commonest_phase(f) == place, ratio, np.nan)) for f, ratio in ratios]
-    return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] or [(f, r) for f, r in ratios if len(r)]
+    return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] \
+        or [(f, ratio) for f, ratio in ratios if np.isfinite(ratio).any()]
 
 
 def _commonest_phase(flight: Flight) -> np.ndarray:

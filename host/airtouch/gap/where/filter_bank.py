@@ -30,10 +30,24 @@ def gains(f: np.ndarray) -> np.ndarray:
 
 def filtered(values: np.ndarray) -> np.ndarray:
     """Values (n, c) of one stretch in each band, (bands, n, c); a constant stays in the lowest."""
+    return _with_gains(values, gains(_mirrored_frequencies(len(values))))
+
+
+def low_passed(values: np.ndarray, bands: int) -> np.ndarray:
+    """Values (n, c) of one stretch in the lowest bands together, with a gain of 1 up to the crossover of the last."""
+    power_gain = (gains(_mirrored_frequencies(len(values)))[:bands] ** 2).sum(axis=0)
+    return _with_gains(values, np.sqrt(power_gain)[None])[0]
+
+
+def _mirrored_frequencies(n: int) -> np.ndarray:
+    """Frequencies (n + 1,), Hz, of a stretch of n samples with its mirror image behind it."""
+    return np.fft.rfftfreq(2 * n, PERIOD_S)
+
+
+def _with_gains(values: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """Values (n, c) with each of several amplitude gains (g, n + 1), (g, n, c); the stretch is mirrored at its end."""
     n = len(values)
-    mirrored = np.concatenate([values, values[::-1]])
-    spectrum = np.fft.rfft(mirrored, axis=0)
-    gain = gains(np.fft.rfftfreq(2 * n, PERIOD_S))
+    spectrum = np.fft.rfft(np.concatenate([values, values[::-1]]), axis=0)
     return np.fft.irfft(spectrum * gain[:, :, None], 2 * n, axis=1)[:, :n]
 
 
