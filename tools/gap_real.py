@@ -102,13 +102,14 @@ def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
 def identity(case: Case) -> dict:
     """What tells the answer to a case from others: its flight, what it is held against, what is left out."""
     return {"row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
-            "partner": len(case.partner), "left_out": list(case.left_out)}
+            "partner": len(case.partner), "left_out": list(case.left_out),
+            "against": [Path(file).name for file in (*case.baseline, *(p for p, _ in case.partner))]}
 
 
 def _key(answer: dict) -> tuple:
-    """The `identity` of an answer as a key; files of before 2026-11-26 have neither partners nor effects left out."""
+    """The `identity` of an answer as a key. A kept answer that does not say what it was held against fits no case."""
     return (answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0),
-            tuple(answer.get("left_out", ())))
+            tuple(answer.get("left_out", ())), tuple(answer.get("against", ())))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -132,7 +133,7 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     if args.most_baseline is not None and args.most_baseline < 0:
         parser.error("--most-baseline must be 0 or more")
-    for data_set in {data_set for row in args.rows for data_set in DATA_SETS[row]}:
+    for data_set in {data_set for row in (DEFAULT_ROWS if args.quick else args.rows) for data_set in DATA_SETS[row]}:
         check_data_set(args.flights / data_set)
     check_free(args.keep, force=True)
     if args.quick:  # of the parts for building, and two peers
@@ -145,6 +146,8 @@ def main(arguments: list[str] | None = None) -> int:
     if args.leave_out:
         cases = list(without_truths(cases))
     cases = [replace(c, baseline=c.baseline[:args.most_baseline]) for c in cases]
+    if not cases:
+        raise AirTouchError(f"no flight of {' '.join(args.rows)} in the part {args.part}")
     answers = diagnoses(cases, args.keep, args.jobs)
     print_table(answers, args.flights)
     wrong = [c["flight"] for c in answers if answer(c) != c["truth"]]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from airtouch.errors import AirTouchError
 from tools import gap_real
 from tools.diagnosis.recordings import cases
 
@@ -37,7 +38,8 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, diagnosed, capsys
 
 def test_a_kept_answer_is_that_of_the_same_baseline_partners_and_candidates(tmp_path, diagnosed):
     whole = cases.Case("swarm", "none", "v", "a.csv", ("b.csv", "c.csv", "d.csv"))
-    asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, partner=(("e.csv", 0.0),)),
+    asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, baseline=("b.csv", "c.csv", "f.csv")),
+             replace(whole, partner=(("e.csv", 0.0),)),
              replace(whole, left_out=("mass",))]
     for case in asked:
         for _ in range(2):
@@ -45,6 +47,12 @@ def test_a_kept_answer_is_that_of_the_same_baseline_partners_and_candidates(tmp_
             assert (answer["baseline"], answer["partner"]) == (len(case.baseline), len(case.partner))
             assert tuple(answer["left_out"]) == case.left_out
     assert diagnosed == asked, "each once"
+
+
+def test_no_flight_is_refused(flights, diagnosed):
+    with pytest.raises(AirTouchError, match="no flight of peers in the part build"):
+        gap_real.main([str(flights), "--rows", "peers", "--part", "build"])
+    assert not diagnosed
 
 
 def test_each_flight_is_diagnosed_against_so_many_baseline_flights_at_most(flights, diagnosed):

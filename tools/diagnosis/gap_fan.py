@@ -25,7 +25,7 @@ from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.study import Study
 from airtouch.logs import read
 from airtouch.simulation.body import rigid_body
-from recordings.authors import VEHICLE, questions
+from recordings.authors import questions
 from recordings.folder import add_folder
 
 BAND_HZ = (0.6, 12.0)  #: Hz, band whose power is compared; no source: round numbers
@@ -61,7 +61,7 @@ def main() -> None:
     add_folder(parser, "airtouch")
     folder = parser.parse_args().folder
     check_data_set(folder)
-    vehicle = vehicles.load(VEHICLE)
+    vehicle = vehicles.load(vehicles.DEFAULT_VEHICLE)
     fan, calm = (list(ready_flights([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
     print(f"calibrating on {len(calm)} calm flights", file=sys.stderr, flush=True)

@@ -30,7 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.cli.shared.progress import with_bar
 from airtouch.detector.evaluation.data.folds import BUILD_DAYS
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from recordings import swarm_cuts
 from recordings.folder import add_folder
 from recordings.wakes.false_alarms import show_false_alarms
@@ -53,6 +53,8 @@ def main() -> None:
     if (options.false_alarms or options.without_seconds) and (options.part == "all" or options.answers):
         parser.error("--part all and --answers are of the test that knows the seconds: leave them out")
     check_data_set(options.flights / "neuralswarm")
+    if options.answers is not None and not options.answers.is_file():
+        raise AirTouchError(f"{options.answers}: no such file; gap_real.py --keep writes one")
     if options.without_seconds:
         show_without_seconds(options.flights)
         return

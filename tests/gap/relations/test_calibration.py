@@ -16,6 +16,7 @@ def test_the_scatter_of_distances_is_found_in_flights_of_which_some_hit_somethin
     excess = np.hypot(19.0, 0.02 * evidence) * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000)
     excess[:40] += 5000.0
     assert likeliest_scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
+    assert likeliest_scatter(np.zeros(0), np.zeros(0), 19.0) == 0.0, "no flight"
     assert likeliest_scatter(19.0 * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000), evidence, 19.0) < 0.002
 
 

@@ -43,6 +43,13 @@ def test_either_sign_has_its_own_line():
     assert readout(np.array([-10.0]))[0] == pytest.approx([-30.0], rel=1e-3)
 
 
+def test_a_sign_that_no_calibration_flight_has_mirrors_the_other():
+    size = np.geomspace(1.0, 100.0, 30)
+    readout = Readout(("fraction",), size[:, None], 2.0 * size[:, None])
+    (there,), (here,) = readout(np.array([-20.0]))[0], readout(np.array([20.0]))[0]
+    assert there == -here == pytest.approx(-40.0, rel=1e-3)
+
+
 def test_several_parameters_are_linear_in_the_strengths():
     rng = np.random.default_rng(2)
     matrix, strength = np.array([[0.3, 0.1], [-0.2, 0.5]]), rng.normal(size=(60, 2))

@@ -161,8 +161,11 @@ def share_of(gains: Iterable[tuple[float, float]]) -> float:
 def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
     """Likeliest scatter s of distances over the evidence: excess (n,) ~ sqrt(nominal^2 + (s evidence)^2) Student's t.
 
-    nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats.
+    nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats. Without flights it is 0.
     """
+    if not len(excess):
+        return 0.0
+
     def against(logarithm: float) -> float:
         """Minus the log likelihood of a scatter."""
         scatter = np.hypot(nominal, np.exp(logarithm) * evidence)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.relations.calibration import HIGHEST_START, calibrate_class
-from airtouch.gap.relations.effect_class import ClassCalibration, ClassFlights, EffectClass, learn_class
+from airtouch.gap.relations.effect_class import LEAST_SHIFT, ClassCalibration, ClassFlights, EffectClass, learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled, weakest_strength
 from airtouch.gap.relations.library import SHARES, Library
 from airtouch.gap.relations.settings import OWN_EFFECT, OwnEffectSettings
@@ -45,7 +45,10 @@ def completed(library: Library, vehicle: Vehicle, names: Iterable[str],
 
 
 def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSettings) -> Library:
-    """The library with a class of one more effect, learned and calibrated; as it is if too few flights end well."""
+    """The library with a class of one more effect, learned and calibrated.
+
+    It stays as it is if too few flights end well and show the effect.
+    """
     drawing = Drawing(name, kinds_of(get(name))[name])
     high = drawing.kind.highest
     low = min(weakest_strength(high, partial(_length_of_shift, library, scene, drawing)), HIGHEST_START * high)
@@ -53,6 +56,7 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
                  for i in range(settings.pairs)]
     flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
     pairs = [p for p in flown if p is not None]
+    pairs = [p for p in pairs if np.linalg.norm(p.flight - p.nominal) > LEAST_SHIFT]
     if len(pairs) < settings.least_pairs:
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))

@@ -51,8 +51,14 @@ class Readout:
         return self._across(strength)
 
     def _along(self, strength: float) -> tuple[np.ndarray, np.ndarray]:
-        """One parameter: local linear regression of the logarithm of the amount on that of the strength."""
+        """One parameter: local linear regression of the logarithm of the amount on that of the strength.
+
+        A strength of a sign that no calibration flight has is read as the mirror image of the other sign.
+        """
         same_sign = self.strength[:, 0] * strength > 0.0
+        if strength != 0.0 and not same_sign.any():
+            amount, error = self._along(-strength)
+            return (-amount if self.shows_sign(np.array([-strength])) else amount), error
         distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
         ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
         weight = _weights(distance)
