@@ -57,8 +57,8 @@ class Readout:
         """
         same_sign = self.strength[:, 0] * strength > 0.0
         if strength != 0.0 and not same_sign.any():
-            amount, error = self._along(-strength)
-            return (-amount if self.shows_sign(np.array([-strength])) else amount), error
+            mirrored, error_of_it = self._along(-strength)
+            return (-mirrored if self.shows_sign(np.array([-strength])) else mirrored), error_of_it
         distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
         ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
         weight = _weights(distance)
