@@ -90,7 +90,8 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
         return re.search(r"^\| flights \|.*\n\|[-|]+\n((?:\|.*\n)+)", page[page.index(start):], re.M).group(1)
 
     view, build, nominal, unknown_scatter = map(table, (
-        "**Flights to which no constant", "were built on.", "**Every nominal flight", "**The same in flights whose scatter"))
+        "**Flights to which no constant", "were built on.", "**Every nominal flight",
+        "**The same in flights whose scatter"))
 
     def total(rows, truth):
         counts = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()
