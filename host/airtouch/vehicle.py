@@ -67,6 +67,7 @@ class Vehicle:
 
 
 DEFAULT_VEHICLE = "crazyflie-2.1-flow"  #: the authors' drone, flown where nothing names another
+FILE = "VEHICLE.toml"  #: in advised commands: the file of a vehicle that is not built in
 TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are texts
 #: field -> length, of fields that are lists of numbers
 LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
@@ -91,6 +92,14 @@ def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
             raise unknown("vehicle", str(name_or_path), known, ", or a .toml file")
         text = file.read_text(encoding="utf-8")
     return parse(text, str(name_or_path))
+
+
+def argument_of(vehicle: Vehicle) -> str:
+    """What `--vehicle` takes for a vehicle: its name where it is the built-in one of that name, else FILE."""
+    try:
+        return vehicle.name if load(vehicle.name) == vehicle else FILE
+    except AirTouchError:
+        return FILE
 
 
 def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:

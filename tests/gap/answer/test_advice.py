@@ -18,7 +18,7 @@ BASELINE = ("nominal.csv",)
 
 
 def advice(answer, flights=WITH_GYRO):
-    return steps(replace(answer, baseline=BASELINE, indistinguishable=()), flights)
+    return steps(replace(answer, baseline=BASELINE, indistinguishable=()), flights, VEHICLE)
 
 
 def test_named_effects_are_switched_on_in_the_simulator():
@@ -26,6 +26,14 @@ def test_named_effects_are_switched_on_in_the_simulator():
     words = shlex.split(step.command)
     assert words[words.index("--vehicle") + 1] == VEHICLE.name
     assert words[words.index("--effect") + 1] == "imu_bias:acc_x=0.8m/s^2"
+
+
+@pytest.mark.parametrize("vehicle", [replace(VEHICLE, name="my drone"), replace(VEHICLE, mass_kg=0.05)])
+def test_a_vehicle_of_a_file_of_its_own_is_named_by_a_file(vehicle):
+    """`--vehicle` takes no name of a vehicle that is not built in, and would take another one for one that is."""
+    answer = replace(diagnosis(), baseline=())
+    commands = [step.command for step in steps(answer, WITH_GYRO, vehicle) if "--vehicle" in step.command]
+    assert len(commands) == 2 and all("--vehicle VEHICLE.toml" in command for command in commands)
 
 
 def test_none_asks_for_nothing_to_be_added():
@@ -46,7 +54,7 @@ def test_an_open_gap_at_landing_is_flown_again_as_it_was():
 
 def test_effects_that_look_alike_come_first_and_what_is_missing_last():
     answer = replace(diagnosis(), baseline=())
-    alike, switch_on, baseline, gyro = steps(answer, [SimpleNamespace(rates=None)])
+    alike, switch_on, baseline, gyro = steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
     assert alike.text.startswith("To tell mass from thrust_coefficient: ")
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
 

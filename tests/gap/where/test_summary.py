@@ -6,7 +6,7 @@ from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.result import BASELINE, Cell, GapMap, NamedEffect
 from airtouch.gap.where import summary
-from made_diagnosis import cell, diagnosis
+from made_diagnosis import VEHICLE, cell, diagnosis
 
 
 def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
@@ -19,7 +19,7 @@ def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
     where, _, _ = sentences(answer)
     assert where == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, "
                      "and it stands out in 4 of 5 phases in the air.")
-    texts = [s.text for s in advice.steps(replace(answer, indistinguishable=()), [])]
+    texts = [s.text for s in advice.steps(replace(answer, indistinguishable=()), [], VEHICLE)]
     assert "more time in hover" in texts[0] and not any("take-off" in t for t in texts)
 
 

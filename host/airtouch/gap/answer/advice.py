@@ -8,6 +8,7 @@ from airtouch.gap.result import Cell, Diagnosis, NamedEffect, NextStep
 from airtouch.gap.signatures.alike import confusion_among
 from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
+from airtouch.vehicle import Vehicle, argument_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"  #: of a Crazyflie as it ships
@@ -15,32 +16,36 @@ URI = "radio://0/80/2M/E7E7E7E7E7"  #: of a Crazyflie as it ships
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def steps(answer: Diagnosis, flights: Sequence[Flight]) -> tuple[NextStep, ...]:
+def steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tuple[NextStep, ...]:
     """What to do next, most useful first.
 
-    answer: complete but for these steps; flights: which it is about.
+    answer: complete but for these steps; flights: which it is about; vehicle: as declared.
     """
+    argument = shlex.quote(argument_of(vehicle))
     next_steps = [_to_tell_apart(group) for group in answer.indistinguishable]
     if answer.verdict == "unknown":
-        next_steps += _for_an_open_gap(answer.headline, answer.vehicle)
+        next_steps += _for_an_open_gap(answer.headline, argument)
     if answer.verdict == "effect":
         named = " and ".join(dict.fromkeys(e.name for e in answer.effects))
         next_steps.append(NextStep(
             f"Switch on {named} with these parameters in the simulator, and fly it again.",
-            switched_on(answer.effects, answer.vehicle)))
+            switched_on(answer.effects, argument_of(vehicle))))
     if answer.verdict == "none":
         next_steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not answer.baseline:
         next_steps.append(NextStep(
             "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
-            "of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+            "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
     if any(f.rates is None for f in flights):
         next_steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(next_steps)
 
 
 def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
-    """The command that flies the named effects in the simulator, those that come and go all the time."""
+    """The command that flies the named effects in the simulator; those that pass act for the whole flight there.
+
+    vehicle: what `--vehicle` takes.
+    """
     words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
     for e in effects:
         arguments = [f"{k}={_argument(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
@@ -71,8 +76,11 @@ def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
                     collect(among.mission) if among.mission else "")
 
 
-def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
-    """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
+def _for_an_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
+    """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion.
+
+    argument: what `--vehicle` takes, quoted.
+    """
     next_steps = []
     if headline is not None and headline.phase in MISSIONS:
         next_steps.append(NextStep(
@@ -83,6 +91,6 @@ def _for_an_open_gap(headline: Cell | None, vehicle: str) -> list[NextStep]:
             "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
     next_steps.append(NextStep(
         "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
-        f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... --effect-file mine.py",
+        f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL... --effect-file mine.py",
         ADD_AN_EFFECT))
     return next_steps

@@ -95,7 +95,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
         if pictures else None)
-    return replace(answer, next=next_steps(answer, flights))
+    return replace(answer, next=next_steps(answer, flights, vehicle))
 
 
 def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
