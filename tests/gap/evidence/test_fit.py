@@ -1,4 +1,6 @@
-"""Fits of effects: wherever they begin, they end where the likelihood is highest."""
+"""Fits of effects together, and strengths of random effects: the likeliest, as certain as the spectra say."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,10 +8,14 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, converged, fit
 from airtouch.gap.evidence.judge import judge
-from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
+from airtouch.gap.evidence.problem import problem_of, whole_of
+from airtouch.gap.evidence.random_strength import LEAST_STRENGTH, strength_variance, strongest
 from airtouch.gap.flights.flight import without_columns
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.signatures import candidates
 from gap_flights import VEHICLE, fly
+from hovers import FLOOR, hover
 
 
 @pytest.mark.parametrize("start", [0.05, 3.0])
@@ -37,3 +43,45 @@ def test_a_fit_goes_on_until_it_stands_still(study):
     assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
     assert judge(data, blocks, refit.terms) < level + SETTLED
     assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED
+
+
+@pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])
+def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
+    """Against the best of a thousand strengths by the whole likelihood; one is less than the floor has."""
+    data = Data(FLOOR, [hover(1, louder=louder, length_s=12.0)])
+    problem = problem_of(data, whole_of(data))
+    (noise,) = candidates.terms("imu_noise")
+    values, other = problem.elements.base, beside * problem.elements.power
+    found = strongest(problem, noise, values, other)
+    strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
+    terms = [noise.fitted(np.full(1, x)) for x in strengths]
+    levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
+    best = strengths[int(np.argmax(levels))]
+    assert noise.scaled(found.values)[0] == pytest.approx(best, rel=0.01)
+    level = problem.likelihood(values, other + problem.random_power([found]))
+    assert level > max(levels) - 1e-2 and (best > 2.0 * LEAST_STRENGTH) == (louder > 1.0)
+
+
+def test_a_random_effect_that_adds_no_power_stays_as_it_is():
+    data = Data(FLOOR, [hover(1, length_s=12.0)])
+    problem = problem_of(data, whole_of(data))
+    (noise,) = candidates.terms("imu_noise")
+    elsewhere = replace(noise, gate=(("another flight", 0.0, 12.0),))
+    assert strongest(problem, elsewhere, problem.elements.base, np.zeros(len(problem.elements.base))) is elsewhere
+
+
+def test_variance_is_the_inverse_of_the_information_of_the_strength():
+    """Whittle's information of the logarithm of a strength x, sum (d log P / d log x)^2, by differences of the power P.
+
+    Tails leave nu / (nu + 2) of it or a little more; the curvature of one flight scatters about that.
+    """
+    data = Data(FLOOR, [hover(3, louder=1.5, length_s=20.0)])
+    blocks, problem = whole_of(data), problem_of(data, whole_of(data))
+    (noise,) = candidates.terms("imu_noise")
+    found = strongest(problem, noise, problem.elements.base, np.zeros(len(problem.elements.base)))
+    x, step = found.scaled(found.values), 1e-3
+    up, down = (np.log(problem.elements.power + problem.random_power([noise.fitted(x * np.exp(h))]))
+                for h in (step, -step))
+    information = OVERLAP_WEIGHT * np.sum((((up - down) / (2.0 * step)) ** 2)[problem.elements.valid])
+    with_tails = float(x[0] ** 2 / strength_variance(data, blocks, [found], found)[0, 0]) / information
+    assert 0.9 * REPLAY_FREEDOM / (REPLAY_FREEDOM + 2.0) < with_tails < 1.1
