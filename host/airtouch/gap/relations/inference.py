@@ -185,9 +185,13 @@ def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
 
 
 def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
-    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h
-                  for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
+    """Hypotheses with one more effect, all effects refitted in turn, the likeliest first.
+
+    Of the same classes, reached from two hypotheses of the beam, the likelier is kept.
+    """
+    extended = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM]),
+                      key=lambda h: h.evidence)
+    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in extended}
     likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
