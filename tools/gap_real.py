@@ -107,7 +107,9 @@ def identity(case: Case) -> dict:
 
 
 def _key(answer: dict) -> tuple:
-    """The `identity` of an answer as a key. A kept answer that does not say what it was held against fits no case."""
+    """The `identity` of an answer as a key. Files of before 2026-11-26 do not say what an answer was held against: such
+    an answer fits only a case without a baseline.
+    """
     return (answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0),
             tuple(answer.get("left_out", ())), tuple(answer.get("against", ())))
 

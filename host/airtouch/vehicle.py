@@ -95,7 +95,10 @@ def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
 
 
 def argument_of(vehicle: Vehicle) -> str:
-    """What `--vehicle` takes for a vehicle: its name where it is the built-in one of that name, else FILE."""
+    """What `--vehicle` takes for a vehicle: its name where it is the built-in one of that name, else FILE.
+
+    A shell takes either as it stands.
+    """
     try:
         return vehicle.name if load(vehicle.name) == vehicle else FILE
     except AirTouchError:

@@ -51,8 +51,9 @@ def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
     _, missed, _, error, *_ = cells_of("## Edges", "`best`")
     assert edges[0].startswith("{} % of 174 edges missed, the others {} m off".format(*numbers(missed, error)))
     high, others = (cells_of("### Where `best` fails", "0201")[i] for i in (2, 3))
-    (hits, of), more = map(int, re.match(r"(\d+) of (\d+)", high).groups()), re.match(r"none of (\d+)", others)
-    assert edges[1].startswith(f"{hits} of {of + int(more.group(1))} missed on one of their days")
+    missed_high, high_edges = map(int, re.match(r"(\d+) of (\d+)", high).groups())
+    other_edges = re.match(r"none of (\d+)", others)
+    assert edges[1].startswith(f"{missed_high} of {high_edges + int(other_edges.group(1))} missed on one of their days")
     for said, name in zip(simulated, ("`paper-4cm`", "`paper-mixed`"), strict=True):
         seeds = cells_of("## Flights of the virtual drone", name)[2:]
         assert said.startswith("{} and {} % of 40 missed".format(*numbers(*seeds))) and name in said

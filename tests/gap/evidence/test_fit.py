@@ -52,13 +52,13 @@ def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
     problem = problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
     values, other = problem.elements.base, beside * problem.elements.power
-    found = strongest(problem, noise, values, other)
+    likeliest = strongest(problem, noise, values, other)
     strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
     terms = [noise.fitted(np.full(1, x)) for x in strengths]
     levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
     best = strengths[int(np.argmax(levels))]
-    assert noise.scaled(found.values)[0] == pytest.approx(best, rel=0.01)
-    level = problem.likelihood(values, other + problem.random_power([found]))
+    assert noise.scaled(likeliest.values)[0] == pytest.approx(best, rel=0.01)
+    level = problem.likelihood(values, other + problem.random_power([likeliest]))
     assert level > max(levels) - 1e-2 and (best > 2.0 * LEAST_STRENGTH) == (louder > 1.0)
 
 
@@ -78,10 +78,10 @@ def test_variance_is_the_inverse_of_the_information_of_the_strength():
     data = Data(FLOOR, [hover(3, louder=1.5, length_s=20.0)])
     blocks, problem = whole_of(data), problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
-    found = strongest(problem, noise, problem.elements.base, np.zeros(len(problem.elements.base)))
-    x, step = found.scaled(found.values), 1e-3
+    likeliest = strongest(problem, noise, problem.elements.base, np.zeros(len(problem.elements.base)))
+    x, step = likeliest.scaled(likeliest.values), 1e-3
     up, down = (np.log(problem.elements.power + problem.random_power([noise.fitted(x * np.exp(h))]))
                 for h in (step, -step))
     information = OVERLAP_WEIGHT * np.sum((((up - down) / (2.0 * step)) ** 2)[problem.elements.valid])
-    with_tails = float(x[0] ** 2 / strength_variance(data, blocks, [found], found)[0, 0]) / information
+    with_tails = float(x[0] ** 2 / strength_variance(data, blocks, [likeliest], likeliest)[0, 0]) / information
     assert 0.9 * REPLAY_FREEDOM / (REPLAY_FREEDOM + 2.0) < with_tails < 1.1

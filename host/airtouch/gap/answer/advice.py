@@ -21,7 +21,7 @@ def steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tup
 
     answer: complete but for these steps; flights: which it is about; vehicle: as declared.
     """
-    argument = shlex.quote(argument_of(vehicle))
+    argument = argument_of(vehicle)
     next_steps = [_to_tell_apart(group) for group in answer.indistinguishable]
     if answer.verdict == "unknown":
         next_steps += _for_an_open_gap(answer.headline, argument)
@@ -29,7 +29,7 @@ def steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tup
         named = " and ".join(dict.fromkeys(e.name for e in answer.effects))
         next_steps.append(NextStep(
             f"Switch on {named} with these parameters in the simulator, and fly it again.",
-            switched_on(answer.effects, argument_of(vehicle))))
+            switched_on(answer.effects, argument)))
     if answer.verdict == "none":
         next_steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not answer.baseline:
@@ -79,7 +79,7 @@ def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
 def _for_an_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion.
 
-    argument: what `--vehicle` takes, quoted.
+    argument: what `--vehicle` takes.
     """
     next_steps = []
     if headline is not None and headline.phase in MISSIONS:

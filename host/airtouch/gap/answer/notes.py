@@ -23,7 +23,7 @@ def at_end_of_range(effects: Sequence[NamedEffect]) -> list[str]:
 
 
 def mostly_random(effects: Sequence[NamedEffect]) -> list[str]:
-    """A note on each effect whose mean is too small for its random part, with which `with_random_part` raises it."""
+    """A note on each effect whose strength `with_random_part` raised, as its mean is too small for its random part."""
     notes = []
     for effect in effects:
         turbulence = effect.parameters.get("turbulence")

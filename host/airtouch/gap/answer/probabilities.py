@@ -18,7 +18,7 @@ MOST_UNKNOWN = 0.9
 
 
 def probabilities(selection: Selection, answer: str) -> dict[str, float]:
-    """The probability of every single candidate, of `none` and of `unknown`; they sum to 1, the answer's is largest.
+    """The probability of every single candidate, of `none` and of `unknown`: no other is larger than the answer's.
 
     answer: the first effect named, else the verdict (`ranking.verdict_of`).
 

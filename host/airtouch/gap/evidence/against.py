@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Against(NamedTuple):
-    """Nats that speak against the named effects, and the limit: those that may where these are right.
+    """Nats that speak against the named effects, and the limit: as many as may where these are right.
 
     of_distance: whether they are the excess of a flight's distance (`relations.inference`), not the gain of a nameless
     disturbance or model.

@@ -78,7 +78,7 @@ def clock_gain(data: Data, term: Term) -> MeasuredTerm:
 
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
-    """Log likelihood that those effects gain that act on the logged times, among others that do not."""
+    """Sum of the gains in log likelihood of those terms that act on the logged times."""
     return sum(clock_gain(data, t).gain for t in terms if t.shows_in == CLOCK)
 
 

@@ -30,7 +30,7 @@ GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,) with their covariance (k, k), and the gap (n,) that they leave."""
+    """Scaled parameters x (k,), the covariance (k, k) where the last step began, and the gap (n,) that they leave."""
 
     x: np.ndarray
     covariance: np.ndarray

@@ -43,7 +43,7 @@ class Layout:
                         for (i, state, _), places in zip(self.pieces, self._places, strict=True)), complex)
 
     def per_piece(self, value: Callable[[int, str], float]) -> np.ndarray:
-        """A number (n,) that a flight and a state have, for each value."""
+        """For each value the number (n,) of its flight and state."""
         return _joined(np.full(size, value(i, state))
                        for (i, state, _), size in zip(self.pieces, self.sizes, strict=True))
 

@@ -166,7 +166,7 @@ def _over_floor(data: Data, blocks: np.ndarray) -> _OverFloor:
 
 
 class BestStrength(NamedTuple):
-    """The strength (power) of the likeliest lines, and the nats, without OVERLAP_WEIGHT, that they gain over none."""
+    """The nats, without OVERLAP_WEIGHT, that the likeliest lines gain over none, and the strength (power) of these."""
 
     gain: float
     strength: float

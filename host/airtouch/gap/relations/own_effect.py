@@ -55,8 +55,7 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()]))
                  for i in range(settings.pairs)]
     flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
-    pairs = [p for p in flown if p is not None]
-    pairs = [p for p in pairs if np.linalg.norm(p.flight - p.nominal) > LEAST_SHIFT]
+    pairs = [p for p in flown if p is not None and np.linalg.norm(p.flight - p.nominal) > LEAST_SHIFT]
     if len(pairs) < settings.least_pairs:
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))
@@ -70,8 +69,8 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
 def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> ClassCalibration:
     """A calibration with shares no smaller than those of the known classes: a curve through few flights is less exact.
     """
-    every = (calibration, *(c.calibration for c in known))
-    return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in every) for name in SHARES))
+    calibrations = (calibration, *(c.calibration for c in known))
+    return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in calibrations) for name in SHARES))
 
 
 def _length_of_shift(library: Library, scene: Scene, drawing: Drawing, strength: float) -> float:

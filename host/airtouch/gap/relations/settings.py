@@ -41,7 +41,7 @@ class OwnEffectSettings:
     """Flights of an effect that the library lacks; chosen for time, as its user waits for them."""
 
     pairs: int = 40  #: flights with the effect, and as many without, of which its class is learned
-    least_pairs: int = 20  #: of these, that must end well; else the effect gets no class
+    least_pairs: int = 20  #: of these, that must end well and show the effect; else it gets no class
     calibration: CalibrationSettings = CalibrationSettings(class_flights=24)
 
 

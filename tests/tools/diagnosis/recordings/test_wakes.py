@@ -108,8 +108,9 @@ def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_i
     for t, name, truth in zip([low, high, *calm], ("low", "high", "a", "b", "c"), ("downwash", "", *["none"] * 3),
                               strict=True):
         t.row.update(file=name, vehicle="34 g", manoeuvre="swap" if name == "c" else "hover", truth=truth)
-    given = []
-    monkeypatch.setattr(false_alarms.overhead, "with_overhead", lambda study, flight, seconds: given.append(seconds))
+    seconds_overhead = []
+    monkeypatch.setattr(false_alarms.overhead, "with_overhead",
+                        lambda study, flight, seconds: seconds_overhead.append(seconds))
     monkeypatch.setattr(false_alarms.cases, "nominal", lambda *_: map(case, ("a", "b", "c", "no track")))
     wake = SimpleNamespace(key="", strength=None)
     monkeypatch.setattr(false_alarms.gates, "passing_effects", lambda data: {
@@ -119,7 +120,7 @@ def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_i
     false_alarms.show_false_alarms("F", [low, high, *calm])
     *lines, last = capsys.readouterr().out.splitlines()
     assert lines == ["a: 1 of 1", "b: 0 of 1", "c: 0 of 0"] and "1 of 2" in last and last.endswith("in 1 flights")
-    assert given == [((4.0, 7.0),)] * 2
+    assert seconds_overhead == [((4.0, 7.0),)] * 2
 
 
 def test_measures_without_seconds_are_held_against_nominal_flights_of_the_vehicle(stand_in, monkeypatch, capsys):
