@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
 from airtouch.logs.files import check_free, write_bytes
@@ -110,8 +111,8 @@ def figures_of(own: list[dict[str, Any]], other: list[dict[str, Any]], rotorpy: 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=64, help="of each round (default %(default)s)")
-    parser.add_argument("--workers", type=int, default=batch.available_cores(),
+    parser.add_argument("--flights", type=whole_number(1), default=64, help="of each round (default %(default)s)")
+    parser.add_argument("--workers", type=whole_number(1), default=batch.available_cores(),
                         help="processes (default: one a core)")
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--force", action="store_true", help="replace --json if it is there")

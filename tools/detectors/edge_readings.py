@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.simulation import scenario
@@ -162,7 +163,7 @@ def main() -> None:
     """Recorded flights, then the twin's."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="of recorded flights, with a manifest.csv")
-    parser.add_argument("--fold", type=int, action="append", default=[],
+    parser.add_argument("--fold", type=whole_number(0), action="append", default=[],
                         help="only flights of this fold; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()

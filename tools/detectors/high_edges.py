@@ -22,6 +22,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch import vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.model import BestModel
@@ -126,7 +127,8 @@ def main() -> None:
     """Print the tables, by class of height."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
-    parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
+    parser.add_argument("--fold", type=whole_number(0), action="append",
+                        help="only flights of this fold; may be repeated")
     parser.add_argument("--model", type=Path, action="append", default=[], help="a `best` model; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()

@@ -89,7 +89,10 @@ def main() -> None:
     """Print instructions of CMSIS-DSP's transforms beside those of one step of the pipeline."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sdist", type=Path, help="the archive, instead of a download")
-    source = unpack(parser.parse_args().sdist)
+    sdist = parser.parse_args().sdist
+    if sdist is not None and not sdist.is_file():
+        parser.error(f"{sdist}: no such file")
+    source = unpack(sdist)
     flight = made_flight()
     print(f"{'compiler':18}{'one FFT':>9}{'nine':>10}{'the step':>10}{'ratio':>8}")
     least, most = sys.maxsize, 0.0
