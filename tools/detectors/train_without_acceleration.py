@@ -62,7 +62,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="the model")
     parser.add_argument("--force", action="store_true", help="replace --out if it is there")
     options = parser.parse_args()
+    if not 0.0 < options.least <= 1.0:
+        parser.error("--least is a fraction: more than 0, at most 1")
     check_free(options.out, options.force)
+    scenario.load(options.twin / files.SCENARIO)  # before the flights are read
     listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]
     readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     air = free_air.read(options.free_air) if options.free_air else []
