@@ -18,6 +18,7 @@ from rich.table import Table
 from scipy.signal import ShortTimeFFT
 
 from airtouch import kernels, logs
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import find_flights
 from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best, paper
@@ -183,7 +184,7 @@ def row(table: Table, name: str, ours: float, peer: float, ratio: float, what: s
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=20, help="how many at most (default %(default)s)")
+    parser.add_argument("--flights", type=whole_number(1), default=20, help="how many at most (default %(default)s)")
     parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
     options = parser.parse_args()
     flights = load_flights(options.flights)

@@ -14,6 +14,7 @@ turn, medians. host/docs/simulation-checks.md has the figures.
 import argparse
 import importlib.util
 import json
+import shutil
 import statistics
 import subprocess
 import sys
@@ -22,8 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.progress import with_bar
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import check_free, write_bytes
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
@@ -76,12 +78,17 @@ def rotorpy_rate(seconds: float = PEER_S) -> float | None:
 
 
 def crazyflow_rates(python: str | None) -> dict[str, list[float]]:
-    """Simulated seconds a wall second and a CPU second, by integrator; {} without crazyflow."""
+    """Simulated seconds a wall second and a CPU second, by integrator; {} without crazyflow.
+
+    python: one that has crazyflow. Raises AirTouchError where it has not.
+    """
     if python is None and importlib.util.find_spec("crazyflow") is None:
         return {}
     command = [python or sys.executable, str(Path(__file__).parent / "benchmarks/bench_crazyflow.py"), "--rounds", "1"]
     run = subprocess.run(command, capture_output=True, text=True)
-    return json.loads(run.stdout.splitlines()[-1]) if run.returncode == 0 else {}
+    if run.returncode:
+        raise AirTouchError(f"crazyflow by {command[0]}: {run.stderr.strip().splitlines()[-1]}")
+    return json.loads(run.stdout.splitlines()[-1])
 
 
 def figures_of(own: list[dict[str, Any]], other: list[dict[str, Any]], rotorpy: list[float],
@@ -110,13 +117,15 @@ def figures_of(own: list[dict[str, Any]], other: list[dict[str, Any]], rotorpy: 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=64, help="of each round (default %(default)s)")
-    parser.add_argument("--workers", type=int, default=batch.available_cores(),
+    parser.add_argument("--flights", type=whole_number(1), default=64, help="of each round (default %(default)s)")
+    parser.add_argument("--workers", type=whole_number(1), default=batch.available_cores(),
                         help="processes (default: one a core)")
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--force", action="store_true", help="replace --json if it is there")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()
+    if options.crazyflow and shutil.which(options.crazyflow) is None:
+        parser.error(f"--crazyflow {options.crazyflow}: no such program")
     check_free(options.json, options.force)
     own, other, rotorpy, crazyflow = [], [], [], []
     for _ in with_bar(range(ROUNDS), "rounds"):

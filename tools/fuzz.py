@@ -175,13 +175,18 @@ def main() -> None:
     parser.add_argument("--resume", action="store_true", help="what earlier runs of the same programs did counts")
     parser.add_argument("--engine", choices=["libfuzzer", "standalone"], default="",
                         help="(default: the best that this machine has)")
-    parser.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
-    parser.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
-    parser.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
+    instead.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
+    instead.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")
     options = parser.parse_args()
     names = options.targets or list(targets())
     if unknown := set(names) - set(targets()):
         parser.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(targets())}")
+    if options.runs < 1:
+        parser.error("--runs must be at least 1")
+    if absent := [path for path in options.replay or () if not Path(path).is_file()]:
+        parser.error(f"{absent[0]}: no such file")
     if options.coverage:
         return print_coverage(names)
     made_by = engine(options.engine)

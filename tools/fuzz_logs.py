@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
+from airtouch.cli.shared.arguments import whole_number
 from fuzzing.log_fuzzing import hostile, mutations, sound, usd_mutations, usd_old_mutations, walk
 
 #: s of processor time for one input, and for each MB of it; no source: round numbers, some times what sound files take
@@ -157,11 +158,13 @@ def main() -> int:
     """Fuzz the formats, or run one input or the hostile files; 1 where anything failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1, help="of the mutations (default %(default)s)")
-    parser.add_argument("--count", type=int, default=1000, help="inputs of each format (default 1000)")
-    parser.add_argument("--first", type=int, default=0, help="number of the first input (default 0)")
+    parser.add_argument("--count", type=whole_number(1), default=1000, help="inputs of each format (default 1000)")
+    parser.add_argument("--first", type=whole_number(0), default=0, help="number of the first input (default 0)")
     parser.add_argument("--format", choices=sound.FORMATS, action="append", help="only this format; may be repeated")
-    parser.add_argument("--shapes", type=int, help="hostile files of this length instead of mutated ones")
-    parser.add_argument("--only", type=int, help="one input, with its traceback; its bytes go to out/fuzzed.log")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--shapes", type=whole_number(1), help="hostile files of this length instead of mutated ones")
+    instead.add_argument("--only", type=whole_number(0),
+                         help="one input, with its traceback; its bytes go to out/fuzzed.log")
     options = parser.parse_args()
     if options.only is not None and len(options.format or ()) != 1:
         parser.error("--only is a number of one format: give that with --format")

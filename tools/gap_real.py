@@ -20,6 +20,8 @@ only where --rows names it.
     python tools/gap_real.py [FLIGHTS] --rows swarm --leave-out    # flights whose effect no candidate explains
 
 --leave-out: flights with an effect alone, each without its effect among the candidates. `unknown` is right.
+
+A flight that the diagnosis refuses is counted as `refused` and not kept: the next run tries it again.
 """
 
 import argparse
@@ -27,6 +29,7 @@ import multiprocessing
 import os
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -34,15 +37,17 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
-from airtouch.logs import json_lines, read
+from airtouch.logs import read
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners, without_truths
 from diagnosis.recordings.folder import add_folder
+from diagnosis.recordings.kept import REFUSED, Result, add_keep, complete
 from diagnosis.recordings.table import answer, print_table
 
 #: (row, truth) -> flights of --quick
@@ -59,20 +64,20 @@ def _delay_clock(path: str, seconds: float) -> FlightLog:
     return FlightLog({**log.columns, "t_s": log["t_s"] + seconds}, log.meta)
 
 
-def diagnose_case(case: Case) -> dict:
-    """A case with its diagnosis."""
+def diagnose_case(case: Case) -> Result:
+    """The result of a case: its diagnosis, with what was asked and the labels."""
     started = time.perf_counter()
-    out = {**identity(case), "truth": case.truth, "condition": case.condition, "effects": []}
+    result = {**identity(case), "truth": case.truth, "condition": case.condition, "effects": []}
     study = case.vehicle, case.baseline, case.left_out
     try:
         diagnosis = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
                              before=_LAST.get(study), without=case.left_out,
                              partner=[_delay_clock(*p) for p in case.partner])
     except AirTouchError as error:
-        return {**out, "verdict": "refused", "why": str(error)}
+        return {**result, "verdict": REFUSED, "why": str(error)}
     _LAST.clear()
     _LAST[study] = diagnosis
-    return {**out, "verdict": diagnosis.verdict, "effects": diagnosis.plain()["effects"], "gap": diagnosis.gap,
+    return {**result, "verdict": diagnosis.verdict, "effects": diagnosis.plain()["effects"], "gap": diagnosis.gap,
             "ranking": {r.name: round(r.probability, 4) for r in diagnosis.ranking[:6]},
             "seconds": time.perf_counter() - started}
 
@@ -86,75 +91,89 @@ def quick(cases: list[Case]) -> list[Case]:
     return out
 
 
-def diagnoses(cases: list[Case], store: Path | None, jobs: int) -> list[dict]:
-    """Cases with their diagnoses, by `jobs` processes; those in the file `store` are read, others appended to it."""
-    answer_of = {_key(c): c for c in json_lines.read(store)}
-    todo = sorted((c for c in cases if _key(identity(c)) not in answer_of),
-                  key=lambda c: (c.row, c.vehicle, c.baseline, c.left_out))
-    with ProcessPoolExecutor(max(jobs, 1), multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
-        for i, case in enumerate(pool.map(diagnose_case, todo)):
-            answer_of[_key(case)] = case
-            json_lines.append(store, [case])
-            print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
-    return [answer_of[_key(identity(c))] for c in cases]
+def diagnose_cases(cases: list[Case], store: Path | None, jobs: int) -> list[Result]:
+    """The results of the cases, by `jobs` processes; those in the file `store` are read, others appended to it."""
+    def run(todo: list[Case]) -> Iterator[Result]:
+        """Results as they come, those of the same study one after another; each with a line of progress."""
+        todo = sorted(todo, key=lambda c: (c.row, c.vehicle, c.baseline, c.left_out))
+        with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:  # with no memory of ours
+            for i, result in enumerate(pool.map(diagnose_case, todo), 1):
+                print(f"{i}/{len(todo)} {result['truth']}: {result.get('why') or answer(result)} {result['flight']}",
+                      file=sys.stderr, flush=True)
+                yield result
+
+    return complete({_key(identity(c)): c for c in cases}, run, _key, store)
 
 
-def identity(case: Case) -> dict:
-    """What tells the answer to a case from others: its flight, what it is held against, what is left out."""
+def identity(case: Case) -> Result:
+    """What tells the result of a case from others: its flight, what it is held against, what is left out."""
     return {"row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
             "partner": len(case.partner), "left_out": list(case.left_out),
             "against": [Path(file).name for file in (*case.baseline, *(p for p, _ in case.partner))]}
 
 
-def _key(answer: dict) -> tuple:
-    """The `identity` of an answer as a key. Files of before 2026-11-26 do not say what an answer was held against: such
-    an answer fits only a case without a baseline.
+def _key(result: Result) -> tuple:
+    """The `identity` of a result as a key. Files of before 2026-11-26 do not say what a flight was held against: such
+    a result fits only a case without a baseline.
     """
-    return (answer["row"], answer["flight"], answer["baseline"], answer.get("partner", 0),
-            tuple(answer.get("left_out", ())), tuple(answer.get("against", ())))
+    return (result["row"], result["flight"], result["baseline"], result.get("partner", 0),
+            tuple(result.get("left_out", ())), tuple(result.get("against", ())))
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Diagnose the cases that the options name, and print the table; 1 where --quick has too many wrong ones."""
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line, whose options fit each other."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
-    parser.add_argument("--part", choices=("build", "view", "all"), default="build",
-                        help="flights on which settings may be chosen, the others, or both (default %(default)s)")
-    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=DEFAULT_ROWS,
-                        help="rows of the table (default: all but nominal)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
-    parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
+    parser.add_argument("--part", choices=("build", "view", "all"),
+                        help="flights on which settings may be chosen, the others, or both (default: build)")
+    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), help="rows of the table (default: all but nominal)")
+    parser.add_argument("--jobs", type=whole_number(1), default=2, help="processes (default %(default)s)")
+    add_keep(parser)
     parser.add_argument("--partner", action="store_true",
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
-    parser.add_argument("--most-baseline", type=int, metavar="N",
+    parser.add_argument("--most-baseline", type=whole_number(0), metavar="N",
                         help="most baseline flights of each, the first of them (default: all)")
     parser.add_argument("--leave-out", action="store_true",
                         help="flights with an effect alone, without that effect among the candidates")
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
-    args = parser.parse_args(arguments)
-    if args.most_baseline is not None and args.most_baseline < 0:
-        parser.error("--most-baseline must be 0 or more")
-    for data_set in {data_set for row in (DEFAULT_ROWS if args.quick else args.rows) for data_set in DATA_SETS[row]}:
-        check_data_set(args.flights / data_set)
-    check_free(args.keep, force=True)
-    if args.quick:  # of the parts for building, and two peers
-        cases = quick([c for row in DEFAULT_ROWS
-                       for c in ROWS[row](args.flights, "view" if row == "peers" else "build")])
+    options = parser.parse_args(arguments)
+    if options.quick and (options.rows or options.part):
+        parser.error("--quick has its own flights: leave out --rows and --part")
+    options.rows, options.part = options.rows or DEFAULT_ROWS, options.part or "build"
+    if options.partner and not any("neuralswarm" in DATA_SETS[row] for row in options.rows):
+        parser.error("--partner is of neural-swarm's flights: add swarm or nominal to --rows, or leave it out")
+    return options
+
+
+def cases_of(options: argparse.Namespace) -> list[Case]:
+    """The cases that the options name. Raises AirTouchError where there are none."""
+    if options.quick:  # of the parts for building, and two peers
+        cases = quick([c for row in options.rows
+                       for c in ROWS[row](options.flights, "view" if row == "peers" else "build")])
     else:
-        cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
-    if args.partner:
-        cases = with_partners(cases, args.flights)
-    if args.leave_out:
+        cases = [c for row in options.rows for c in ROWS[row](options.flights, options.part)]
+    if options.partner:
+        cases = with_partners(cases, options.flights)
+    if options.leave_out:
         cases = list(without_truths(cases))
-    cases = [replace(c, baseline=c.baseline[:args.most_baseline]) for c in cases]
     if not cases:
-        raise AirTouchError(f"no flight of {' '.join(args.rows)} in the part {args.part}")
-    answers = diagnoses(cases, args.keep, args.jobs)
-    print_table(answers, args.flights)
-    wrong = [c["flight"] for c in answers if answer(c) != c["truth"]]
-    if args.quick and len(wrong) > QUICK_WRONG:
-        print(f"gap_real: {len(wrong)} of {len(answers)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",
+        raise AirTouchError(f"no flight of {' '.join(options.rows)} in the part {options.part}"
+                            + " has an effect to leave out" * options.leave_out)
+    return [replace(c, baseline=c.baseline[:options.most_baseline]) for c in cases]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Diagnose the cases that the options name, and print the table; 1 where --quick has too many wrong ones."""
+    options = parse(arguments)
+    for data_set in sorted({data_set for row in options.rows for data_set in DATA_SETS[row]}):
+        check_data_set(options.flights / data_set)
+    check_free(options.keep, force=True)
+    results = diagnose_cases(cases_of(options), options.keep, options.jobs)
+    print_table(results, options.flights)
+    wrong = [r["flight"] for r in results if answer(r) != r["truth"]]
+    if options.quick and len(wrong) > QUICK_WRONG:
+        print(f"gap_real: {len(wrong)} of {len(results)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",
               file=sys.stderr)
         return 1
     return 0

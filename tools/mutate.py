@@ -135,6 +135,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--show", action="store_true", help="print those that no test noticed, and run nothing")
     parser.add_argument("--force", action="store_true", help="begin anew")
     args = parser.parse_args(arguments)
+    if args.sample is not None and args.sample < 1:
+        parser.error("--sample must be at least 1")
+    if args.show and (args.sample or args.force):
+        parser.error("--show runs nothing: leave out --sample and --force")
     if unknown := set(args.groups) - set(GROUPS):
         parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
     if not args.show and find_spec("mutmut") is None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from airtouch.errors import AirTouchError
 from tools import bench_simulation
 
 
@@ -26,3 +27,11 @@ def test_rates_and_ratios_are_medians_and_a_ratio_is_of_one_round():
 def test_peers_that_are_not_there_have_no_figures():
     figures = bench_simulation.figures_of(rounds(100), rounds(200), [], [{}])
     assert not any("rotorpy" in name or "crazyflow" in name for name in figures)
+
+
+def test_a_python_that_fails_is_no_python_without_crazyflow(tmp_path):
+    failing = tmp_path / "python"
+    failing.write_text("#!/bin/sh\necho no module named crazyflow >&2\nexit 1\n")
+    failing.chmod(0o755)
+    with pytest.raises(AirTouchError, match="no module named crazyflow"):
+        bench_simulation.crazyflow_rates(str(failing))

@@ -1,5 +1,6 @@
 """The diagnosis on a few recorded flights of each kind, and that the check of them can fail."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -18,15 +19,18 @@ def test_a_few_recorded_flights_of_each_kind(flights, capsys):
 
 @pytest.fixture
 def diagnosed(monkeypatch):
-    """The cases that are diagnosed, each of which is answered with none, in this process."""
-    out = []
+    """The cases that are diagnosed, in this process, each with the verdict `cases.verdict`: none."""
+    class Cases(list):
+        verdict = "none"
 
-    def none(case):
+    out = Cases()
+
+    def diagnose_case(case):
         out.append(case)
         return {**gap_real.identity(case), "truth": case.truth, "condition": case.condition, "effects": [],
-                "verdict": "none"}
+                "verdict": out.verdict}
 
-    monkeypatch.setattr(gap_real, "diagnose_case", none)
+    monkeypatch.setattr(gap_real, "diagnose_case", diagnose_case)
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
     return out
 
@@ -36,17 +40,30 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, diagnosed, capsys
     assert "wrong, more than" in capsys.readouterr().err and diagnosed
 
 
-def test_a_kept_answer_is_that_of_the_same_baseline_partners_and_candidates(tmp_path, diagnosed):
+def test_a_kept_result_is_that_of_the_same_baseline_partners_and_candidates(tmp_path, diagnosed):
     whole = cases.Case("swarm", "none", "v", "a.csv", ("b.csv", "c.csv", "d.csv"))
     asked = [whole, replace(whole, baseline=whole.baseline[:2]), replace(whole, baseline=("b.csv", "c.csv", "f.csv")),
              replace(whole, partner=(("e.csv", 0.0),)),
              replace(whole, left_out=("mass",))]
     for case in asked:
         for _ in range(2):
-            (answer,) = gap_real.diagnoses([case], tmp_path / "kept.jsonl", 1)
-            assert (answer["baseline"], answer["partner"]) == (len(case.baseline), len(case.partner))
-            assert tuple(answer["left_out"]) == case.left_out
+            (result,) = gap_real.diagnose_cases([case], tmp_path / "kept.jsonl", 1)
+            assert (result["baseline"], result["partner"]) == (len(case.baseline), len(case.partner))
+            assert tuple(result["left_out"]) == case.left_out
     assert diagnosed == asked, "each once"
+
+
+def test_a_refusal_is_not_kept_and_one_that_was_kept_is_no_result(tmp_path, diagnosed):
+    case, store = cases.Case("swarm", "none", "v", "a.csv", ()), tmp_path / "kept.jsonl"
+    diagnosed.verdict = "refused"
+    (refused,) = gap_real.diagnose_cases([case], store, 1)
+    assert refused["verdict"] == "refused" and not store.exists()
+    store.write_text(json.dumps(refused) + "\n")
+    diagnosed.verdict = "none"
+    for _ in range(2):
+        (result,) = gap_real.diagnose_cases([case], store, 1)
+        assert result["verdict"] == "none"
+    assert diagnosed == [case] * 2
 
 
 def test_no_flight_is_refused(flights, diagnosed):

@@ -46,6 +46,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0, help="simulated, of each round (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=3, help="timed after the one that compiles (default %(default)s)")
     options = parser.parse_args()
+    if options.seconds <= 0.0 or options.rounds < 1:
+        parser.error("--seconds must be more than 0, --rounds at least 1")
     print(json.dumps({name: [round(statistics.median(column))
                              for column in zip(*rates(name, options.seconds, options.rounds), strict=True)]
                       for name in ("euler", "rk4")}))

@@ -17,6 +17,7 @@ import time
 from importlib import resources
 from pathlib import Path
 
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.nominal.kept_scatter import VARIABLE
@@ -40,10 +41,8 @@ def seconds(processors: set[int], out: Path, cache: str) -> float:
 def main() -> None:
     """Time it and print medians."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=5, help="of each kind (default %(default)s)")
+    parser.add_argument("--runs", type=whole_number(1), default=5, help="of each kind (default %(default)s)")
     runs = parser.parse_args().runs
-    if runs < 1:
-        parser.error("--runs must be at least 1")
     free = os.sched_getaffinity(0)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

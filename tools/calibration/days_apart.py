@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
@@ -53,7 +54,8 @@ def main() -> None:
     """One line for each pair of days."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights of one drone")
-    parser.add_argument("--fewest", type=int, default=MIN_FLIGHTS, help="flights of a day (default %(default)s)")
+    parser.add_argument("--fewest", type=whole_number(1), default=MIN_FLIGHTS,
+                        help="flights of a day (default %(default)s)")
     options = parser.parse_args()
     days = read_days(options.folders)
     large = {day: flights for day, flights in sorted(days.items()) if len(flights) >= options.fewest}

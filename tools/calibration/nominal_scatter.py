@@ -1,13 +1,13 @@
 """Measures how strong every effect seems to be in nominal flights, for gap/signatures/nominal_scatter.toml.
 
-    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]   # hours
+    python tools/calibration/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep x.jsonl]   # hours
 
 Every nominal flight is compared twice with up to five others of its vehicle, on which the vehicle is calibrated: with
 flights of its own group (drone, day and condition), and with flights of other groups of the same drone. Strengths of
 both comparisons count, rates of the first alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20;
 simulated flights of this project. host/docs/gap-floor.md explains the table.
 
-    python tools/calibration/nominal_scatter.py [FLIGHTS] --passing    # 5 min
+    python tools/calibration/nominal_scatter.py [FLIGHTS] --passing [--keep x.jsonl]    # 5 min
 
 measures nothing but passing effects, in the same flights of the same groups. It writes the table that is shipped with
 these figures in place of the old ones. Both write --out; to ship a table, give it the path of the shipped one, and
@@ -20,10 +20,11 @@ from importlib import resources
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import check_data_set, data_folder
 from airtouch.errors import in_one_line
 from airtouch.logs.files import check_free, write_bytes
-from nominal.comparisons import compare_all, passing_of_classes
+from nominal.comparisons import Task, compare_all, tasks_of
 from nominal.groups import nominal_groups
 from nominal.scatter_table import counts_of, scatter_of_classes, text_of, with_passing
 
@@ -38,8 +39,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"),
                         help="the table (default %(default)s)")
     parser.add_argument("--force", action="store_true", help="replace --out if it is there")
-    parser.add_argument("--keep", type=Path, help="JSON lines; comparisons that it holds are not made again")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
+    parser.add_argument("--keep", type=Path, metavar="FILE",
+                        help="JSON lines, made if not there; comparisons that it holds are not made again")
+    parser.add_argument("--jobs", type=whole_number(1), default=2, help="processes (default %(default)s)")
     parser.add_argument("--passing", action="store_true", help="measure passing effects alone")
     args = parser.parse_args()
     check_free(args.out, args.force)
@@ -49,10 +51,12 @@ def main() -> None:
     large_enough = [g for g in nominal_groups(args.flights) if len(g.logs) >= LEAST]
     if args.passing:
         shipped = resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml"
-        text = text_of(with_passing(passing_of_classes(large_enough, args.jobs)),
+        tasks = [Task(group, passing=True) for group in large_enough]
+        text = text_of(with_passing(tasks, compare_all(tasks, args.keep, args.jobs)),
                        counts_of(shipped.read_text(encoding="utf-8")))
     else:
-        text = text_of(*scatter_of_classes(large_enough, compare_all(large_enough, args.keep, args.jobs)))
+        row_of = compare_all(tasks_of(large_enough), args.keep, args.jobs)
+        text = text_of(*scatter_of_classes(large_enough, row_of))
     write_bytes(text.encode(), args.out, args.force)
     print(text)
 

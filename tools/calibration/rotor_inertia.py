@@ -8,11 +8,13 @@ k thrust over speed squared, yaw torque over thrust, I a rotor's inertia, Jz the
 to the measured yaw acceleration is the ratio of their cross-spectra with the commanded yaw, so that noise of the
 speeds does not count; a delay of the gyro is fitted too. Printed for each flight: I / Jz, I for the vehicle's Jz,
 yaw torque over thrust, delay, each with its 90 % interval (bootstrap over blocks of 4 s), and what fraction of the yaw
-acceleration from 1 to 12 Hz that follows the command is explained with I and without.
+acceleration from 1 to 12 Hz that follows the command is explained with I and without. A flight that cannot be used
+has a line on stderr; the exit code is then 2.
 host/docs/twin-method.md has the figures.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -87,20 +89,23 @@ def report(log: FlightLog, craft: Vehicle) -> str:
             f"{fit(f, blocks, False)[1]:.0%}")
 
 
-def main() -> None:
-    """Print a line for each flight."""
+def main() -> int:
+    """Print a line for each flight; 2 where one was refused."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", type=Path, nargs="+", help="logs with rotor speeds")
     parser.add_argument("--vehicle", default="crazyflie-2.1", help="name or file: mass and Jz (default %(default)s)")
     options = parser.parse_args()
     craft = vehicle.load(options.vehicle)
+    refused = 0
     for path in options.flights:
         try:
             print(report(logs.read(path), craft), flush=True)
         except AirTouchError as error:
-            print(error, flush=True)
+            refused = 2
+            print(f"rotor_inertia: {error}", file=sys.stderr, flush=True)
+    return refused
 
 
 if __name__ == "__main__":
     with in_one_line("rotor_inertia"):
-        main()
+        sys.exit(main())

@@ -17,6 +17,7 @@ import numpy as np
 
 from airtouch import kernels, logs
 from airtouch.cli.shared import scores as show_scores
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
@@ -33,6 +34,7 @@ from airtouch.logs.files import check_free
 from airtouch.parameters import SAMPLE_PERIOD_S
 from airtouch.reference.edge_decoder import DecoderConfig
 
+FOLDS = "best_fold*.json"  #: files of `airtouch crossval`, one of each fold
 MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: round number, 1 s at 0.3 m/s
 FALSE_M = 0.02  #: m of mean error, cost of one false edge a minute; no source: round number
 
@@ -77,7 +79,7 @@ def held_out_flight(file: dataset.FlightFile, fold: int, model: BestModel, silen
 def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[HeldOutFlight]:
     """Every flight with the model of its own fold in `out`, by what `airtouch crossval` wrote of that fold."""
     files = {file.path.name: file for file in dataset.collect([folder])}
-    entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
+    entries = [json.loads(path.read_text()) for path in sorted(out.glob(FOLDS))]
     if len({entry["fold"] for entry in entries}) != len(entries):
         raise AirTouchError(f"{out}: folds of more than one cross-validation; give a folder with one")
     if absent := {score["file"] for entry in entries for score in entry["per_flight"]} - set(files):
@@ -167,8 +169,8 @@ def main() -> None:
     """Search, then print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
-    parser.add_argument("--count", type=int, default=1000, help="settings tried (default %(default)s)")
-    parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
+    parser.add_argument("--count", type=whole_number(1), default=1000, help="settings tried (default %(default)s)")
+    parser.add_argument("--hold", type=whole_number(0), default=best.DECODER.hold_steps,
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
     parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
                         help="decode the flights without this sensor")
@@ -176,9 +178,10 @@ def main() -> None:
     parser.add_argument("--force", action="store_true", help="replace --json if it is there")
     options = parser.parse_args()
     check_free(options.json, options.force)
+    for out in options.out:
+        if not any(out.glob(FOLDS)):
+            raise AirTouchError(f"{out}: no models of `best`: airtouch crossval --detector best --out {out}")
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
-    if not flights:
-        raise AirTouchError(f"{options.out[0]}: no models of `best`: airtouch crossval --out {options.out[0]}")
     settings = candidates(options.count, np.random.default_rng(0), options.hold)
     results = [outcomes(flights, config) for config in with_bar(settings, "settings")]
     print_figures("as shipped", flights, outcomes(flights, best.DECODER))

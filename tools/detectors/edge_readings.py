@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.simulation import scenario
@@ -124,9 +125,9 @@ def high_edges(passes: Passes, kind: str) -> dict[str, np.ndarray]:
     return {name: np.median(rows, axis=0) for name, rows in out.items() if rows}
 
 
-def simulated_passes(folder: Path, courses: Sequence[Course]) -> Iterable[tuple[Course, np.ndarray]]:
-    """The twin's flights in this folder that cross one platform, as many as courses at most."""
-    scene, craft = scenario.load(folder / files.SCENARIO), vehicle.load(str(folder / files.VEHICLE))
+def simulated_passes(scene: scenario.Scenario, craft: vehicle.Vehicle,
+                     courses: Sequence[Course]) -> Iterable[tuple[Course, np.ndarray]]:
+    """Flights of a twin, its scenario and vehicle, that cross one platform; as many as courses at most."""
     for number in range(len(courses)):
         log = fly(scene, craft, 0, number)
         if isinstance(log, Diverged):
@@ -162,14 +163,16 @@ def main() -> None:
     """Recorded flights, then the twin's."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="of recorded flights, with a manifest.csv")
-    parser.add_argument("--fold", type=int, action="append", default=[],
+    parser.add_argument("--fold", type=whole_number(0), action="append", default=[],
                         help="only flights of this fold; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()
+    twin = options.twin and (scenario.load(options.twin / files.SCENARIO),
+                             vehicle.load(str(options.twin / files.VEHICLE)))
     recorded = flights.read([options.folder], folds=options.fold)
     print_tables("recorded", list(zip(recorded.courses, recorded.channels, strict=True)))
-    if options.twin:
-        print_tables("twin", list(simulated_passes(options.twin, recorded.courses)))
+    if twin:
+        print_tables("twin", list(simulated_passes(*twin, recorded.courses)))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch import vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.model import BestModel
@@ -126,11 +127,14 @@ def main() -> None:
     """Print the tables, by class of height."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
-    parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
+    parser.add_argument("--fold", type=whole_number(0), action="append",
+                        help="only flights of this fold; may be repeated")
     parser.add_argument("--model", type=Path, action="append", default=[], help="a `best` model; may be repeated")
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()
     models = [best.load(path) for path in options.model]
+    twin = options.twin and (scenario.load(options.twin / files.SCENARIO),
+                             vehicle.load(str(options.twin / files.VEHICLE)))
     groups = by_height([f for f in dataset.collect(options.folders)
                         if not options.fold or f.condition.fold in options.fold])
     hovers = {name: [(log, path) for log, path in group if length(path.phases()["hover"]) > HOVER_S * RATE_HZ]
@@ -143,8 +147,8 @@ def main() -> None:
         pairs = [calm(log, path) for log, path in group]
         for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
             print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
-    if options.twin:
-        print_responses(groups, options.twin)
+    if twin:
+        print_responses(groups, *twin)
 
 
 def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
@@ -172,10 +176,9 @@ def print_logits(title: str, groups: Groups, models: Sequence[BestModel],
             print(row(name, len(values), np.median(values, axis=0).tolist(), "{:+.1f}"), flush=True)
 
 
-def print_responses(groups: Groups, twin: Path) -> None:
-    """Print what a platform adds above SPLIT_HZ, recorded and by the twin's responses."""
-    craft = vehicle.load(str(twin / files.VEHICLE))
-    responses = overlay.simulate_responses(scenario.load(twin / files.SCENARIO), craft, RESPONSES)
+def print_responses(groups: Groups, scene: scenario.Scenario, craft: vehicle.Vehicle) -> None:
+    """Print what a platform adds above SPLIT_HZ, recorded and by the responses of a twin: its scenario and vehicle."""
+    responses = overlay.simulate_responses(scene, craft, RESPONSES)
     print(head("above 3 Hz, over the platform / before", COLUMNS))
     for name, group in groups.items():
         pairs = [shaking(overlay.values_of(log), path.entry, path.exit) for log, path in group

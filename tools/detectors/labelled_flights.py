@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.progress import with_bar
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
@@ -88,7 +89,7 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
 
 
 def arguments() -> argparse.Namespace:
-    """The command line. Raises AirTouchError for --steps where the steps are fixed."""
+    """The command line. Raises AirTouchError where its options do not fit each other."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights, each with a manifest.csv")
     parser.add_argument("--start", type=Path, action="append", default=[],
@@ -107,25 +108,17 @@ def arguments() -> argparse.Namespace:
                         help="groups: the manifest's folds 0 to 2, and 3 and up; or each day")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"),
                         help="what is in it already is not done again")
-    parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
-    parser.add_argument("--draws", type=int, default=5, help="of labelled flights, for each row (default %(default)s)")
-    parser.add_argument("--seeds", type=int, default=2, help="trainings of each draw (default %(default)s)")
-    parser.add_argument("--steps", type=int, help="of going on from --start (default 300)")
-    parser.add_argument("--alone-steps", type=int, default=1000, help="of training on the K alone; 0: no such rows")
+    parser.add_argument("--labelled", type=whole_number(1), action="append", metavar="K", help="default 2, 5, 10, 20")
+    parser.add_argument("--draws", type=whole_number(1), default=5,
+                        help="of labelled flights, for each row (default %(default)s)")
+    parser.add_argument("--seeds", type=whole_number(1), default=2, help="trainings of each draw (default %(default)s)")
+    parser.add_argument("--steps", type=whole_number(1), help="of going on from --start (default 300)")
+    parser.add_argument("--alone-steps", type=whole_number(0), default=1000,
+                        help="of training on the K alone; 0: no such rows")
     parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")
     options = parser.parse_args()
     if options.steps is not None and (options.twin or options.beside):
         raise AirTouchError("--steps has no effect with --twin or --beside, whose steps are fixed: leave it out")
-    if options.steps is None:
-        options.steps = best.FINE_TUNING["steps"]
-    return options
-
-
-def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
-    """Raise AirTouchError where options do not fit each other or the groups."""
-    if len(options.start) not in (0, 1, len(groups)):
-        raise AirTouchError(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one "
-                            "for each")
     if len(options.twin) not in (0, len(options.start)):
         raise AirTouchError(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for "
                             "each, or none")
@@ -133,6 +126,16 @@ def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
         raise AirTouchError("--unlabelled learns beside other flights: give --twin or --beside")
     if options.beside and (options.twin or not options.start):
         raise AirTouchError("--beside goes on from a model: give --start, and no --twin")
+    if options.steps is None:
+        options.steps = best.FINE_TUNING["steps"]
+    return options
+
+
+def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
+    """Raise AirTouchError where the models to start from do not fit the groups."""
+    if len(options.start) not in (0, 1, len(groups)):
+        raise AirTouchError(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one "
+                            "for each")
 
 
 def groups_of(options: argparse.Namespace, listed: Sequence[FlightFile],

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airtouch import vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.progress import Bar
 from airtouch.detector import best
 from airtouch.detector.best import free_air
@@ -55,13 +56,16 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+", help="of recorded flights with edges")
     parser.add_argument("--twin", type=Path, required=True, help="folder of `airtouch twin`")
     parser.add_argument("--free-air", type=Path, action="append", default=[], help="folder of flights without edges")
-    parser.add_argument("--hold-out", type=int, metavar="FOLD", help="train on no flight of this fold")
+    parser.add_argument("--hold-out", type=whole_number(0), metavar="FOLD", help="train on no flight of this fold")
     parser.add_argument("--least", type=float, default=0.3, help="of a platform's length (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the training (default %(default)s)")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of the training (default %(default)s)")
     parser.add_argument("--out", type=Path, required=True, help="the model")
     parser.add_argument("--force", action="store_true", help="replace --out if it is there")
     options = parser.parse_args()
+    if not 0.0 < options.least <= 1.0:
+        parser.error("--least is a fraction: more than 0, at most 1")
     check_free(options.out, options.force)
+    scenario.load(options.twin / files.SCENARIO)  # before the flights are read
     listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]
     readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     air = free_air.read(options.free_air) if options.free_air else []

@@ -1,11 +1,11 @@
 """Diagnoses every flight of CrazyPAD alone, calibrated on the other normal flights of its drone.
 
-    python tools/diagnosis/gap_crazypad.py [FOLDER] [--json cases.jsonl] [--leave-one-out]    # 20 s
+    python tools/diagnosis/gap_crazypad.py [FOLDER] [--json results.jsonl] [--leave-one-out]    # 20 s
     python tools/diagnosis/gap_crazypad.py [FOLDER] --corrections
 
 The figures are in host/docs/gap-crazypad.md. FOLDER holds the flights and their manifest.csv. The label is read after
-the diagnosis. With --json, cases that the file holds already are not diagnosed again. What the diagnosis takes as known
-beforehand (`priors.Priors`) was chosen with these conditions in view; --leave-one-out chooses it anew for each
+the diagnosis. With --json, flights that the file holds already are not diagnosed again. What the diagnosis takes as
+known beforehand (`priors.Priors`) was chosen with these conditions in view; --leave-one-out chooses it anew for each
 condition, from a grid, by the others alone. --corrections fits how unsteadiness and heave follow the corrections of
 the estimated velocity (`hover_balance.ANSWER`), on the building part: all but every fourth condition.
 """
@@ -13,6 +13,7 @@ the estimated velocity (`hover_balance.ANSWER`), on the building part: all but e
 import argparse
 import itertools
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,14 @@ from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import HoverPattern
 from airtouch.gap.balance.priors import PRIORS, STEADY, Priors
 from airtouch.gap.diagnosis import diagnose
-from airtouch.logs import json_lines, read
+from airtouch.logs import read
 from airtouch.logs.files import check_free
 from recordings.crazypad.corrections import POWER_NAMES, HoverPowers
-from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_answers
+from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_figures
 from recordings.crazypad.labels import VEHICLE, baseline, family, manifest
 from recordings.crazypad.patterns import hover_patterns, likeliest
 from recordings.folder import add_folder
+from recordings.kept import Result, complete
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
 #: priors to choose from, round numbers below and above those of `PRIORS`
@@ -42,47 +44,48 @@ GRID = [Priors(nominal_flights=n, maintenance=(*PRIORS.maintenance[:3], yaw), sl
 ROTOR_WEIGHT = 0.3  #: of the fraction of rotors named exactly beside the balanced accuracy; no source: round number
 
 
-def cases(folder: Path, store: Path | None) -> list[dict]:
-    """Each flight's diagnosis, in the manifest's order; those that the file `store` holds are taken from there."""
+def diagnose_all(folder: Path, store: Path | None) -> list[Result]:
+    """Each flight's result, in the manifest's order; those that the file `store` holds are taken from there."""
     rows = manifest(folder, "all")
-    case_of = {c["file"]: c for c in json_lines.read(store)}
     logs = {k: read(folder / r["file"]) for k, r in enumerate(rows) if family(r["condition"]) == "normal"}
     vehicle = vehicles.load(VEHICLE)
-    for i, row in enumerate(with_bar(rows, "diagnosing")):
-        if row["file"] not in case_of:
-            answer = diagnose([read(folder / row["file"])], vehicle, [logs[k] for k in baseline(rows, i)]).plain()
-            case = {"file": row["file"], "drone": row["drone"], "condition": row["condition"],
-                    "verdict": answer["verdict"], "effects": answer["effects"],
-                    "ranking": {r["name"]: r["probability"] for r in answer["ranking"]}}
-            case_of[row["file"]] = case
-            json_lines.append(store, [case])
-    return [case_of[row["file"]] for row in rows]
+
+    def run(todo: list[int]) -> Iterator[Result]:
+        """The results of some flights, by their place in the manifest."""
+        for i in with_bar(todo, "diagnosing"):
+            row = rows[i]
+            diagnosis = diagnose([read(folder / row["file"])], vehicle, [logs[k] for k in baseline(rows, i)]).plain()
+            yield {"file": row["file"], "drone": row["drone"], "condition": row["condition"],
+                   "verdict": diagnosis["verdict"], "effects": diagnosis["effects"],
+                   "ranking": {r["name"]: r["probability"] for r in diagnosis["ranking"]}}
+
+    return complete({row["file"]: i for i, row in enumerate(rows)}, run, lambda result: result["file"], store)
 
 
-def cross_validate(folder: Path) -> list[dict]:
-    """Cases of all flights, each condition with the priors of GRID that do best on the other conditions."""
+def cross_validate(folder: Path) -> list[Result]:
+    """Results of all flights, each condition with the priors of GRID that do best on the other conditions."""
     rows = manifest(folder, "all")
     vehicle = vehicles.load(VEHICLE)
     patterns = hover_patterns(folder, rows, vehicle)
-    return best_of_others([cases_with(rows, patterns, vehicle, priors) for priors in GRID])
+    return best_of_others([results_with(rows, patterns, vehicle, priors) for priors in GRID])
 
 
-def best_of_others(tables: list[list[dict]]) -> list[dict]:
-    """Cases of all conditions in turn, each from the table that scores best on the other conditions' cases.
+def best_of_others(tables: list[list[Result]]) -> list[Result]:
+    """Results of all conditions in turn, each from the table that scores best on the other conditions.
 
-    tables: the cases of all flights, once for each choice of priors.
+    tables: the results of all flights, once for each choice of priors.
     """
     out = []
-    for condition in sorted({c["condition"] for c in tables[0]}):
-        others = [[c for c in table if c["condition"] != condition] for table in tables]
-        scores = [balanced_accuracy(cases) + ROTOR_WEIGHT * exact_rotors(cases) for cases in others]
-        out += [c for c in tables[scores.index(max(scores))] if c["condition"] == condition]
+    for condition in sorted({r["condition"] for r in tables[0]}):
+        others = [[r for r in table if r["condition"] != condition] for table in tables]
+        scores = [balanced_accuracy(results) + ROTOR_WEIGHT * exact_rotors(results) for results in others]
+        out += [r for r in tables[scores.index(max(scores))] if r["condition"] == condition]
     return out
 
 
-def cases_with(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles.Vehicle,
-               priors: Priors) -> list[dict]:
-    """Cases of all flights with these priors, by `hover_balance` alone. patterns: of each flight."""
+def results_with(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicles.Vehicle,
+                 priors: Priors) -> list[Result]:
+    """Results of all flights with these priors, by `hover_balance` alone. patterns: of each flight."""
     candidates, out = hypotheses(vehicle, priors), []
     names = ["mass" if h.name == "com_offset" else h.name for h in candidates]
     for k, (row, pattern) in enumerate(zip(rows, patterns, strict=True)):
@@ -112,23 +115,27 @@ def show_corrections(folder: Path) -> None:
 
 
 def main() -> None:
-    """Diagnose every flight, or fit the answer to corrections, and print."""
+    """Diagnose every flight, or fit how the powers follow the corrections, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "crazypad")
-    parser.add_argument("--json", type=Path, help="cases already done are read from here, new ones appended")
+    parser.add_argument("--json", type=Path, metavar="FILE",
+                        help="JSON lines; results that it holds are not computed again, new ones are appended")
     parser.add_argument("--leave-one-out", action="store_true", help="also with priors chosen by the others")
-    parser.add_argument("--corrections", action="store_true", help="only fit the answer to corrections of the estimate")
+    parser.add_argument("--corrections", action="store_true",
+                        help="instead fit how unsteadiness and heave follow the corrections of the velocity")
     options = parser.parse_args()
+    if options.corrections and (options.json or options.leave_one_out):
+        parser.error("--corrections diagnoses no flight: leave out --json and --leave-one-out")
     check_data_set(options.folder)
     if options.corrections:
         show_corrections(options.folder)
         return
     check_free(options.json, force=True)
     start = time.time()
-    print_answers(cases(options.folder, options.json))
+    print_figures(diagnose_all(options.folder, options.json))
     if options.leave_one_out:
         print("\nPriors chosen without the condition judged:")
-        print_answers(cross_validate(options.folder))
+        print_figures(cross_validate(options.folder))
     print(f"{time.time() - start:.0f} s")
 
 

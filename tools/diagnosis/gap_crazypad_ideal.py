@@ -29,6 +29,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
 from recordings.crazypad import figures, labels
+from recordings.kept import Result
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
@@ -138,10 +139,10 @@ def standardised(model: Any) -> Any:
     return scikit("pipeline").make_pipeline(scikit("preprocessing").StandardScaler(), model)
 
 
-def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
-    """Cases of all flights, each with the answer of a learner that has the labels of all flights outside its fold."""
+def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[Result]:
+    """Results of all flights, each predicted by a learner that has the labels of all flights outside its fold."""
     x = table.numbers[:, BALANCE] if learner.endswith("the balance") else table.numbers
-    out: list[dict] = [{} for _ in table.rows]
+    out: list[Result] = [{} for _ in table.rows]
     for fold in folds:
         train = ~fold
         predicted = {}
@@ -155,12 +156,12 @@ def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[
         cut = standardised(MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
         for i, family, rotors, mm in zip(np.flatnonzero(fold), predicted["family"], predicted["rotors"], cut,
                                          strict=True):
-            out[i] = {**table.rows[i], **as_case(family, rotors, mm)}
+            out[i] = {**table.rows[i], **as_result(family, rotors, mm)}
     return out
 
 
-def as_case(family: str, rotors: str, mm: float) -> dict:
-    """A learner's answer in the form of a diagnosis; millimetres stand for the loss of thrust."""
+def as_result(family: str, rotors: str, mm: float) -> Result:
+    """A learner's prediction in the form of a diagnosis; millimetres stand for the loss of thrust."""
     if family == "normal":
         return {"verdict": "none", "effects": []}
     if family != "rotor damage":
@@ -175,16 +176,16 @@ def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
     print(f"\n{part}\n| test | family, balanced | of damage, right | exact rotors | severity, Spearman |\n"
           "|---|---|---|---|---|")
     for learner in LEARNERS:
-        cases = cross_validate(table, folds, learner)
+        results = cross_validate(table, folds, learner)
         cells = []
         for figure in (figures.balanced_accuracy, _damage_right, figures.exact_rotors, figures.severity):
-            cells.append(figures.with_interval(cases, figure))
+            cells.append(figures.with_interval(results, figure))
         print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
 
 
-def _damage_right(cases: list[dict]) -> float:
+def _damage_right(results: list[Result]) -> float:
     """Share of flights with rotor damage that are called so."""
-    right = [figures.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
+    right = [figures.answer(r) == "rotor damage" for r in results if labels.family(r["condition"]) == "rotor damage"]
     return float(np.mean(right)) if right else float("nan")
 
 

@@ -22,13 +22,8 @@ from airtouch.errors import in_one_line
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.logs import read
 from recordings.folder import add_folder
-from recordings.swarm_lift import CLOSE
+from recordings.swarm_lift import CLOSE, CURVE, CURVE_M
 
-#: m above standing at which the lift was measured (the data's SOURCE.md); nothing from 15 cm on, level below 1 cm
-CURVE_M = np.array([0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.073, 0.09, 0.115, 0.15])
-#: vehicle -> fraction of the weight that the ground carries at CURVE_M
-CURVE = {"ns-34g": np.array([13.8, 9.7, 7.3, 5.7, 3.5, 1.8, 0.6, 0.1, -0.1, 0.0]) / 100.0,
-         "ns-67g": np.array([13.6, 10.2, 8.0, 6.5, 5.3, 4.2, 3.4, 2.0, 0.8, 0.0]) / 100.0}
 #: z_m of each vehicle on the floor, m (the data's SOURCE.md)
 STANDING_Z_M = {"cf50": 0.0495, "cf51": 0.0525, "cf52": 0.0555, "cf101": 0.055, "cf102": 0.060}
 LAG_S = 0.06  #: s, first-order lag of the motors, as `reference.motion_channels`

@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import logs, vehicle
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.evaluation import crossval, evaluate
@@ -60,9 +61,12 @@ def cut(flights: Flights, groups: Sequence[str]) -> list[Flights]:
     return [{f: log for f, log in flights.items() if str(f.condition.fold) in folds} for folds in groups]
 
 
-def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
-    """Both diagnoses of some flights and the calibration, JSON-ready; read from the file `store` if it exists."""
-    if not store.is_file():
+def diagnoses(flights: Flights, store: Path, again: bool = False) -> dict[str, Any]:
+    """Both diagnoses of some flights and the calibration, JSON-ready; read from the file `store` if it exists.
+
+    again: they are made anew, and the file is replaced when they are there.
+    """
+    if again or not store.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
         cuts = [pair for pair in map(pieces, evenly_spaced(close, MOST_PASSES)) if pair is not None]
@@ -186,24 +190,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/gap-training"), help="diagnoses and models")
     parser.add_argument("--groups", default="012,34", help="folds of each group (default 012,34)")
-    parser.add_argument("--flights", type=int, default=90, help="simulated flights to train on (default 90)")
-    parser.add_argument("--steps", type=int, default=800, help="training steps (default 800)")
-    parser.add_argument("--seeds", type=int, default=2, help="trainings a row (default 2)")
+    parser.add_argument("--flights", type=whole_number(1), default=90,
+                        help="simulated flights to train on (default 90)")
+    parser.add_argument("--steps", type=whole_number(1), default=800, help="training steps (default 800)")
+    parser.add_argument("--seeds", type=whole_number(1), default=2, help="trainings a row (default 2)")
     parser.add_argument("--again", action="store_true", help="diagnose anew")
     parser.add_argument("--diagnose", action="store_true", help="only diagnose")
     options = parser.parse_args()
+    group_names = options.groups.split(",")
+    if not all(map(str.isdecimal, group_names)) or len(set(options.groups) - {","}) < sum(map(len, group_names)):
+        parser.error(f"--groups {options.groups}: give folds as digits, each in one group only, as 012,34")
+    if len(group_names) < 2 and not options.diagnose:
+        parser.error(f"--groups {options.groups}: what is found in one group is tested on another: give two or more")
     if not options.diagnose:
         need("train", "training")
     make_folder(options.out)
-    group_names = options.groups.split(",")
     read, _ = crossval.readable_flights(files := dataset.collect([need_flights()]))
     groups = cut({f: read[f.path] for f in files if f.path in read}, group_names)
     chains = []
     for name, group in zip(group_names, groups, strict=True):
         store = options.out / f"diagnosis_{name}.json"
-        if options.again:
-            store.unlink(missing_ok=True)
-        chains.append(chain(diagnoses(group, store)))
+        chains.append(chain(diagnoses(group, store, options.again)))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
     if not options.diagnose:
         print_table(chains, group_names, groups, options)

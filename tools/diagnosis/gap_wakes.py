@@ -7,10 +7,10 @@ The seconds come from the other vehicles' own logs, where the data hold a cut of
 mean force along z, the power of that force above 1 Hz, and the power of the yaw torque from 2 to 20 Hz. The same
 three are taken of nominal flights of the same vehicle and kind of flying, in the same seconds shifted along the flight
 by each half second. A flight is seen where one of the three is beyond all but a third of one per cent of these, which
-makes 1 % false alarms. --answers: what `gap_real.py --keep` wrote, to print what the diagnosis says beside it.
-build: days 19 and 20.
+makes 1 % false alarms. --answers: what `gap_real.py --keep` wrote, to print what the diagnosis says beside it; the
+results of one run, as one with --partner and one without would each say something else. build: days 19 and 20.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] --false-alarms    # what the diagnosis says of nominal flights, 15 min
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] --false-alarms [--keep x.jsonl]    # of nominal flights, 15 min
 
 Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
 vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
@@ -31,10 +31,12 @@ from airtouch.cli.shared.flights import check_data_set
 from airtouch.cli.shared.progress import with_bar
 from airtouch.detector.evaluation.data.folds import BUILD_DAYS
 from airtouch.errors import AirTouchError, in_one_line
+from airtouch.logs.files import check_free
 from recordings import swarm_cuts
 from recordings.folder import add_folder
+from recordings.kept import add_keep
 from recordings.wakes.false_alarms import show_false_alarms
-from recordings.wakes.known_seconds import show_detected
+from recordings.wakes.known_seconds import answers_of, show_detected
 from recordings.wakes.tracks import track
 from recordings.wakes.without_seconds import show_without_seconds
 
@@ -45,16 +47,24 @@ def main() -> None:
     add_folder(parser, name="flights")
     parser.add_argument("--part", choices=("build", "all"), default="build",
                         help="days 19 and 20, or all days (default %(default)s)")
-    parser.add_argument("--answers", type=Path, help="what `gap_real.py --keep` wrote")
+    parser.add_argument("--answers", type=Path, metavar="FILE", help="what `gap_real.py --keep` wrote")
+    add_keep(parser, "of --false-alarms: ")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
     instead.add_argument("--without-seconds", action="store_true", help="what a test without the seconds detects")
     options = parser.parse_args()
     if (options.false_alarms or options.without_seconds) and (options.part == "all" or options.answers):
         parser.error("--part all and --answers are of the test that knows the seconds: leave them out")
-    check_data_set(options.flights / "neuralswarm")
+    if options.keep and not options.false_alarms:
+        parser.error("--keep is of --false-alarms: add it, or leave out --keep")
+    check_data_set(options.flights / "neuralswarm", "baselines.csv")
+    check_free(options.keep, force=True)
     if options.answers is not None and not options.answers.is_file():
         raise AirTouchError(f"{options.answers}: no such file; gap_real.py --keep writes one")
+    answer_of = answers_of(options.answers)
+    if options.answers and not answer_of:
+        raise AirTouchError(f"{options.answers} has no flight of neural-swarm: gap_real.py --rows swarm --keep writes "
+                            "them")
     if options.without_seconds:
         show_without_seconds(options.flights)
         return
@@ -62,9 +72,9 @@ def main() -> None:
     rows = [r for r in swarm_cuts.cuts(folder) if options.part == "all" or r["day"] in BUILD_DAYS]
     tracks = [track(folder, r) for r in with_bar([r for r in rows if r.get("truth") != "ground_effect"], "tracks")]
     if options.false_alarms:
-        show_false_alarms(options.flights, tracks)
+        show_false_alarms(options.flights, tracks, options.keep)
     else:
-        show_detected(tracks, options.answers)
+        show_detected(tracks, answer_of)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """The command line of `python -m tools.firmware_emulation`: what it takes, and what it refuses before it builds."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.errors import AirTouchError
 from airtouch.logs import read
 from airtouch.logs.files import check_free, make_folder
@@ -15,19 +15,6 @@ from .replay import VEHICLES, rows
 
 #: what is said where the checkout is not given
 NO_BASE = f"say where the firmware's sources are: make emulate CRAZYFLIE_BASE=~/crazyflie-firmware; {build.CLONE}"
-
-
-def number(least: int) -> Callable[[str], int]:
-    """A whole number from `least` on, for argparse."""
-    def read_number(text: str) -> int:
-        """The text as a whole number of at least `least`, for argparse."""
-        try:
-            if (value := int(text)) >= least:
-                return value
-        except ValueError:
-            pass
-        raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} on")
-    return read_number
 
 
 class Parser(argparse.ArgumentParser):
@@ -53,9 +40,9 @@ def parser(description: str | None) -> argparse.ArgumentParser:
                       help="closed loop over edges of every kind: the height kept or not")
     what.add_argument("--gap8", action="store_true",
                       help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
-    arguments.add_argument("--steps", type=number(1), help="of each recorded flight (2400)")
-    arguments.add_argument("--begin", type=number(0), help="first row of each recorded flight (0)")
-    arguments.add_argument("--seeds", type=number(1), help="of --fly and --height: draws of the noise (1)")
+    arguments.add_argument("--steps", type=whole_number(1), help="of each recorded flight (2400)")
+    arguments.add_argument("--begin", type=whole_number(0), help="first row of each recorded flight (0)")
+    arguments.add_argument("--seeds", type=whole_number(1), help="of --fly and --height: draws of the noise (1)")
     arguments.add_argument("--traces", type=Path, help="of --fly: CSV for the first flight and the simulator's own")
     arguments.add_argument("--force", action="store_true", help="of --traces: overwrite the file")
     arguments.add_argument("--only", help="of --height: cases whose names begin so")

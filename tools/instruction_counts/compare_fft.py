@@ -47,9 +47,12 @@ def unpack(sdist: Path | None, folder: Path = CACHE) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as work:
             archive = sdist or _download(Path(work))
-            with tarfile.open(archive) as tar:
-                tar.extractall(work, filter="data")
-            (Path(work) / f"cmsisdsp-{VERSION}").rename(target)
+            try:
+                with tarfile.open(archive) as tar:
+                    tar.extractall(work, filter="data")
+                (Path(work) / f"cmsisdsp-{VERSION}").rename(target)
+            except (OSError, tarfile.TarError) as error:
+                raise AirTouchError(f"{archive}: not the source archive of cmsisdsp {VERSION}: {error}") from None
     return target
 
 
@@ -89,7 +92,12 @@ def main() -> None:
     """Print instructions of CMSIS-DSP's transforms beside those of one step of the pipeline."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sdist", type=Path, help="the archive, instead of a download")
-    source = unpack(parser.parse_args().sdist)
+    sdist = parser.parse_args().sdist
+    if sdist is not None and not sdist.is_file():
+        parser.error(f"{sdist}: no such file")
+    if not compilers("cortex-m4"):
+        raise AirTouchError("no compiler for the Cortex-M4: pip install ziglang, or apt-get install gcc-arm-none-eabi")
+    source = unpack(sdist)
     flight = made_flight()
     print(f"{'compiler':18}{'one FFT':>9}{'nine':>10}{'the step':>10}{'ratio':>8}")
     least, most = sys.maxsize, 0.0

@@ -19,13 +19,14 @@ from itertools import islice
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.sealed.make import VEHICLE, stripped
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation import batch, effects
+from airtouch.simulation import batch, effects, scenario
 
 SCENES = ("paper-low", "paper-9cm", "paper-12cm", "steps", "zigzag", "hover")  #: no source: few of each kind
 BASELINE = 4  #: flights; as `gap demo` has them
@@ -72,10 +73,13 @@ def main() -> None:
     """Diagnose the flights of the scenes and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", nargs="+", default=SCENES, help=f"scenarios (default: {', '.join(SCENES)})")
-    parser.add_argument("--flights", type=int, default=8, help="without an effect, in each scene (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=100, help="of the flights (default %(default)s)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default %(default)s)")
+    parser.add_argument("--flights", type=whole_number(1), default=8,
+                        help="without an effect, in each scene (default %(default)s)")
+    parser.add_argument("--seed", type=whole_number(0), default=100, help="of the flights (default %(default)s)")
+    parser.add_argument("--jobs", type=whole_number(1), default=2, help="processes (default %(default)s)")
     args = parser.parse_args()
+    for scene in args.scenes:
+        scenario.load(scene)  # raises AirTouchError for one that there is not
     with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("spawn")) as pool:
         rows_of = dict(zip(args.scenes, pool.map(answers, [(s, args.flights, args.seed) for s in args.scenes]),
                            strict=True))

@@ -17,12 +17,13 @@ from typing import Any
 
 import airtouch.simulation
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.summary import summarise
-from airtouch.errors import AirTouchError, in_one_line
+from airtouch.errors import AirTouchError, in_one_line, unknown
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.simulation import scenario
 
@@ -90,19 +91,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/simulated"), help="finished rows are kept here")
     parser.add_argument("--scenario", default=simulated.SCENARIO, help="default paper-mixed")
-    parser.add_argument("--flights", type=int, default=90, help="simulated flights to train on (default 90)")
-    parser.add_argument("--steps", type=int, help="best: training steps; its own number if left out")
-    parser.add_argument("--epochs", type=int, help="paper: epochs; its own number if left out")
+    parser.add_argument("--flights", type=whole_number(1), default=90,
+                        help="simulated flights to train on (default 90)")
+    parser.add_argument("--steps", type=whole_number(1), help="best: training steps; its own number if left out")
+    parser.add_argument("--epochs", type=whole_number(1), help="paper: epochs; its own number if left out")
     parser.add_argument("--detector", action="append", choices=("best", "paper"), help="default both")
     parser.add_argument("--without", action="append", metavar="EFFECT",
                         help="only these rows; none is all effects on")
-    parser.add_argument("--seed", type=int, default=0, help="of flights and training (default %(default)s)")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of flights and training (default %(default)s)")
     options = parser.parse_args()
+    choices = (ALL, *effects_of(options.scenario))
+    if odd := [name for name in options.without or () if name not in choices]:
+        raise unknown("effect of the scenario", odd[0], choices)
     make_folder(options.out)
     files = dataset.collect([need_flights()])
     started = False
     for detector in options.detector or ("best", "paper"):
-        for without in options.without or (ALL, *effects_of(options.scenario)):
+        for without in options.without or choices:
             figures = row(detector, without, options, files)
             if not started:
                 print(f"{options.flights} flights of {options.scenario}, seed {options.seed}; tested on "

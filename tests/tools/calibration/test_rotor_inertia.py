@@ -1,5 +1,7 @@
 """The inertia of a rotor from a flight whose yaw follows the equation of motion, and from a real flight."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,16 @@ def test_it_finds_what_the_equation_of_motion_holds(ratio, noise_rpm):
 def test_a_flight_that_is_too_short_is_refused():
     with pytest.raises(AirTouchError, match="longer"):
         rotor_inertia.spectra(log_of(RATIO, seconds=8.0), CRAFT.arm_pwm)
+
+
+def test_a_refused_flight_has_a_line_on_stderr_and_the_others_are_done(tmp_path, monkeypatch, capsys):
+    for name, seconds in (("short", 8.0), ("long", 20.0)):
+        logs.write(log_of(RATIO, seconds=seconds), tmp_path / f"{name}.csv")
+    monkeypatch.setattr(sys, "argv", ["rotor_inertia.py", f"{tmp_path}/short.csv", f"{tmp_path}/long.csv"])
+    assert rotor_inertia.main() == 2
+    said = capsys.readouterr()
+    assert said.out.startswith("long.csv: ") and len(said.out.splitlines()) == 1
+    assert said.err.startswith("rotor_inertia: ") and "longer flight" in said.err and len(said.err.splitlines()) == 1
 
 
 def test_a_real_crazyflies_rotors_have_inertia():

@@ -80,7 +80,7 @@ def test_a_file_of_figures_is_replaced_with_force_alone(tmp_path, monkeypatch):
     figures = tmp_path / "all.json"
     figures.write_text("{}")
     monkeypatch.setattr(tool, "need_flights", lambda: tmp_path)
-    for more, refusal in (([], "--force"), (["--force"], "no flights in this folder")):
+    for more, refusal in (([], "--force"), (["--force"], "no models of `best`")):
         monkeypatch.setattr(sys, "argv", ["choose_decoder.py", str(tmp_path), "--json", str(figures), *more])
         with pytest.raises(AirTouchError, match=refusal):
             tool.main()

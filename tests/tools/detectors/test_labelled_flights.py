@@ -126,7 +126,7 @@ def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
 def test_steps_are_refused_where_they_have_no_effect(tmp_path, monkeypatch, option):
     with pytest.raises(AirTouchError, match="--steps has no effect with --twin or --beside"):
         run(monkeypatch, tmp_path, option, tmp_path, "--steps", 300)
-    monkeypatch.setattr(sys, "argv", ["labelled_flights.py", str(tmp_path), option, str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["labelled_flights.py", str(tmp_path), option, str(tmp_path), "--start", "a"])
     assert labelled_flights.arguments().steps == best.FINE_TUNING["steps"]
 
 

@@ -40,10 +40,10 @@ def test_each_question_is_one_diagnosis_with_its_flights_baseline_and_files(aske
     for command, name, own, baseline in zip(asked, ("all", "close", "wind"), "aac", ("", "b", "b"), strict=True):
         options = command.index("--vehicle")
         assert command[:options] == ["gap", "diagnose", flights[own]]
-        assert command[options:-5] == ["--vehicle", gap_authors.DEFAULT_VEHICLE,
+        assert command[options:-4] == ["--vehicle", gap_authors.DEFAULT_VEHICLE,
                                        *(["--baseline", flights[baseline]] if baseline else [])]
         out = tmp_path / "out/deep" / name
-        assert command[-5:] == ["--json", f"{out}.json", "--report", f"{out}.html", "--force"]
+        assert command[-4:] == ["--json", f"{out}.json", "--report", f"{out}.html"]
     assert (tmp_path / "out/deep").is_dir()
 
 
@@ -51,3 +51,14 @@ def test_a_diagnosis_that_fails_is_named(asked):
     asked.code = 2
     with pytest.raises(AirTouchError, match="^wind: the diagnosis failed"):
         gap_authors.main()
+
+
+def test_reports_that_are_there_are_replaced_with_force_alone(asked, tmp_path, monkeypatch):
+    (tmp_path / "out/deep").mkdir(parents=True)
+    (tmp_path / "out/deep/wind.html").touch()
+    with pytest.raises(AirTouchError, match=r"wind.html: exists already; use --force"):
+        gap_authors.main()
+    assert not asked
+    monkeypatch.setattr(sys, "argv", [*sys.argv, "--force"])
+    gap_authors.main()
+    assert [command[-1] for command in asked] == ["--force"] * 3

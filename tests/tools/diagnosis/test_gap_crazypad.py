@@ -1,4 +1,4 @@
-"""The choice of priors on CrazyPAD, and diagnoses by the balance alone, on synthetic cases and patterns."""
+"""The choice of priors on CrazyPAD, and diagnoses by the balance alone, on synthetic results and patterns."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ VEHICLE = vehicles.load("crazyflie-2.1")
 SCATTER = 0.003  #: of the balance between flights
 
 
-def case(condition, right):
+def result(condition, right):
     """A flight of a condition with a cut rotor, which is named or not."""
     rotor, loss = {"value": int(condition[5])}, {"value": 0.1}
     effects = [{"name": "weak_motor", "parameters": {"rotor": rotor, "thrust_loss": loss}}] if right else []
@@ -24,7 +24,7 @@ def case(condition, right):
 def test_the_condition_that_is_judged_has_no_voice_in_the_priors():
     """Three tables, right on the first condition, on the second and third, and on the first and third."""
     names = ("cut_M1_3.0mm", "cut_M2_3.0mm", "cut_M3_3.0mm")
-    first, second, third = tables = [[case(name, name in right) for name in names] for right in (
+    first, second, third = tables = [[result(name, name in right) for name in names] for right in (
         names[:1], names[1:], names[::2])]
     chosen = tool.best_of_others(tables)
     assert chosen[0] is second[0]  # alone right on both others, though wrong on the first itself
@@ -53,9 +53,9 @@ def test_a_flight_is_called_what_its_balance_was_changed_by():
     rows = [{"file": f"{i}.csv", "drone": "A", "condition": "normal_flight"} for i in range(6)]
     rows.append({"file": "cut.csv", "drone": "A", "condition": "cut_M1_3.0mm"})
     patterns = [pattern(rng) for _ in range(6)] + [pattern(rng, strong)]
-    cases = tool.cases_with(rows, patterns, VEHICLE, PRIORS)
-    assert [c["verdict"] for c in cases] == ["none"] * 6 + ["effect"]
-    (effect,) = cases[-1]["effects"]
+    results = tool.results_with(rows, patterns, VEHICLE, PRIORS)
+    assert [r["verdict"] for r in results] == ["none"] * 6 + ["effect"]
+    (effect,) = results[-1]["effects"]
     assert effect["name"] == "weak_motor"
     assert effect["parameters"]["rotor"]["value"] == pytest.approx(weak.effects[0][1]["rotor"][0])
     assert effect["parameters"]["thrust_loss"]["value"] == pytest.approx(loss.max(), rel=0.3)

@@ -29,12 +29,13 @@ def test_numbers_are_relative_to_the_other_normal_flights_of_the_drone():
     assert table.numbers[:, 0].tolist() == [-4.5, -1.5, 6.0, -100.0, 100.0, 6.0]
 
 
-@pytest.mark.parametrize(("answer", "family", "rotors", "loss"), [
+@pytest.mark.parametrize(("prediction", "family", "rotors", "loss"), [
     (("normal", "", 4.0), "normal", [], 0.0), (("slung load", "", 4.0), "slung load", [], 0.0),
     (("added weight", "", 4.0), "added weight", [], 0.0), (("rotor damage", "24", 5.0), "rotor damage", [2, 4], 5.0)])
-def test_a_learners_answer_counts_as_a_diagnosis_would(answer, family, rotors, loss):
-    named, at, summed = pad.answer(ideal.as_case(*answer))
-    assert (named, at) == (family, rotors) and summed == pytest.approx(loss)
+def test_a_learners_prediction_counts_as_a_diagnosis_would(prediction, family, rotors, loss):
+    result = ideal.as_result(*prediction)
+    assert (pad.answer(result), pad.named_rotors(result)) == (family, rotors)
+    assert pad.thrust_loss(result) == pytest.approx(loss)
 
 
 def test_nearest_flights_of_the_same_condition_are_counted(capsys):

@@ -9,9 +9,10 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import GROUND
 from tools.diagnosis import gap_lift
+from tools.diagnosis.recordings.swarm_lift import CURVE, CURVE_M
 
 VEHICLE = replace(vehicles.load("crazyflie-2.1"), nominal_voltage_v=4.0)
-STANDING_M, CURVE = 0.05, gap_lift.CURVE["ns-34g"]
+STANDING_M, LIFT = 0.05, CURVE["ns-34g"]
 
 
 def descent(lift, offset=0.0):
@@ -20,7 +21,7 @@ def descent(lift, offset=0.0):
     height = np.linspace(0.3, 0.005, n)
     pwm = np.full((n, 4), 38000.0)
     weight = VEHICLE.mass_kg * VEHICLE.gravity_mps2
-    extra = (offset + lift * np.interp(height, gap_lift.CURVE_M, CURVE)) * weight
+    extra = (offset + lift * np.interp(height, CURVE_M, LIFT)) * weight
     up = (VEHICLE.thrust(pwm).sum(axis=1) + extra) / VEHICLE.mass_kg
     phase = np.where(np.arange(n) < n - 100, GROUND + 1, GROUND)
     up[phase == GROUND] = VEHICLE.gravity_mps2  # the floor carries it: no lift
@@ -32,4 +33,4 @@ def descent(lift, offset=0.0):
 @pytest.mark.parametrize("lift", [0.0, 0.7, 1.0])
 @pytest.mark.parametrize("offset", [0.0, -0.03])
 def test_regression_finds_the_lift_beside_a_thrust_that_is_off(lift, offset):
-    assert gap_lift.regressed_lift(descent(lift, offset), VEHICLE, STANDING_M, CURVE) == pytest.approx(lift, abs=1e-6)
+    assert gap_lift.regressed_lift(descent(lift, offset), VEHICLE, STANDING_M, LIFT) == pytest.approx(lift, abs=1e-6)

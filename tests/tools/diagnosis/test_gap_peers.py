@@ -1,9 +1,13 @@
-"""The counts of `gap_peers.py`, on synthetic answers."""
+"""The counts of `gap_peers.py`, on synthetic results."""
 
+import sys
+from dataclasses import replace
+
+import pytest
 from scipy.stats import binomtest
 
+from airtouch.errors import AirTouchError
 from tools.diagnosis import gap_peers
-from tools.diagnosis.gap_peers import Answer
 from tools.diagnosis.recordings import peers
 
 
@@ -16,11 +20,16 @@ def test_flights_of_a_vehicle_are_held_against_its_own_two(tmp_path):
     assert [path.name for path in peers.baseline(tmp_path, rows[1])] == ["cal_B_0.csv.gz", "cal_B_1.csv.gz"]
 
 
+def result(ranked, shrink=None, control=None):
+    """The result of a flight with more mass. ranked: the likeliest effects."""
+    return gap_peers.PeerResult("a.csv", "mass", "0.1 kg", "effect", "", ranked, shrink, control, 1.0)
+
+
 def test_names_of_one_thing_are_the_same_answer():
     """A heavier vehicle and less thrust are one thing in these logs; a weak rotor is another."""
-    answer = Answer("mass", ("weak_motor", "thrust_coefficient"), None, None)
-    assert not answer.within(1) and answer.within(2)
-    assert Answer("mass", ("thrust_coefficient",), None, None).within(1)
+    second = result(["weak_motor", "thrust_coefficient"])
+    assert not second.within(1) and second.within(2)
+    assert result(["thrust_coefficient"]).within(1)
 
 
 def share(hits, n):
@@ -29,10 +38,30 @@ def share(hits, n):
 
 
 def test_the_gap_closed_counts_where_the_first_answer_is_right():
-    answers = [Answer("mass", ("mass",), 0.9, 0.05), Answer("mass", ("mass",), 0.7, None),
-               Answer("mass", ("mass",), 0.95, 0.1), Answer("mass", ("gust", "mass"), 0.1, 0.9),
-               Answer("mass", ("mass",), None, None)]
-    first, last = gap_peers.summary(answers).splitlines()
+    results = [result(["mass"], 0.9, 0.05), result(["mass"], 0.7), result(["mass"], 0.95, 0.1),
+               result(["gust", "mass"], 0.1, 0.9), result(["mass"])]
+    first, last = gap_peers.summary(results).splitlines()
     assert first == f"top-1 {share(4, 5)}; top-3 {share(5, 5)} (95 % intervals)"
     assert last == "shrink with the right effect: median 0.90, >= 0.80 in 2 of 3; with a wrong one at most 0.10"
-    assert len(gap_peers.summary(answers[3:]).splitlines()) == 1
+    assert len(gap_peers.summary(results[3:]).splitlines()) == 1
+
+
+def test_a_run_goes_on_where_the_last_one_stopped(tmp_path, monkeypatch, capsys):
+    (tmp_path / "manifest.csv").write_text("file,vehicle,effect\na.csv,A,mass\nb.csv,A,mass\nc.csv,A,mass\n")
+    diagnosed = []
+
+    def diagnose_flight(_, label):
+        if len(diagnosed) == 1 and label["file"] == "b.csv":
+            diagnosed.append("stopped")
+            raise AirTouchError("b.csv: too short")
+        diagnosed.append(label["file"])
+        return replace(result(["mass"], 0.9), file=label["file"])
+
+    monkeypatch.setattr(gap_peers, "diagnose_flight", diagnose_flight)
+    monkeypatch.setattr(sys, "argv", ["gap_peers.py", str(tmp_path), "--keep", str(tmp_path / "kept.jsonl")])
+    with pytest.raises(AirTouchError, match="too short"):
+        gap_peers.main()
+    gap_peers.main()
+    assert diagnosed == ["a.csv", "stopped", "b.csv", "c.csv"]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines.count("| mass | 0.1 kg | effect |  | 0.90 |  | 1 |") == 3 and f"top-1 {share(3, 3)}; " in lines[-2]

@@ -107,3 +107,13 @@ def test_without_a_low_pass_there_is_nothing_to_diagnose(tmp_path):
     file = FlightFile(Path("high.csv"), Condition(height="h80", fold=0))
     with pytest.raises(AirTouchError, match="0 flights have the height `low`"):
         gap_training.diagnoses({file: None}, tmp_path / "diagnosis.json")
+
+
+def test_a_diagnosis_is_replaced_when_the_new_one_is_there(tmp_path):
+    """Here the new one fails."""
+    store = tmp_path / "diagnosis.json"
+    store.write_text('{"all": 1}')
+    assert gap_training.diagnoses({}, store) == {"all": 1}
+    with pytest.raises(AirTouchError, match="0 flights"):
+        gap_training.diagnoses({}, store, again=True)
+    assert store.read_text() == '{"all": 1}'

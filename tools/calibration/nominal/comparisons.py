@@ -2,7 +2,6 @@
 
 import multiprocessing
 import sys
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -24,23 +23,28 @@ MOST = 5  #: baseline flights of one, at most; no source: round number, for time
 
 
 class Task(NamedTuple):
-    """Flights of a group to be compared with `others`, of other groups of its drone; None: with those of the group."""
+    """Flights of a group to be compared with `others`, of other groups of its drone; None: with those of the group.
+
+    passing: whether only passing effects are measured.
+    """
 
     group: Group
     others: list[Log] | None = None
+    passing: bool = False
 
     @property
     def note(self) -> str:
         """What is added to the names of the comparisons."""
-        return "" if self.others is None else ", other groups"
+        return ", other groups" * (self.others is not None) + ", passing effects" * self.passing
 
 
-def compare_all(groups: Sequence[Group], keep: Path | None, jobs: int) -> dict[str, dict]:
-    """Name of a comparison -> its row, of all groups; rows in the file `keep` are taken from there, new ones added."""
+def compare_all(tasks: Sequence[Task], keep: Path | None, jobs: int) -> dict[str, dict]:
+    """Name of a comparison -> its row, of all tasks; rows in the file `keep` are taken from there, new ones added."""
     row_of = {r["file"]: r for r in json_lines.read(keep)}
-    tasks = [task for task in tasks_of(groups) if any(name + task.note not in row_of for name, _ in task.group.logs)]
-    with _pool_of(jobs) as pool:
-        for task, rows in zip(tasks, pool.map(_rows_of, tasks), strict=True):
+    todo = [task for task in tasks if any(name + task.note not in row_of for name, _ in task.group.logs)]
+    # forked processes need not import anything again
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
+        for task, rows in zip(todo, pool.map(_rows_of, todo), strict=True):
             row_of |= {row["file"]: row for row in rows}
             json_lines.append(keep, rows)
             print(f"{task.group.of}, {task.group.name}{task.note}: {len(rows)} flights",
@@ -56,16 +60,6 @@ def tasks_of(groups: Sequence[Group]) -> list[Task]:
                   for log in other.logs]
         out += [Task(group), *([Task(group, others)] if len(others) > 1 else [])]
     return out
-
-
-def passing_of_classes(groups: Sequence[Group], jobs: int) -> dict[str, list[ApparentStrengths]]:
-    """Class -> the passing effects in each of its flights, compared with the others of its group."""
-    flights = defaultdict(list)
-    with _pool_of(jobs) as pool:
-        for group, sizes in zip(groups, pool.map(_passing_of, groups), strict=True):
-            flights[group.of] += sizes
-            print(f"{group.of}, {group.name}: {len(sizes)} flights", file=sys.stderr, flush=True)
-    return flights
 
 
 def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None,
@@ -92,7 +86,8 @@ def _ready(logs: list[Log], vehicle: Vehicle) -> list[tuple[str, Flight]]:
 
 def _rows_of(task: Task) -> list[dict]:
     """The rows of a task's comparisons, one for each flight of the group; JSON-ready."""
-    comparisons = held_out(task.group.logs, task.group.vehicle, task.others)
+    comparisons = held_out(task.group.logs, task.group.vehicle, task.others,
+                           passing_alone if task.passing else apparent_strengths)
     return [{"file": name + task.note, "rate": apparent.rate, "passing": dict(apparent.passing),
              "strengths": {k: v.tolist() for k, v in apparent.strengths.items()},
              "errors": {k: v.tolist() for k, v in apparent.errors.items()}} for name, apparent in comparisons]
@@ -101,13 +96,3 @@ def _rows_of(task: Task) -> list[dict]:
 def passing_alone(data: Data) -> ApparentStrengths:
     """Passing effects in a flight, and nothing else."""
     return ApparentStrengths({}, {}, 0.0, passing_sizes(data))
-
-
-def _passing_of(group: Group) -> list[ApparentStrengths]:
-    """Passing effects in every flight of a group, compared with the others."""
-    return [apparent for _, apparent in held_out(group.logs, group.vehicle, look=passing_alone)]
-
-
-def _pool_of(jobs: int) -> ProcessPoolExecutor:
-    """Worker processes, which are forked: they need not import anything again."""
-    return ProcessPoolExecutor(jobs, multiprocessing.get_context("fork"))

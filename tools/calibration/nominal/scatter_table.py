@@ -17,24 +17,28 @@ from .groups import Group
 def scatter_of_classes(groups: Sequence[Group],
                        row_of: Mapping[str, dict]) -> tuple[dict[str, Scatter], dict[str, str]]:
     """Class -> its scatter, and class -> on how many flights it was measured, from the rows of `compare_all`."""
-    cases, alike, names, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
+    flights, alike, names, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
     for group in groups:
         names[group.of].add(group.name)
         flown_by[group.of] = group.vehicle.name
         for task in (Task(group), Task(group, [])):
             files = [name + task.note for name, _ in group.logs]
             for row in (row_of[file] for file in files if file in row_of):
-                cases[group.of].append(_apparent(row))
+                flights[group.of].append(_apparent(row))
                 if task.others is None:
-                    alike[group.of].append(cases[group.of][-1])
-    classes = {of: replace(class_scatter(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
-    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(names[of])} groups"
-              for of, flights in cases.items()}
+                    alike[group.of].append(flights[group.of][-1])
+    classes = {of: replace(class_scatter(all_of, alike[of]), vehicle=flown_by[of]) for of, all_of in flights.items()}
+    counts = {of: f"{len(alike[of])} flights, {len(all_of)} comparisons in {len(names[of])} groups"
+              for of, all_of in flights.items()}
     return classes, counts
 
 
-def with_passing(flights: Mapping[str, Sequence[ApparentStrengths]]) -> dict[str, Scatter]:
-    """The classes of the table that is shipped, with the passing effects of these flights. flights: by class."""
+def with_passing(tasks: Sequence[Task], row_of: Mapping[str, dict]) -> dict[str, Scatter]:
+    """The classes of the table that is shipped, with the passing effects in the rows of `compare_all` of these tasks.
+    """
+    flights = defaultdict(list)
+    for task in tasks:
+        flights[task.group.of] += [_apparent(row_of[name + task.note]) for name, _ in task.group.logs]
     return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
 
 

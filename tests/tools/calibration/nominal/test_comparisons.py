@@ -54,12 +54,13 @@ def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
         return [{"file": name + task.note} for name, _ in task.group.logs]
 
     monkeypatch.setattr(comparisons, "_rows_of", rows_of)
-    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: nullcontext(SimpleNamespace(map=map)))
+    monkeypatch.setattr(comparisons, "ProcessPoolExecutor", lambda *_: nullcontext(SimpleNamespace(map=map)))
     groups, keep = [group("a", "one", 4), group("b", "one", 3)], tmp_path / "kept.jsonl"
-    first = comparisons.compare_all(groups, keep, 1)
+    tasks = comparisons.tasks_of(groups)
+    first = comparisons.compare_all(tasks, keep, 1)
     assert len(first) == 14 and done == ["a", "a, other groups", "b", "b, other groups"]
     keep.write_text("\n".join(line for line in keep.read_text().splitlines() if '"b1, ' not in line) + "\n")
-    assert comparisons.compare_all(groups, keep, 1) == first and done[4:] == ["b, other groups"]
+    assert comparisons.compare_all(tasks, keep, 1) == first and done[4:] == ["b, other groups"]
 
 
 def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monkeypatch):
@@ -76,10 +77,13 @@ def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monke
     assert all(isinstance(f, ApparentStrengths) for f in flights)
 
 
-def test_passing_effects_of_a_class_are_those_of_each_flight_against_the_others_of_its_group(compared, monkeypatch):
-    monkeypatch.setattr(comparisons, "_pool_of", lambda jobs: nullcontext(SimpleNamespace(map=map)))
+def test_passing_effects_are_those_of_each_flight_against_the_others_of_its_group(compared, monkeypatch, tmp_path):
+    monkeypatch.setattr(comparisons, "ProcessPoolExecutor", lambda *_: nullcontext(SimpleNamespace(map=map)))
     monkeypatch.setattr(comparisons, "passing_sizes", lambda data: {"gust": float(len(compared))})
-    flights = comparisons.passing_of_classes([group("a", "one", 3), group("b", "one", 2)], 1)
-    assert list(flights) == ["class"] and [f.passing["gust"] for f in flights["class"]] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    tasks = [comparisons.Task(group("a", "one", 3), passing=True), comparisons.Task(group("b", "one", 2), passing=True)]
+    for _ in range(2):  # the second run takes what the first kept
+        rows = comparisons.compare_all(tasks, tmp_path / "kept.jsonl", 1)
+        assert list(rows) == [f"{name}, passing effects" for name in ("a0", "a1", "a2", "b0", "b1")]
+        assert [row["passing"]["gust"] for row in rows.values()] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert compared == [("a0", ["a1", "a2"]), ("a1", ["a0", "a2"]), ("a2", ["a0", "a1"]),
                         ("b0", ["b1"]), ("b1", ["b0"])]

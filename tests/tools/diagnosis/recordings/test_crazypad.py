@@ -1,4 +1,4 @@
-"""What CrazyPAD's conditions say, and its figures, on synthetic answers whose counts are known."""
+"""What CrazyPAD's conditions say, and its figures, on synthetic results whose counts are known."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tools.diagnosis.recordings.crazypad import figures, labels
 SMALL, LARGE = "cut_M3_0.5mm_0.5mm", "cut_M2_3.5mm_3.0mm_40.5mm"  # 1 mm and 6.5 mm gone; the last is the blade's length
 
 
-def case(condition, rotors=(), name="weak_motor", verdict="effect", loss=0.1, drone="A"):
+def result(condition, rotors=(), name="weak_motor", verdict="effect", loss=0.1, drone="A"):
     """A flight of a condition and what its diagnosis names: an effect of these rotors, or of none."""
     parameters = [{"rotor": {"value": float(r)}, "thrust_loss": {"value": loss}} for r in rotors] or [{}]
     effects = [{"name": name, "parameters": p} for p in parameters] if verdict == "effect" else []
@@ -43,28 +43,35 @@ def test_all_flights_of_each_fourth_defect_are_kept_for_looking():
 
 
 def test_each_family_counts_the_same_however_many_flights_it_has():
-    flights = [case("normal_flight", verdict="none"), case(LARGE, [2]), case(LARGE, verdict="none"),
-               case(LARGE, verdict="unknown"), case(LARGE, name="mass")]
+    flights = [result("normal_flight", verdict="none"), result(LARGE, [2]), result(LARGE, verdict="none"),
+               result(LARGE, verdict="unknown"), result(LARGE, name="mass")]
     assert figures.balanced_accuracy(flights) == pytest.approx((1.0 + 0.25) / 2.0)
     assert np.isnan(figures.balanced_accuracy([]))
 
 
 def test_rotors_are_exact_or_only_damaged_ones():
     two = "cut_M1_2.0mm_M3_2.0mm"
-    flights = [case(two, [3, 1]), case(two, [1]), case(two, [1, 2]), case(two, verdict="none"), case("normal_flight")]
+    flights = [*(result(two, rotors) for rotors in ([3, 1], [1], [1, 2])), result(two, verdict="none"),
+               result("normal_flight")]
     assert figures.exact_rotors(flights) == pytest.approx(1 / 4)
     assert figures.only_damaged_rotors(flights) == pytest.approx(2 / 4)
-    assert figures.large_exact_rotors([*flights, case(SMALL, [1])]) == pytest.approx(1 / 4)
+    assert figures.large_exact_rotors([*flights, result(SMALL, [1])]) == pytest.approx(1 / 4)
 
 
 def test_a_small_cut_may_be_called_normal_and_a_large_one_not():
     for condition, forgiven in ((SMALL, 1.0), (LARGE, 0.0)):
-        flights = [case(condition, verdict="none")]
+        flights = [result(condition, verdict="none")]
         assert figures.balanced_accuracy(flights) == 0.0 and figures.forgiven(flights) == forgiven
 
 
+def test_a_refused_flight_is_not_right_and_is_not_called_unknown():
+    refused = result(LARGE, verdict="refused")
+    assert figures.answer(refused) == "refused" and figures.balanced_accuracy([refused]) == 0.0
+    assert figures.named_rotors(refused) == [] and figures.thrust_loss(refused) == 0.0
+
+
 def test_severity_is_the_order_of_the_losses():
-    flights = [case(f"cut_M1_{mm}.0mm", [1], loss=0.01 * mm ** 2) for mm in (1, 2, 3, 4)]
+    flights = [result(f"cut_M1_{mm}.0mm", [1], loss=0.01 * mm ** 2) for mm in (1, 2, 3, 4)]
     assert figures.severity(flights) == pytest.approx(1.0)
     backwards = [{**one, "effects": other["effects"]} for one, other in zip(flights, flights[::-1], strict=True)]
     assert figures.severity(backwards) == pytest.approx(-1.0) and np.isnan(figures.severity(flights[:2]))
@@ -75,7 +82,7 @@ def test_intervals_resample_conditions_not_flights():
 
     How many flights each has does not matter. With a single condition the interval has no width.
     """
-    right, wrong = [case(LARGE, [2])] * 9, [case("cut_M1_2.0mm", verdict="none")] * 9
+    right, wrong = [result(LARGE, [2])] * 9, [result("cut_M1_2.0mm", verdict="none")] * 9
     assert figures.interval([*right, *wrong], figures.balanced_accuracy) == (0.0, 1.0)
     assert figures.interval([*right, *wrong[:1]], figures.balanced_accuracy) == (0.0, 1.0)
     assert figures.interval([*right], figures.balanced_accuracy) == (1.0, 1.0)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.errors import AirTouchError
 from tools.diagnosis.recordings.wakes import false_alarms, known_seconds, tracks, without_seconds
 
 
@@ -50,7 +51,7 @@ def test_a_wake_with_too_few_seconds_of_the_path_is_listed_and_counted_apart(cap
         high = window("cf51", 4.0, (0.0, 0.0, 0.9), samples)
         high.row.update(here, file="high.csv", truth="partner")
         low.force[:] = np.where(tracks.under(low, high), -0.2, low.force)
-        known_seconds.show_detected([low, high, nominal], None)
+        known_seconds.show_detected([low, high, nominal], {})
         out = capsys.readouterr().out
         assert words in next(line for line in out.splitlines() if "low.csv" in line)
         assert f"{int(samples == 40)} more, for which the data hold less than 0.5 s" in out
@@ -67,14 +68,30 @@ def test_named_wakes_are_counted_by_whether_the_path_is_held(tmp_path):
 
     held = [*wake("long", 1, 3.0), *wake("unnamed", 2, 3.0), *wake("short", 3, 0.3), *wake("alone", 4, 0.0)]
     kept = tmp_path / "answers.jsonl"
-    kept.write_text("".join(json.dumps({"flight": name, "verdict": verdict, "effects": [{"name": n} for n in names]})
-                            + "\n" for name, verdict, names in (
-        ("long", "effect", ["downwash", "mass"]), ("unnamed", "effect", ["mass", "downwash"]), ("short", "none", []),
-        ("alone", "effect", ["downwash"]))))
+    results = [{"row": "swarm", "flight": name, "verdict": "effect" if names else "none",
+                "effects": [{"name": n} for n in names]} for name, names in (
+        ("long", ["downwash", "mass"]), ("unnamed", ["mass", "downwash"]), ("short", []), ("alone", ["downwash"]))]
+    kept.write_text("".join(json.dumps(result) + "\n" for result in results))
     answers = known_seconds.answers_of(kept)
     assert answers == {"long": "downwash", "unnamed": "mass", "short": "none", "alone": "downwash"}
     assert known_seconds.named_by_path(held, answers) == {True: [True, False], False: [False, True]}
     assert known_seconds.named_by_path(held, known_seconds.answers_of(None)) == {True: [False] * 2, False: [False] * 2}
+
+
+@pytest.mark.parametrize(("more", "answer"), [
+    ({"partner": 1}, None), ({"left_out": ["downwash"]}, "downwash"), ({"row": "nominal"}, "downwash"),
+    ({"verdict": "refused"}, "downwash")])
+def test_two_diagnoses_of_one_flight_are_refused_and_other_rows_left_out(tmp_path, more, answer):
+    """Of runs with a partner and without, nobody knows which is asked for."""
+    first = {"row": "swarm", "flight": "a.csv", "partner": 0, "left_out": [], "verdict": "effect",
+             "effects": [{"name": "downwash"}]}
+    kept = tmp_path / "kept.jsonl"
+    kept.write_text("".join(json.dumps(one) + "\n" for one in (first, {**first, "effects": [], **more})))
+    if answer is None:
+        with pytest.raises(AirTouchError, match="a.csv was diagnosed more than once, as with --partner"):
+            known_seconds.answers_of(kept)
+    else:
+        assert known_seconds.answers_of(kept) == {"a.csv": answer}
 
 
 def test_the_interval_of_an_area_holds_it():
@@ -100,7 +117,7 @@ def case(name, truth="none", folder="neuralswarm"):
     return SimpleNamespace(flight=f"F/{folder}/flights/{name}", vehicle="34 g", truth=truth, baseline=("one", "two"))
 
 
-def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_in, monkeypatch, capsys):
+def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_in, monkeypatch, capsys, tmp_path):
     """Of three nominal flights that are tracks one gains enough, one too little, one flies another manoeuvre."""
     stand_in(false_alarms)
     low, high = window(), window("cf51", 4.0, (0.1, 0.0, 0.9), 300)
@@ -116,10 +133,11 @@ def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_i
     monkeypatch.setattr(false_alarms.gates, "passing_effects", lambda data: {
         false_alarms.gates.KNOWN_OVERHEAD: SimpleNamespace(**vars(wake), gain=data[1])})
     monkeypatch.setattr(false_alarms, "passing_evidence",
-                        lambda data, key, gain, strength: false_alarms.PASSING_GAIN - (gain != "a"))
-    false_alarms.show_false_alarms("F", [low, high, *calm])
-    *lines, last = capsys.readouterr().out.splitlines()
-    assert lines == ["a: 1 of 1", "b: 0 of 1", "c: 0 of 0"] and "1 of 2" in last and last.endswith("in 1 flights")
+                        lambda data, key, gain, strength: np.float64(false_alarms.PASSING_GAIN - (gain != "a")))
+    for _ in range(2):  # the second run takes what the first kept
+        false_alarms.show_false_alarms("F", [low, high, *calm], tmp_path / "kept.jsonl")
+        *lines, last = capsys.readouterr().out.splitlines()
+        assert lines == ["a: 1 of 1", "b: 0 of 1", "c: 0 of 0"] and "1 of 2" in last and last.endswith("in 1 flights")
     assert seconds_overhead == [((4.0, 7.0),)] * 2
 
 

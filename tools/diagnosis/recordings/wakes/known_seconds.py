@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import json_lines
 
+from ..kept import REFUSED
 from .tracks import LEAST_S, Track, seconds_under
 
 LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number
@@ -43,9 +45,19 @@ def chance(acts: np.ndarray, nominal: list[Track]) -> np.ndarray:
 
 
 def answers_of(path: Path | None) -> dict[str, str]:
-    """A flight's file -> the first effect, or the verdict, in what `gap_real.py --keep` wrote; empty without a file."""
-    return {case["flight"]: case["effects"][0]["name"] if case["effects"] else case["verdict"]
-            for case in json_lines.read(path)}
+    """A flight's file -> the first effect, or the verdict, in what `gap_real.py --keep` wrote; empty without a file.
+
+    Raises AirTouchError for a flight that was diagnosed more than once, as with --partner and without.
+    """
+    answers: dict[str, str] = {}
+    for result in json_lines.read(path):
+        if result["row"] != "swarm" or result.get("left_out") or result["verdict"] == REFUSED:
+            continue
+        if result["flight"] in answers:
+            raise AirTouchError(f"{path}: {result['flight']} was diagnosed more than once, as with --partner and "
+                                "without; keep the results of one set of options in a file of its own")
+        answers[result["flight"]] = result["effects"][0]["name"] if result["effects"] else result["verdict"]
+    return answers
 
 
 def named_by_path(tracks: list[Track], answer_of: dict[str, str]) -> dict[bool, list[bool]]:
@@ -56,10 +68,12 @@ def named_by_path(tracks: list[Track], answer_of: dict[str, str]) -> dict[bool, 
     return named
 
 
-def show_detected(tracks: list[Track], answers: Path | None) -> None:
-    """Print a line for each flight under another vehicle, and for each vehicle how many the test detects."""
+def show_detected(tracks: list[Track], answer_of: dict[str, str]) -> None:
+    """Print a line for each flight under another vehicle, and for each vehicle how many the test detects.
+
+    answer_of: what the diagnosis says of a flight, by its file (`answers_of`); may be empty.
+    """
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
-    answer_of = answers_of(answers)
     table: dict[str, list[bool]] = {}
     print(f"| flight | under, s | {' | '.join(MEASURES)} | detected | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
@@ -81,6 +95,6 @@ def show_detected(tracks: list[Track], answers: Path | None) -> None:
         print(f"{vehicle}: detected {share_text(sum(hits), len(hits))}")
     named = named_by_path(tracks, answer_of)
     print(f"{len(named[False])} more, for which the data hold less than {LEAST_S:g} s of a path overhead")
-    if answers:
+    if answer_of:
         print(f"the diagnosis names a wake in {share_text(sum(named[True]), len(named[True]))} where the data hold "
               f"at least {LEAST_S:g} s of the path, in {share_text(sum(named[False]), len(named[False]))} where less")
