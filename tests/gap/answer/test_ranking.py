@@ -10,7 +10,7 @@ from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.inference import Inference
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
 
@@ -34,7 +34,7 @@ def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0
 
 
 def gap(before):
-    return SimpleNamespace(shrink=SimpleNamespace(before=before, share=Quantity(0.8)))
+    return SimpleNamespace(closure=SimpleNamespace(before=before, shrink=Quantity(0.8)))
 
 
 OVER = AT_FLOOR + 0.5
@@ -81,6 +81,15 @@ def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
     assert probabilities == sorted(probabilities, reverse=True)
     assert [bool(r.why) for r in ranking] == [False] + [True] * (len(ranking) - 1)
     assert ranking[0].shrink.value == (0.8 if verdict == "effect" else 0.0), "of one effect named: that of the answer"
+    assert [r.measured for r in ranking] == [verdict == "effect"] + [False] * (len(ranking) - 1)
+
+
+def test_a_shrink_that_was_not_measured_is_a_number_in_the_json_and_says_so():
+    """Nought that was measured is told from one that was not."""
+    measured, not_measured = RankedCandidate("mass", 0.1, Quantity(0.0)), RankedCandidate("none", 0.1, Quantity(0.0),
+                                                                                          measured=False)
+    assert measured.plain()["shrink"] == {"value": 0.0, "unit": "1"}
+    assert not_measured.plain()["shrink"] == {"value": 0.0, "unit": "1", "measured": False}
 
 
 def gaining(**gains):

@@ -28,7 +28,7 @@ def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
 
 def test_no_cause_is_given_without_a_headline_cell():
     where, which, _ = sentences(diagnosis([cell("force_z", "hover", 0.05)]))
-    assert where == "In no cell of the map does the gap stand out of its floor."
+    assert where == "In no cell of the map does the gap stand out from its floor."
     assert which.startswith("The effect named, from all cells together, is imu bias")
 
 

@@ -18,7 +18,7 @@ def _where(diagnosis: Diagnosis) -> str:
     """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
     cell = diagnosis.headline
     if cell is None:
-        return "In no cell of the map does the gap stand out of its floor."
+        return "In no cell of the map does the gap stand out from its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
