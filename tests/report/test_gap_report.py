@@ -113,7 +113,7 @@ def test_pages_of_other_verdicts(pushed_flights, tmp_path, verdict, words_there)
 
 def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects(tmp_path):
     open_cell = OpenCell("force_y", (0.0, 0.5), "hover", "a/log.csv", from_s=34.0, to_s=42.0, over_floor=6.1,
-                         follows=("height",), nearest=(Rejected("wind", "gains 3 nats, 12 are needed"),))
+                         follows=("height",), nearest=(Rejected("wind", "gains 3 nats, but 12 are needed"),))
     result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(open_cell,))
     steps = advice.steps(replace(result, indistinguishable=()), [], VEHICLE)
     path = tmp_path / "gap.html"
@@ -121,7 +121,7 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
     text, _ = checked(path)
     assert ("sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; "
             "follows height") in text
-    assert "wind: gains 3 nats, 12 are needed" in text
+    assert "wind: gains 3 nats, but 12 are needed" in text
     assert 'href="#add-an-effect"' in path.read_text() and "EFFECT = Effect(" in text  # the link leads to a whole file
 
 
