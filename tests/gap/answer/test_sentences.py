@@ -61,7 +61,7 @@ def test_none_says_how_large_the_gap_is(before, size):
     assert sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {size}"
 
 
-def test_an_effect_beside_the_first_is_told_as_one_though_the_headline_is_its_own():
+def test_an_effect_beside_the_first_is_named_as_one_though_the_headline_is_its_own():
     cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
     effects = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
     _, which, _ = sentences(diagnosis(cells, effects=effects))

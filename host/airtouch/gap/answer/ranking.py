@@ -14,7 +14,7 @@ from airtouch.gap.signatures.signature import CLOCK
 AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
 #: nats of held-out log likelihood by which two candidates differ that can be told apart; chosen: odds of 20. A larger
 #: number lists more pairs as alike that the flights do tell apart
-TOLD_APART = 3.0
+LEAST_DIFFERENCE = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
@@ -81,7 +81,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     groups = []
     first = selection.single_effects[selection.named_steps[0].name]
     same = [n for n, c in selection.single_effects.items() if (c.full or selection.inference is not None)
-            and selection.gained(first) - selection.gained(c) < TOLD_APART]
+            and selection.gained(first) - selection.gained(c) < LEAST_DIFFERENCE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named_steps:
