@@ -39,14 +39,16 @@ from airtouch.gap.relations.learning import (
     scaled,
     weakest_strength,
 )
-from airtouch.gap.relations.library import STORED, Coordinates, Library, packed, read, save
+from airtouch.gap.relations.library import HALF_PRECISION, Coordinates, Library, packed, read, save
 from airtouch.gap.relations.settings import SHIPPED, BuildSettings
 from airtouch.logs.files import check_free
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import DEFAULT_VEHICLE, load
 
-CLEAR_NAMELESS = 3.0  #: length of the shift of a nameless disturbance from which its direction counts
-CLEAR_OF_TWO = 12.0  #: length of the smaller shift of two effects from which their sum is looked at
+#: the direction of a nameless disturbance counts where its shift is longer, nominal standard deviations
+LEAST_NAMELESS_LENGTH = 3.0
+#: two effects show their interaction where the smaller one's shift is longer, nominal standard deviations
+LEAST_PAIR_LENGTH = 12.0
 
 
 @dataclass(frozen=True)
@@ -99,13 +101,13 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: 
                          for i, f in disturbed_flights(scene, settings.nameless_flights) if i in nominal])
     axes = directions([p.shift for p in paired], settings.directions_of_class, nameless,
                       settings.directions_of_nameless)
-    projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
+    projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(HALF_PRECISION).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
     classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
         p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
     coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
     additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
-                            nameless=_scatter_of_nameless(nameless @ axes)[:, :settings.rank_of_nameless])
+                            nameless=_nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
     say("flights of two effects")
     interaction = _interaction(scene, coordinates, additive, paired, settings.flights_of_two)
     model = replace(additive, interaction=interaction[:, :settings.rank_of_interaction])
@@ -138,13 +140,13 @@ def _shifts(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], 
     return [whitening(f)[0] - nominal[i] for i, f in flown if f is not None]
 
 
-def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
+def _nameless_loadings(shift: np.ndarray) -> np.ndarray:
     """Directions (Q, r), times the standard deviation, of nameless shifts (n, Q) over their length.
 
     The direction of the largest one comes first.
     """
     length = np.linalg.norm(shift, axis=1, keepdims=True)
-    unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > CLEAR_NAMELESS]
+    unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > LEAST_NAMELESS_LENGTH]
     _, deviation, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
     return axes.T * deviation
 
@@ -163,7 +165,7 @@ def _interaction(scene: Scene, coordinates: Coordinates, additive: LearnedModel,
         if f is None:
             continue
         residual, smaller = _residual_of_two(additive, coordinates(f[None])[0], a, b)
-        if smaller > CLEAR_OF_TWO:
+        if smaller > LEAST_PAIR_LENGTH:
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
                 relative.append(residual / smaller)

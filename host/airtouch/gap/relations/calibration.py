@@ -1,7 +1,7 @@
 """Calibrate a library on simulated flights that it was not learned from: distances, shares of evidence, parameters.
 
 Three steps: the distance of nominal flights (`nominal_distance`), then in `calibrated` each class by flights with its
-effect (`calibrate_class`) and two effects together (`_scatter_of_two`).
+effect (`calibrate_class`) and two effects together (`_pair_distance_scatter`).
 
 How many flights it takes is in `settings`. Thresholds without another source were chosen on flights of `learning.SEED`
 alone (host/docs/looks.md, 2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not
@@ -27,15 +27,16 @@ from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
-FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
-NUMBERS_OF_CLASS = 1000  #: numbers that each class has of its own
+#: numbers of the first nominal flight, the first with two effects and the first of a class
+FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000
+NUMBERS_OF_CLASS = 1000  #: flight numbers that each class has of its own
 RANGE_OF_TWO = 30.0  #: factor between the highest and the lowest strength of two effects that act together
-HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
-HIGHEST_START = 0.5  #: of the highest strength, from which a class's flights begin at most
-SHOWN = 0.5  #: share of the flights at a strength that show the effect, from which on it shows there
-QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
+HALVINGS = 12  #: most times that the highest strength is halved, down to that which hardly shows
+HIGHEST_START = 0.5  #: largest fraction of the highest strength at which a class's flights begin
+DETECTION_RATE = 0.5  #: fraction of the flights at a strength that show the effect, from which on it shows there
+QUANTILE_OF_SHARES = 0.8  #: fraction of the flights of a class whose own share lies below the one that is stored
 DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
-LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
+LEAST_SCATTER = 1e-4  #: lower bound of the search for the standard deviation of a distance over the evidence
 
 
 def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, say: Say = lambda _: None) -> Library:
@@ -48,7 +49,8 @@ def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, sa
         classes.append(replace(own, calibration=calibrate_class(scene, library, place, drawing, settings)))
     library = library.with_classes(classes)
     say("flights of two effects")
-    return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings, settings.flights_of_two))
+    return replace(library, pair_distance_scatter=_pair_distance_scatter(scene, library, drawings,
+                                                                         settings.flights_of_two))
 
 
 def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, settings: CalibrationSettings,
@@ -58,8 +60,8 @@ def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing
     return ClassCalibration(
         _readout(drawing, shown, settings.least_flights), share_of((f.nameless, f.evidence) for f in shown),
         share_of((f.second, f.evidence) for f in shown if f.second is not None),
-        likeliest_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
-                          library.nominal_scatter))
+        likeliest_distance_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
+                          library.nominal_distance_scatter))
 
 
 def nominal_distance(scene: Scene, coordinates: Coordinates, count: int) -> NominalDistance:
@@ -130,7 +132,7 @@ def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float, tr
     def hides(strength: float) -> bool:
         """Whether fewer than half of the flights at a strength show the class; False where none ends well."""
         ended = [one for one in (fitted(strength) for _ in range(tried)) if one is not None]
-        return bool(ended) and float(np.mean([one.shows for one in ended])) < SHOWN
+        return bool(ended) and float(np.mean([one.shows for one in ended])) < DETECTION_RATE
 
     return halved(highest, HALVINGS, hides)
 
@@ -157,7 +159,7 @@ def share_of(gains: Iterable[tuple[float, float]]) -> float:
     return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
 
 
-def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
+def likeliest_distance_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
     """Likeliest scatter s of distances over the evidence: excess (n,) ~ sqrt(nominal^2 + (s evidence)^2) Student's t.
 
     nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats. Without flights it is 0.
@@ -182,9 +184,9 @@ def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight], least: int) -
     return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
 
 
-def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing], count: int) -> float:
-    """`Library.pair_scatter` by so many flights with two effects, each hypothesis started from either."""
-    excess, evidence, of_classes = [], [], []
+def _pair_distance_scatter(scene: Scene, library: Library, drawings: Sequence[Drawing], count: int) -> float:
+    """`Library.pair_distance_scatter` by so many flights with two effects, each hypothesis started from either."""
+    excess, evidence, scatter_of_classes = [], [], []
     for i in range(count):
         rng = np.random.default_rng([SEED, Stream.CALIBRATION_PAIR, i])
         a, b = two_of(drawings, rng)
@@ -200,8 +202,9 @@ def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing],
             continue  # the weaker one does not show
         excess.append(library.excess(flight.squared_distance(both)))
         evidence.append(both.evidence)
-        of_classes.append(library.scatter(max(c.calibration.distance_scatter for c in (one, two)), both.evidence))
-    return likeliest_scatter(np.array(excess), np.array(evidence), np.array(of_classes))
+        larger = max(c.calibration.distance_scatter for c in (one, two))
+        scatter_of_classes.append(library.distance_scatter(larger, both.evidence))
+    return likeliest_distance_scatter(np.array(excess), np.array(evidence), np.array(scatter_of_classes))
 
 
 def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, int]:

@@ -20,12 +20,16 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-FARTHEST_NOMINAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
-PARTS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
-SHARES = ("nameless_share", "second_share", "distance_scatter")  #: of a calibration; arrays of all classes in a file
-STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its scatter
-#: ends of the names of the arrays that are stored in float32
-EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
+#: standard deviations of the distance of nominal flights from the median; farther ones are not as those that were
+#: learned from; chosen
+FARTHEST_NOMINAL = 4.0
+CLASS_ARRAYS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
+#: fields of a calibration that are fractions of the evidence; each an array of all classes in a file
+SHARE_FIELDS = ("nameless_share", "second_share", "distance_scatter")
+#: type of most arrays of a file; it moves a coordinate by less than a tenth of its nominal standard deviation
+HALF_PRECISION = np.float16
+#: ends of the names of the arrays of a file that are in float32
+SINGLE_PRECISION = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
 
 
 class NominalDistance(NamedTuple):
@@ -71,7 +75,7 @@ class Coordinates:
 class Library:
     """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
-    pair_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
+    pair_distance_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
     """
 
     scenario: str
@@ -79,23 +83,23 @@ class Library:
     coordinates: Coordinates
     model: LearnedModel
     distance: NominalDistance
-    pair_scatter: float = 0.0
+    pair_distance_scatter: float = 0.0
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Other processes read the shipped library from their own package: it is 30 MB of a study that is sent."""
         return (shipped, ()) if self is shipped() else super().__reduce_ex__(protocol)
 
     @property
-    def nominal_scatter(self) -> float:
+    def nominal_distance_scatter(self) -> float:
         """Standard deviation of the excess distance of nominal flights, nats."""
         return 0.5 * self.distance.deviation
 
-    def scatter(self, share: float, evidence: float) -> float:
+    def distance_scatter(self, share: float, evidence: float) -> float:
         """Standard deviation of the excess distance of flights with effects, nats.
 
         share: what of it is beyond that of nominal flights, over the evidence; evidence: of the effects, nats.
         """
-        return float(np.hypot(self.nominal_scatter, share * evidence))
+        return float(np.hypot(self.nominal_distance_scatter, share * evidence))
 
     def excess(self, squared: float) -> float:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
@@ -104,7 +108,7 @@ class Library:
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
         middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_scatter
+        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_distance_scatter
 
     @property
     def effects(self) -> frozenset[str]:
@@ -133,20 +137,21 @@ def save(library: Library, path: Path, force: bool = False) -> None:
 
 def _rounded(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The arrays in the precision of a file."""
-    return {name: array.astype(np.float32 if name.endswith(EXACT) else STORED) for name, array in arrays.items()}
+    return {name: array.astype(np.float32 if name.endswith(SINGLE_PRECISION) else HALF_PRECISION)
+            for name, array in arrays.items()}
 
 
 def packed(library: Library) -> bytes:
     """The bytes of a library's file."""
     model = library.model
     arrays = {**library.coordinates.arrays(), "interaction": model.interaction, "nameless": model.nameless,
-              **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARES}}
+              **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARE_FIELDS}}
     for i, c in enumerate(model.classes):
-        arrays |= {f"{i}.{part}": getattr(c, part) for part in PARTS}
+        arrays |= {f"{i}.{part}": getattr(c, part) for part in CLASS_ARRAYS}
         if (readout := c.calibration.readout) is not None:
             arrays |= {f"{i}.strength": readout.strength, f"{i}.amount": readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
-             "pair_scatter": library.pair_scatter,
+             "pair_scatter": library.pair_distance_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
              "readouts": [(r := c.calibration.readout) and r.parameters for c in model.classes]}
     file = io.BytesIO()
@@ -155,21 +160,21 @@ def packed(library: Library) -> bytes:
 
 
 def read(content: bytes) -> Library:
-    """The library in the bytes of a file; raises ValueError where it has not one number of SHARES for each class."""
+    """The library in the bytes of a file; raises ValueError where SHARE_FIELDS have not one number for each class."""
     with np.load(io.BytesIO(content)) as file:
         words = json.loads(str(file["words"]))
         arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
-    if any(len(arrays[name]) != len(words["classes"]) for name in SHARES):
-        raise ValueError(f"a library of {len(words['classes'])} classes must have as many of {', '.join(SHARES)}")
+    if any(len(arrays[name]) != len(words["classes"]) for name in SHARE_FIELDS):
+        raise ValueError(f"a library of {len(words['classes'])} classes must have as many of {', '.join(SHARE_FIELDS)}")
     classes = tuple(
-        EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in PARTS},
+        EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in CLASS_ARRAYS},
                     calibration=ClassCalibration(_readout(words["readouts"][i], i, arrays),
-                                                 **{share: float(arrays[share][i]) for share in SHARES}))
+                                                 **{share: float(arrays[share][i]) for share in SHARE_FIELDS}))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
     return Library(
         words["scenario"], words["vehicle"], Coordinates.of(arrays),
         LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
-        distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"])
+        distance=NominalDistance(*words["distance"]), pair_distance_scatter=words["pair_scatter"])
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:

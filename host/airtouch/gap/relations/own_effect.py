@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.relations.calibration import HIGHEST_START, calibrate_class
 from airtouch.gap.relations.effect_class import LEAST_SHIFT, ClassCalibration, ClassFlights, EffectClass, learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled, weakest_strength
-from airtouch.gap.relations.library import SHARES, Library
+from airtouch.gap.relations.library import SHARE_FIELDS, Library
 from airtouch.gap.relations.settings import OWN_EFFECT, OwnEffectSettings
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
@@ -70,7 +70,8 @@ def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> Cl
     """A calibration with shares no smaller than those of the known classes: a curve through few flights is less exact.
     """
     calibrations = (calibration, *(c.calibration for c in known))
-    return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in calibrations) for name in SHARES))
+    return ClassCalibration(calibration.readout,
+                            *(max(getattr(one, name) for one in calibrations) for name in SHARE_FIELDS))
 
 
 def _shifts(library: Library, scene: Scene, drawing: Drawing, strength: float) -> list[np.ndarray]:
