@@ -7,7 +7,7 @@ asked for and written out.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import digits, leading, seconds_in_words
+from airtouch.gap.answer.words import format_of, leading, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
@@ -109,7 +109,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     for effect in diagnosis.effects:
         name, seconds = effect.name, seconds_in_words(effect)
         for parameter, q in effect.parameters.items():
-            form = digits(q)
+            form = format_of(q)
             rows.append({"effect": name, "parameter": parameter, "value": form.format(q.value),
                          "interval": _interval(q, form), "unit": "" if q.unit == "1" else q.unit,
                          "seconds": f"acts {seconds}" if seconds else ""})
@@ -161,4 +161,4 @@ def with_interval(q: Quantity, form: str) -> WithInterval:
 
 def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, WithInterval]]:
     """(name, value with interval) of calibrated parameters."""
-    return [(name, with_interval(q, digits(q))) for name, q in parameters.items()]
+    return [(name, with_interval(q, format_of(q))) for name, q in parameters.items()]

@@ -26,7 +26,7 @@ LEAST_DIVISOR = 1e-6
 def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     """The effects that a selection names, fitted anew to all the data, with 90 % intervals.
 
-    Their order is that of the selection, so that the first is the first of the ranking.
+    They have the order of the selection: the first leads the ranking.
     """
     hypothesis, named = selection.last_step, selection.named_hypothesis
     if hypothesis is None or named is None:

@@ -27,7 +27,7 @@ Say = Callable[[str], None]  #: what a long run reports its progress to
 class Stream(IntEnum):
     """Second number of a random generator's seed, after SEED, one for each purpose.
 
-    `disturbed_flights` has the number of a flight there: those of the numbers below share the numbers drawn.
+    `drawn_flights` and `disturbed_flights` have the number of a flight in this place.
     """
 
     WEAKEST = 5

@@ -1,4 +1,4 @@
-"""What was learned of one vehicle in one scenario, as a file: coordinates of its flights and classes of effects."""
+"""The library: what was learned of one vehicle in one scenario, its file, and for which flights it holds."""
 
 import io
 import json

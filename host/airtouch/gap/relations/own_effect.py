@@ -1,6 +1,6 @@
 """Classes of effects that a library lacks, such as a user's own: learned from some hundred simulated flights.
 
-What an effect does to the signals is so known in closed loop too, where it changes the plant and no force shows it.
+By them the diagnosis knows what the effect does in closed loop, also where it changes the plant and no force shows it.
 """
 
 from collections.abc import Iterable, Sequence
