@@ -66,7 +66,8 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     assert left_out.gap["after"] > diagnosis.gap["after"]
     unknown, nearest, *_ = left_out.ranking
     assert left_out.verdict == unknown.name == "unknown" and unknown.shrink.value == 0.0  # as nothing is named
-    assert re.match(r"the flight lies \d+ nats farther from it than nominal flights from none, up to \d+ ", nearest.why)
+    assert re.match(r"the flight lies \d+ nats farther from it than nominal flights from none, but only up to \d+ ",
+                    nearest.why)
 
 
 def test_a_users_effect_that_only_the_commands_show_is_fitted(tmp_path):
