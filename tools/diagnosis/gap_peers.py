@@ -71,7 +71,7 @@ def diagnose_flight(folder: Path, label: peers.Row) -> PeerResult:
         label["file"], peers.truth(label), f"{float(label['strength']):.3g} {label['unit'].split(',')[0][:24]}",
         diagnosis.verdict, named, [r.name for r in diagnosis.ranking[:3]],
         None if diagnosis.shrink is None else diagnosis.shrink.value,
-        None if diagnosis.control is None else diagnosis.control.shrink.share.value, time.process_time() - began)
+        None if diagnosis.control is None else diagnosis.control.closure.shrink.value, time.process_time() - began)
 
 
 def summary(results: Sequence[PeerResult]) -> str:

@@ -1,14 +1,23 @@
-"""What a library is learned by, on draws of a known covariance; and a small library, learned from few flights."""
+"""What a library is learned by, on draws of a known covariance; a small library, learned from few flights; its file."""
 
 import numpy as np
 import pytest
 
+import axis_library
+from airtouch.errors import in_one_line
 from airtouch.gap.features import flight_features
 from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations import build, calibration, learning
-from airtouch.gap.relations.build import CLEAR_NAMELESS, PairedFlights, Whitening, _beyond_noise, _scatter_of_nameless
+from airtouch.gap.relations.build import (
+    LEAST_NAMELESS_LENGTH,
+    PairedFlights,
+    Whitening,
+    _beyond_noise,
+    _nameless_loadings,
+)
 from airtouch.gap.relations.inference import infer
 from airtouch.gap.relations.learning import Scene, drawings, fly
+from airtouch.gap.relations.library import read
 from airtouch.gap.relations.settings import BuildSettings, CalibrationSettings
 from airtouch.simulation.effects import activate
 from gap_flights import VEHICLE
@@ -39,18 +48,18 @@ def test_two_effects_interact_in_the_direction_that_stands_over_noise():
     noise = 0.05 * rng.normal(size=(300, 40))
     assert _beyond_noise(noise, 0.05 ** 2).shape == (40, 0)
     direction = np.eye(40)[3]
-    factors = _beyond_noise(noise + 0.3 * rng.normal(size=(300, 1)) * direction, 0.05 ** 2)
-    assert factors.shape == (40, 1)
-    assert abs(factors[3, 0]) == pytest.approx(0.3, rel=0.1)
+    loadings = _beyond_noise(noise + 0.3 * rng.normal(size=(300, 1)) * direction, 0.05 ** 2)
+    assert loadings.shape == (40, 1)
+    assert abs(loadings[3, 0]) == pytest.approx(0.3, rel=0.1)
 
 
 def test_nameless_disturbances_scatter_by_their_directions_not_their_lengths():
     rng = np.random.default_rng(3)
     length = np.exp(rng.uniform(2.0, 8.0, (500, 1)))
     shift = length * np.where(rng.random((500, 1)) < 0.8, np.eye(5)[0], np.eye(5)[1])
-    weak = 0.9 * CLEAR_NAMELESS * np.tile(np.eye(5)[4], (500, 1))
-    factors = _scatter_of_nameless(np.concatenate([shift, weak]))
-    assert np.diag(factors @ factors.T) == pytest.approx([0.8, 0.2, 0.0, 0.0, 0.0], abs=0.05)
+    weak = 0.9 * LEAST_NAMELESS_LENGTH * np.tile(np.eye(5)[4], (500, 1))
+    loadings = _nameless_loadings(np.concatenate([shift, weak]))
+    assert np.diag(loadings @ loadings.T) == pytest.approx([0.8, 0.2, 0.0, 0.0, 0.0], abs=0.05)
 
 
 def test_effects_of_a_pair_are_of_the_upper_half_of_their_strengths():
@@ -100,3 +109,25 @@ def test_a_library_built_of_few_flights_names_nothing_in_nominal_ones(infer_new_
 
 def test_an_effect_that_a_library_was_built_without_is_left(infer_new_flights):
     assert all(one.against.is_too_much for one in infer_new_flights({"wind": {}}))
+
+
+def test_a_file_that_is_there_is_refused_before_the_work(tmp_path, monkeypatch, capsys):
+    """One line and exit code 2, and nothing is flown."""
+    out = tmp_path / "one.npz"
+    out.write_bytes(b"mine")
+    monkeypatch.setattr(build, "build", lambda *_, **__: pytest.fail("half an hour of work"))
+    monkeypatch.setattr("sys.argv", ["build", str(out)])
+    with pytest.raises(SystemExit) as end, in_one_line("build"):
+        build.main()
+    assert capsys.readouterr().err == f"build: {out}: exists already; use --force to replace it\n"
+    assert end.value.code == 2 and out.read_bytes() == b"mine"
+
+
+def test_a_library_is_written_in_place_of_another_by_force(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "one.npz"
+    out.write_bytes(b"old")
+    monkeypatch.setattr(build, "build", lambda *_, **__: axis_library.library())
+    monkeypatch.setattr("sys.argv", ["build", str(out), "--force"])
+    build.main()
+    assert [c.name for c in read(out.read_bytes()).model.classes] == list(axis_library.NAMES)
+    assert capsys.readouterr().out.count("nameless share 0.000") == len(axis_library.NAMES)

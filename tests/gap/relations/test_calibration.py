@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.relations import calibration
-from airtouch.gap.relations.calibration import CalibrationFlight, likeliest_scatter, share_of, two_of
+from airtouch.gap.relations.calibration import CalibrationFlight, likeliest_distance_scatter, share_of, two_of
 from airtouch.gap.relations.learning import drawings
 
 
@@ -15,9 +15,9 @@ def test_the_scatter_of_distances_is_found_in_flights_of_which_some_hit_somethin
     evidence = np.exp(rng.uniform(3.0, 10.0, 4000))
     excess = np.hypot(19.0, 0.02 * evidence) * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000)
     excess[:40] += 5000.0
-    assert likeliest_scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
-    assert likeliest_scatter(np.zeros(0), np.zeros(0), 19.0) == 0.0, "no flight"
-    assert likeliest_scatter(19.0 * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000), evidence, 19.0) < 0.002
+    assert likeliest_distance_scatter(excess, evidence, 19.0) == pytest.approx(0.02, rel=0.1)
+    assert likeliest_distance_scatter(np.zeros(0), np.zeros(0), 19.0) == 0.0, "no flight"
+    assert likeliest_distance_scatter(19.0 * rng.standard_t(calibration.DISTANCE_FREEDOM, 4000), evidence, 19.0) < 0.002
 
 
 def test_four_of_five_flights_gain_a_smaller_share_than_the_stored_one():

@@ -31,7 +31,7 @@ def test_the_likeliest_strength_of_a_straight_line_is_the_projection(way):
     values = 2.0 * way + np.random.default_rng(4).normal(size=Q)
     result = fit(straight(way), values, unchanged(Q))
     assert result.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
-    assert result.level == pytest.approx(-0.5 * np.sum((values - result.strength * way) ** 2), rel=1e-6)
+    assert result.peak == pytest.approx(-0.5 * np.sum((values - result.strength * way) ** 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("signed", [False, True])
@@ -56,15 +56,16 @@ def test_scatter_about_the_curve_widens_the_density(way):
     shift = result.strength * way
     covariance = np.eye(Q) + (shift @ shift) * (axes * variances) @ axes.T
     constant = 0.5 * Q * np.log(2.0 * np.pi)
-    assert result.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
+    assert result.peak == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
 
 
 def test_a_rescaling_turns_a_covariance_into_one():
     rng = np.random.default_rng(6)
-    factors, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
-    rescaling = rescaling_of(factors)
-    exact = multivariate_normal(np.zeros(Q), np.eye(Q) + factors @ factors.T).logpdf(values)
-    assert rescaling.level + log_density(rescaling(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
+    loadings, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
+    rescaling = rescaling_of(loadings)
+    exact = multivariate_normal(np.zeros(Q), np.eye(Q) + loadings @ loadings.T).logpdf(values)
+    constant = 0.5 * Q * np.log(2.0 * np.pi)
+    assert rescaling.log_determinant + log_density(rescaling(values)) == pytest.approx(exact + constant)
 
 
 def test_several_parameters_are_solved_together():
@@ -78,11 +79,11 @@ def test_several_parameters_are_solved_together():
 
 
 def test_principal_axes_are_those_of_a_singular_value_decomposition():
-    """Two of six factors are the same: an axis without variance counts for nothing."""
-    factors = np.random.default_rng(5).normal(size=(40, 6)) * np.array([1e3, 10.0, 1.0, 0.1, 1.0, 1.0])
-    factors[:, 5] = factors[:, 4]
-    axes, variance = principal(factors)
-    assert np.sort(variance)[1:] == pytest.approx(np.sort(np.linalg.svd(factors)[1] ** 2)[1:], rel=1e-6)
+    """Two of six loadings are the same: an axis without variance counts for nothing."""
+    loadings = np.random.default_rng(5).normal(size=(40, 6)) * np.array([1e3, 10.0, 1.0, 0.1, 1.0, 1.0])
+    loadings[:, 5] = loadings[:, 4]
+    axes, variance = principal(loadings)
+    assert np.sort(variance)[1:] == pytest.approx(np.sort(np.linalg.svd(loadings)[1] ** 2)[1:], rel=1e-6)
     assert variance.min() == pytest.approx(0.0, abs=1e-9)
-    assert (axes * variance) @ axes.T == pytest.approx(factors @ factors.T, rel=1e-9, abs=1e-9)
+    assert (axes * variance) @ axes.T == pytest.approx(loadings @ loadings.T, rel=1e-9, abs=1e-9)
     assert principal(np.zeros((40, 0)))[0].shape == (40, 0)

@@ -9,7 +9,7 @@ Q, N = 20, 400
 
 
 def test_a_bent_curve_and_its_scatter_are_recovered():
-    """Shift s along one axis and 0.02 s^2 along another, with 20 % scatter along a third."""
+    """Shift s along one axis and 0.02 s^1.5 along another, with 20 % scatter along a third."""
     rng = np.random.default_rng(1)
     strength = np.exp(rng.uniform(np.log(1.0), np.log(100.0), N))
     shift = np.zeros((N, Q))

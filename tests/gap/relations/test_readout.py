@@ -98,7 +98,7 @@ def test_a_strength_of_which_both_signs_come_is_read_as_a_size():
 
 def test_weights_fall_as_a_normal_density_from_the_nearest_flight_or_from_one_width_away():
     """Distances in units of the width: within the calibration as they are, beyond it less the way to it."""
-    width = readout_module.WIDTH
+    width = readout_module.KERNEL_WIDTH
     for distances, counted in (([-0.5, 1.0, 2.0], [0.5, 1.0, 2.0]), ([3.0, 4.0, 5.0], [1.0, 2.0, 3.0]),
                                ([-3.0, -4.0, -5.0], [1.0, 2.0, 3.0])):
         assert readout_module._weights(width * np.array(distances)) == pytest.approx(

@@ -1,7 +1,11 @@
-"""What is said of the flights; `gap.diagnosis` calls these in this order.
+"""The answer of a diagnosis, part by part, in the order in which `gap.diagnosis` asks for them.
 
-How far the gap closes (`shrink`). The verdict and every candidate by its `probabilities` (`ranking`), with the
-`reasons` against the others; the `named_effects` with the `estimates` of their parameters, and `notes` on these. What
-the answer is held against: a wrong effect and another vehicle (`controls`). What stays open (`unexplained`); what to
-fly next (`advice`); the `sentences`, `words` and `pictures` of a report.
+- `shrink`: how far the gap closes.
+- `ranking`: the verdict, and every candidate with its probability (`probabilities`) and why it is not the answer
+  (`reasons`).
+- `named_effects`: the effects with their parameters (`estimates`), and `notes` on these.
+- `controls`: what the answer is compared with, a wrong effect and the vehicle as declared.
+- `unexplained`: what stays open, and which signals it follows (`followed_signals`).
+- `advice`: what to fly next.
+- `sentences`, `words`, `pictures`: what terminal and report show of it.
 """

@@ -11,8 +11,8 @@ from airtouch.simulation.effects import EFFECTS, source_of
 from airtouch.vehicle import Vehicle, argument_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
-URI = "radio://0/80/2M/E7E7E7E7E7"  #: of a Crazyflie as it ships
-#: mission with most of a phase; take-off and landing are in every one
+URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
+#: by phase, the mission with most of it; take-off and landing are in every one
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
@@ -42,7 +42,7 @@ def steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tup
 
 
 def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
-    """The command that flies the named effects in the simulator; those that pass act for the whole flight there.
+    """The command that flies the named effects in the simulator; a passing effect acts for the whole flight there.
 
     vehicle: what `--vehicle` takes.
     """

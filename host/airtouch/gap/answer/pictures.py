@@ -1,4 +1,4 @@
-"""The curves of a report, computed where everything else is: signals of the headline's cell, spectra, commands."""
+"""The curves of a report: signals of the headline's cell, spectra, commands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,12 +22,12 @@ from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_sp
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
 
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
-MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen; more make a report longer
-#: Hz up to which a signal is drawn at least: the lowest band alone is nearly a constant; chosen, the end of the second
-LEAST_HIGHEST_HZ = 2.0
+MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
+#: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
+LEAST_CUTOFF_HZ = 2.0
 #: blocks of nominal flights from which on the power measured there is drawn as the floor of a spectrum; with fewer the
 #: declared noise of the sensors is; chosen. A smaller number draws a floor that is itself noise
-FEWEST_DRAWN_BLOCKS = 9
+FEWEST_NOMINAL_BLOCKS = 9
 LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel's unit squared/Hz; chosen
 
 
@@ -104,9 +104,9 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
 
 
 def _signal(gap: FlightGap, cell: Cell) -> Signal:
-    """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_HIGHEST_HZ."""
+    """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_CUTOFF_HZ."""
     flight, c = gap.flight, COLUMN[cell.channel]
-    highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_HIGHEST_HZ)
+    highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_CUTOFF_HZ)
     measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
                        for values in (_measured(flight, c), None if gap.after is None else gap.after[:, c]))
     return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
@@ -146,7 +146,7 @@ def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], c
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
-    floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_DRAWN_BLOCKS else
+    floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_NOMINAL_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
     after = _power_after(study, flown, effects, floor) if effects else None

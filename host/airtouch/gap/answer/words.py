@@ -11,8 +11,8 @@ from airtouch.gap.where.cell_words import band_in_words
 MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
 
 
-def digits(q: Quantity) -> str:
-    """The format that shows a number, and its interval as an interval: three digits, six at most."""
+def format_of(q: Quantity) -> str:
+    """The format of a number, as `{:.3g}`: three digits, or up to six so that the ends of its interval differ."""
     if q.low is None or q.high is None or q.low == q.high:
         return "{:.3g}"
     forms = (f"{{:.{n}g}}" for n in (3, 4, 5))
@@ -21,7 +21,7 @@ def digits(q: Quantity) -> str:
 
 def quantity(q: Quantity, form: str | None = None) -> str:
     """A number with unit and interval."""
-    form = form or digits(q)
+    form = form or format_of(q)
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
     interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
     return form.format(q.value) + unit + interval

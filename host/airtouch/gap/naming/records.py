@@ -121,7 +121,7 @@ class OverPrediction(NamedTuple):
 
 
 class TakenBack(NamedTuple):
-    """An effect that was named and is no more, as it closes too little of recorded flights' gap, and the share."""
+    """An effect that was named and is no more, as it closes too little of recorded flights' gap, and the shrink."""
 
     name: str = ""
     closed: float = 0.0

@@ -5,7 +5,7 @@
     nominal                          N(0, 1)
     effect of strength s             N(m(s), 1 + |m|^2 A V A')       `effect_class`: curve m, scatter A V A' about it
     two effects                      N(m1 + m2, 1 + both scatters + min(|m1|, |m2|)^2 I I')     I: they are no sum
-    a nameless disturbance           N(0, 1 + d^2 N N'), averaged over sizes d                  N: its directions
+    a nameless disturbance           N(0, 1 + d^2 N N'), averaged over lengths d                  N: its directions
 
 `density` finds the likeliest strength of one class and averages over all that it may have; `hypotheses` does so for
 several classes and for a nameless disturbance.

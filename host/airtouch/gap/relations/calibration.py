@@ -1,7 +1,7 @@
 """Calibrate a library on simulated flights that it was not learned from: distances, shares of evidence, parameters.
 
-`calibrated` does so in three steps: the distance of nominal flights, each class by flights with its effect
-(`calibrate_class`), two effects together (`_scatter_of_two`).
+Three steps: the distance of nominal flights (`nominal_distance`), then in `calibrated` each class by flights with its
+effect (`calibrate_class`) and two effects together (`_pair_distance_scatter`).
 
 How many flights it takes is in `settings`. Thresholds without another source were chosen on flights of `learning.SEED`
 alone (host/docs/looks.md, 2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not
@@ -20,27 +20,27 @@ from airtouch.gap.relations.effect_class import ClassCalibration
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
-from airtouch.gap.relations.library import Library, NominalDistance
+from airtouch.gap.relations.library import Coordinates, Library, NominalDistance
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.relations.settings import CalibrationSettings
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import log_uniform
 from airtouch.simulation.effects import Active
 
-FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000  #: numbers of the flights
-NUMBERS_OF_CLASS = 1000  #: numbers that each class has of its own
+#: numbers of the first nominal flight, the first with two effects and the first of a class
+FIRST_NOMINAL, FIRST_OF_TWO, FIRST_OF_CLASS = 1_000_000, 1_100_000, 1_200_000
+NUMBERS_OF_CLASS = 1000  #: flight numbers that each class has of its own
 RANGE_OF_TWO = 30.0  #: factor between the highest and the lowest strength of two effects that act together
-HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
-HIGHEST_START = 0.5  #: of the highest strength, from which a class's flights begin at most
-SHOWN = 0.5  #: share of the flights at a strength that show the effect, from which on it shows there
-QUANTILE_OF_SHARES = 0.8  #: share of the flights of a class whose own share lies below the one that is stored
+HALVINGS = 12  #: most times that the highest strength is halved, down to that which hardly shows
+HIGHEST_START = 0.5  #: largest fraction of the highest strength at which a class's flights begin
+DETECTION_RATE = 0.5  #: fraction of the flights at a strength that show the effect, from which on it shows there
+QUANTILE_OF_SHARES = 0.8  #: fraction of the flights of a class whose own share lies below the one that is stored
 DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
-LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
+LEAST_SCATTER = 1e-4  #: lower bound of the search for the standard deviation of a distance over the evidence
 
 
 def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, say: Say = lambda _: None) -> Library:
-    """The library with its distances and the calibration of its classes, alone and by two."""
-    library = replace(library, distance=_nominal_distance(scene, library, settings.nominal_flights))
+    """The library with the calibration of its classes, alone and by two."""
     drawing_of = {(d.name, d.shape): d for d in all_drawings()}
     drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
     classes = []
@@ -49,7 +49,8 @@ def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, sa
         classes.append(replace(own, calibration=calibrate_class(scene, library, place, drawing, settings)))
     library = library.with_classes(classes)
     say("flights of two effects")
-    return replace(library, pair_scatter=_scatter_of_two(scene, library, drawings, settings.flights_of_two))
+    return replace(library, pair_distance_scatter=_pair_distance_scatter(scene, library, drawings,
+                                                                         settings.flights_of_two))
 
 
 def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing, settings: CalibrationSettings,
@@ -59,14 +60,14 @@ def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing
     return ClassCalibration(
         _readout(drawing, shown, settings.least_flights), share_of((f.nameless, f.evidence) for f in shown),
         share_of((f.second, f.evidence) for f in shown if f.second is not None),
-        likeliest_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
-                          library.nominal_scatter))
+        likeliest_distance_scatter(np.array([f.excess for f in shown]), np.array([f.evidence for f in shown]),
+                          library.nominal_distance_scatter))
 
 
-def _nominal_distance(scene: Scene, library: Library, count: int) -> NominalDistance:
-    """`Library.distance` by so many flights, the standard deviation from the middle two thirds."""
+def nominal_distance(scene: Scene, coordinates: Coordinates, count: int) -> NominalDistance:
+    """The distance of nominal flights by so many of them, the standard deviation from the middle two thirds."""
     flown = [f for i in range(count) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
-    squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
+    squared = (coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
     return NominalDistance(float(np.median(squared)), float(0.5 * (high - low)))
 
@@ -131,7 +132,7 @@ def _weakest_shown(fitted: Callable[[float], _Fitted | None], highest: float, tr
     def hides(strength: float) -> bool:
         """Whether fewer than half of the flights at a strength show the class; False where none ends well."""
         ended = [one for one in (fitted(strength) for _ in range(tried)) if one is not None]
-        return bool(ended) and float(np.mean([one.shows for one in ended])) < SHOWN
+        return bool(ended) and float(np.mean([one.shows for one in ended])) < DETECTION_RATE
 
     return halved(highest, HALVINGS, hides)
 
@@ -158,7 +159,7 @@ def share_of(gains: Iterable[tuple[float, float]]) -> float:
     return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
 
 
-def likeliest_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
+def likeliest_distance_scatter(excess: np.ndarray, evidence: np.ndarray, nominal: np.ndarray | float) -> float:
     """Likeliest scatter s of distances over the evidence: excess (n,) ~ sqrt(nominal^2 + (s evidence)^2) Student's t.
 
     nominal: scatter that the flights have whatever the evidence, scalar or (n,), nats. Without flights it is 0.
@@ -183,9 +184,9 @@ def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight], least: int) -
     return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
 
 
-def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing], count: int) -> float:
-    """`Library.pair_scatter` by so many flights with two effects, each hypothesis started from either."""
-    excess, evidence, of_classes = [], [], []
+def _pair_distance_scatter(scene: Scene, library: Library, drawings: Sequence[Drawing], count: int) -> float:
+    """`Library.pair_distance_scatter` by so many flights with two effects, each hypothesis started from either."""
+    excess, evidence, scatter_of_classes = [], [], []
     for i in range(count):
         rng = np.random.default_rng([SEED, Stream.CALIBRATION_PAIR, i])
         a, b = two_of(drawings, rng)
@@ -201,8 +202,9 @@ def _scatter_of_two(scene: Scene, library: Library, drawings: Sequence[Drawing],
             continue  # the weaker one does not show
         excess.append(library.excess(flight.squared_distance(both)))
         evidence.append(both.evidence)
-        of_classes.append(library.scatter(max(c.calibration.distance_scatter for c in (one, two)), both.evidence))
-    return likeliest_scatter(np.array(excess), np.array(evidence), np.array(of_classes))
+        larger = max(c.calibration.distance_scatter for c in (one, two))
+        scatter_of_classes.append(library.distance_scatter(larger, both.evidence))
+    return likeliest_distance_scatter(np.array(excess), np.array(evidence), np.array(scatter_of_classes))
 
 
 def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, int]:

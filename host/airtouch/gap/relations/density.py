@@ -1,7 +1,8 @@
 """How likely a flight is under a class: normal densities with few directions of more scatter.
 
 A flight's coordinates are Q values, of which nominal flights have the covariance 1. Log densities are in nats and leave
-out the constant -Q/2 log(2 pi). The numbers of the search were chosen.
+out the constant -Q/2 log(2 pi). A covariance is written 1 + L L' with loadings L (Q, r), as in factor analysis. The
+numbers of the search were chosen.
 """
 
 from dataclasses import dataclass
@@ -13,46 +14,46 @@ from airtouch.gap.relations.effect_class import SMALLEST, EffectClass
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 REFINEMENTS, TRIALS = 3, 9  #: rounds in which the best strength of a grid is refined, and strengths in each
-STARTS, STEPS = 5, 10  #: sizes of the strength from which a fit of several parameters begins, and its steps at most
+STARTS, STEPS = 5, 10  #: magnitudes from which a fit of several parameters begins, and its steps at most
 STEP_LENGTHS = (1.0, 0.5, 0.25, 0.1)  #: of a step that are tried in turn, until one gains
 LEAST_GAIN = 0.01  #: nats that a step gains; after one that gains less the fit ends
 EPSILON = float(np.finfo(float).eps)
-SLOPE = 1e-3  #: share of the strength over which slopes are taken
+SLOPE_STEP = 1e-3  #: fraction of the strength over which slopes are taken
 
 
 @dataclass(frozen=True)
 class Rescaling:
-    """A change of coordinates that makes a covariance 1 + F F' to 1.
+    """A change of coordinates that makes a covariance 1 + L L' to 1.
 
-    Along axes (Q, r) values are multiplied by 1 + stretch (r,). level: logarithm of the density that this costs, that
-    of the change's determinant.
+    Along axes (Q, r) values are multiplied by 1 + stretch (r,). log_determinant: that of the change, which the log
+    density gains by it.
     """
 
     axes: np.ndarray
     stretch: np.ndarray
-    level: float
+    log_determinant: float
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Values (..., Q) rescaled."""
         return values + ((values @ self.axes) * self.stretch) @ self.axes.T
 
 
-def rescaling_of(factors: np.ndarray) -> Rescaling:
-    """The rescaling for the covariance 1 + F F' of factors F (Q, r)."""
-    axes, variance = principal(factors)
+def rescaling_of(loadings: np.ndarray) -> Rescaling:
+    """The rescaling for the covariance 1 + L L' of loadings L (Q, r)."""
+    axes, variance = principal(loadings)
     deviation = np.sqrt(1.0 + variance)
     return Rescaling(axes, 1.0 / deviation - 1.0, -float(np.log(deviation).sum()))
 
 
-def principal(factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal axes (Q, r) of F F' for factors F (Q, r) with r < Q, and the variances (r,) along them.
+def principal(loadings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal axes (Q, r) of L L' for loadings L (Q, r) with r < Q, and the variances (r,) along them.
 
-    From the eigenvectors of F'F, several times faster than a singular value decomposition. Axes along which there is
+    From the eigenvectors of L'L, several times faster than a singular value decomposition. Axes along which there is
     next to no variance, 1e-16 of the largest, are not of unit length; they count for nothing.
     """
-    variance, vectors = np.linalg.eigh(factors.T @ factors)
+    variance, vectors = np.linalg.eigh(loadings.T @ loadings)
     least = max(float(variance[-1]), SMALLEST) * EPSILON if len(variance) else 0.0
-    return (factors @ vectors) / np.sqrt(np.maximum(variance, least)), np.maximum(variance, 0.0)
+    return (loadings @ vectors) / np.sqrt(np.maximum(variance, least)), np.maximum(variance, 0.0)
 
 
 def unchanged(dimensions: int) -> Rescaling:
@@ -69,13 +70,13 @@ def log_density(values: np.ndarray) -> float:
 class Fit:
     """A class at its likeliest strength (parameters,).
 
-    level: log density of the flight there; evidence: the same averaged over the strengths that the class may have, by
-    Laplace's approximation, and `level` where that would exceed it.
+    peak: log density of the flight there; evidence: that of the density averaged over the strengths that the class may
+    have, by Laplace's approximation, and `peak` where that would exceed it.
     """
 
     effect_class: EffectClass
     strength: np.ndarray
-    level: float
+    peak: float
     evidence: float
 
     @property
@@ -83,8 +84,8 @@ class Fit:
         """Expected shift (Q,), not rescaled."""
         return self.effect_class.mean(self.strength[None])[0]
 
-    def factors(self) -> np.ndarray:
-        """F (Q, r): F F' is the covariance of a flight about the curve, beyond that of nominal flights."""
+    def loadings(self) -> np.ndarray:
+        """Loadings L (Q, r): L L' is the covariance of a flight about the curve, beyond that of nominal flights."""
         return self.effect_class.axes * (np.linalg.norm(self.shift) * np.sqrt(self.effect_class.variances))
 
 
@@ -99,17 +100,17 @@ class _Likelihood:
         else:
             self.axes, self.variances = effect_class.axes, effect_class.variances
 
-    def level(self, shift: np.ndarray) -> np.ndarray:
+    def log_density(self, shift: np.ndarray) -> np.ndarray:
         """Log density (n,) at expected shifts (n, Q), not rescaled."""
-        size = (shift ** 2).sum(axis=1)
+        squared_length = (shift ** 2).sum(axis=1)
         residual = self.values - self.rescaling(shift)
-        along, variance = residual @ self.axes, 1.0 + size[:, None] * self.variances
+        along, variance = residual @ self.axes, 1.0 + squared_length[:, None] * self.variances
         squared_distance = (residual ** 2).sum(axis=1) - (along ** 2 * (1.0 - 1.0 / variance)).sum(axis=1)
-        return self.rescaling.level - 0.5 * (squared_distance + np.log(variance).sum(axis=1))
+        return self.rescaling.log_determinant - 0.5 * (squared_distance + np.log(variance).sum(axis=1))
 
     def at(self, strength: np.ndarray) -> np.ndarray:
         """Log density (n,) at strengths (n, parameters)."""
-        return self.level(self.effect_class.mean(strength))
+        return self.log_density(self.effect_class.mean(strength))
 
     def over_covariance(self, shift: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (n, Q) times the inverse of the covariance that the class has at an expected shift (Q,)."""
@@ -117,13 +118,13 @@ class _Likelihood:
         return values - ((values @ self.axes) * (1.0 - 1.0 / variance)) @ self.axes.T
 
     def clipped(self, strength: np.ndarray) -> np.ndarray:
-        """A strength (parameters,) with its length cut to what was flown."""
-        size = float(np.linalg.norm(strength))
-        return strength / max(size, SMALLEST) * np.clip(size, self.effect_class.least, self.effect_class.most)
+        """A strength (parameters,) with its magnitude cut to what was flown."""
+        magnitude = float(np.linalg.norm(strength))
+        return strength / max(magnitude, SMALLEST) * np.clip(magnitude, self.effect_class.least, self.effect_class.most)
 
     def slopes(self, strength: np.ndarray) -> np.ndarray:
         """Change (parameters, Q) of the expected shift per parameter, rescaled."""
-        step = SLOPE * float(np.linalg.norm(strength)) * np.eye(len(strength))
+        step = SLOPE_STEP * float(np.linalg.norm(strength)) * np.eye(len(strength))
         ahead, back = (self.effect_class.mean(strength + s) for s in (step, -step))
         return self.rescaling((ahead - back) / (2.0 * step[0, 0]))
 
@@ -131,55 +132,55 @@ class _Likelihood:
 def fit(effect_class: EffectClass, values: np.ndarray, rescaling: Rescaling) -> Fit:
     """The likeliest strength of a class for a flight's coordinates (Q,), values: rescaled."""
     likelihood = _Likelihood(effect_class, values, rescaling)
-    strength, level = _on_a_grid(likelihood) if effect_class.parameters == 1 else _by_gauss_newton(likelihood)
-    return Fit(effect_class, strength, level, level + min(_occam_factor(likelihood, strength), 0.0))
+    strength, peak = _on_a_grid(likelihood) if effect_class.parameters == 1 else _by_gauss_newton(likelihood)
+    return Fit(effect_class, strength, peak, peak + min(_occam_factor(likelihood, strength), 0.0))
 
 
 def _on_a_grid(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
     """The likeliest strength (1,) of one parameter and its log density: on the class's grid, then closer and closer."""
     effect_class = likelihood.effect_class
     strengths, shifts = effect_class.grid
-    levels = likelihood.level(shifts)
-    place, width = int(np.argmax(levels)), float(np.log(strengths[1, 0] / strengths[0, 0]))
-    best, top = strengths[place], float(levels[place])
+    densities = likelihood.log_density(shifts)
+    place, width = int(np.argmax(densities)), float(np.log(strengths[1, 0] / strengths[0, 0]))
+    best, peak = strengths[place], float(densities[place])
     for _ in range(REFINEMENTS):
-        sizes = np.abs(best) * np.exp(np.linspace(-width, width, TRIALS))
-        trials = np.clip(sizes, effect_class.least, effect_class.most) * np.sign(best)
-        levels = likelihood.at(trials[:, None])
-        place = int(np.argmax(levels))
-        if levels[place] > top:
-            best, top = trials[place:place + 1], float(levels[place])
+        magnitudes = np.abs(best) * np.exp(np.linspace(-width, width, TRIALS))
+        trials = np.clip(magnitudes, effect_class.least, effect_class.most) * np.sign(best)
+        densities = likelihood.at(trials[:, None])
+        place = int(np.argmax(densities))
+        if densities[place] > peak:
+            best, peak = trials[place:place + 1], float(densities[place])
         width *= 2.0 / (TRIALS - 1)
-    return best, top
+    return best, peak
 
 
 def _by_gauss_newton(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
     """The likeliest strengths (parameters,) of several parameters and their log density."""
-    best, top = _start(likelihood)
+    best, peak = _start(likelihood)
     for _ in range(STEPS):
-        before = top
+        before = peak
         step = _step(likelihood, best)
         for length in STEP_LENGTHS:
             trial = likelihood.clipped(best + length * step)
-            level = float(likelihood.at(trial[None])[0])
-            if level > top:
-                best, top = trial, level
+            density = float(likelihood.at(trial[None])[0])
+            if density > peak:
+                best, peak = trial, density
                 break
-        if top < before + LEAST_GAIN:
+        if peak < before + LEAST_GAIN:
             break
-    return best, top
+    return best, peak
 
 
 def _start(likelihood: _Likelihood) -> tuple[np.ndarray, float]:
-    """The best of several first strengths (parameters,): least squares with the slopes at several sizes of strength."""
-    effect_class, best, top = likelihood.effect_class, np.zeros(0), -np.inf
-    for size in np.geomspace(effect_class.least, effect_class.most, STARTS):
-        slopes = likelihood.slopes(np.full(effect_class.parameters, size / np.sqrt(effect_class.parameters)))
+    """The best of several first strengths (parameters,): least squares with the slopes at several magnitudes."""
+    effect_class, best, peak = likelihood.effect_class, np.zeros(0), -np.inf
+    for magnitude in np.geomspace(effect_class.least, effect_class.most, STARTS):
+        slopes = likelihood.slopes(np.full(effect_class.parameters, magnitude / np.sqrt(effect_class.parameters)))
         trial = likelihood.clipped(np.linalg.lstsq(slopes.T, likelihood.values, rcond=None)[0])
-        level = float(likelihood.at(trial[None])[0])
-        if level > top:
-            best, top = trial, level
-    return best, top
+        density = float(likelihood.at(trial[None])[0])
+        if density > peak:
+            best, peak = trial, density
+    return best, peak
 
 
 def _step(likelihood: _Likelihood, strength: np.ndarray) -> np.ndarray:
@@ -199,9 +200,9 @@ def _occam_factor(likelihood: _Likelihood, strength: np.ndarray) -> float:
     effect_class, many = likelihood.effect_class, len(strength)
     slopes = likelihood.slopes(strength)
     precision = likelihood.over_covariance(effect_class.mean(strength[None])[0], slopes) @ slopes.T
-    size = float(np.linalg.norm(strength))
+    magnitude = float(np.linalg.norm(strength))
     unit_sphere = np.log(2.0) + 0.5 * many * np.log(np.pi) - gammaln(0.5 * many)  # its area; 2 for one parameter
     if many == 1 and not effect_class.signed:
         unit_sphere = 0.0
-    prior = -np.log(np.log(effect_class.most / effect_class.least)) - unit_sphere - many * np.log(size)
+    prior = -np.log(np.log(effect_class.most / effect_class.least)) - unit_sphere - many * np.log(magnitude)
     return 0.5 * many * LOG_2PI - 0.5 * float(np.linalg.slogdet(precision)[1]) + prior

@@ -1,8 +1,9 @@
 """What an effect does to the features: a curve along its strength, and how far single flights lie off it.
 
-Coordinates (Q of them) are those of `feature_space`: nominal flights have the covariance 1 there, and lengths of shifts
-are lengths there. A class is learned from pairs of simulated flights, the same seeds with and without the effect.
-Thresholds without another source were chosen on flights of `learning.SEED` (host/docs/looks.md, 2026-11-24 12:43 UTC).
+Coordinates (Q of them) are those of `feature_space`: nominal flights have the covariance 1 there, so that the length of
+a shift is in nominal standard deviations. A strength, in units of the class, has a magnitude and for several parameters
+a direction. A class is learned from pairs of simulated flights, the same seeds with and without the effect. Thresholds
+without another source were chosen on flights of `learning.SEED` (host/docs/looks.md, 2026-11-24 12:43 UTC).
 """
 
 from dataclasses import dataclass
@@ -13,21 +14,29 @@ import numpy as np
 
 from airtouch.gap.relations.readout import Readout
 
-SMALLEST = 1e-300  #: length that a division or a logarithm may have at least
-KNOT_FACTOR = 3.0  #: of strength, between two knots of a curve
+SMALLEST = 1e-300  #: least divisor and least argument of a logarithm
+#: factor of strength between two knots of a curve. A larger number bends curves less, a smaller one needs more flights
+KNOT_FACTOR = 3.0
 KNOT = float(np.log(KNOT_FACTOR))
-LEAST_SHIFT = 0.5  #: shift along a class's own direction below which a flight says nothing of the curve
-LEAST_WEIGHED = 5.0  #: length of a shift below which errors of the curve are weighed as at that length
-CLEAR = 40.0  #: length of a shift from which the scatter about the curve stands over that of nominal flights
-OUTLIER = 4.0  #: times the median distance from the curve: a flight that hit something
-SIGNED = 0.1  #: share of flights with a negative strength from which a class has two signs
-RANK = 16  #: directions of the scatter, at most
-WEAKEST_QUANTILE = 0.01  #: of the strengths, at which a curve begins: a few flights show next to nothing
-LONGEST_UNIT = 3.0  #: length of a shift from which its direction counts in full
-FITS = 2  #: of a curve, the second without outliers
-GRID_PER_KNOT = 6  #: strengths at which a class of one parameter is tried first, for each knot
-#: times the largest eigenvalue that noise alone gives (Marchenko and Pastur 1967), from which a direction counts
-CHANCE = 1.2
+#: a flight whose shift along the class's main direction is shorter says nothing of the curve, nominal deviations
+LEAST_SHIFT = 0.5
+#: errors of the curve count relative to the length of the shift, but not of a shorter one, nominal deviations
+LEAST_WEIGHT_LENGTH = 5.0
+#: flights with a longer shift show the scatter about the curve, as it is larger than that of nominal flights there,
+#: nominal deviations; where less than half of the flights are, the longer half
+LEAST_SCATTER_LENGTH = 40.0
+OUTLIER_RATIO = 4.0  #: a flight that lies farther from the curve, in medians of this distance, hit something
+LEAST_NEGATIVE_FRACTION = 0.1  #: fraction of flights with a negative strength above which a class has two signs
+MOST_AXES = 16  #: directions of the scatter that are kept, the widest ones
+#: quantile of the strengths at which the curve begins: a few flights of the weakest show next to nothing
+FIRST_KNOT_QUANTILE = 0.01
+#: a shift of this length or longer has the full weight in the main direction, nominal deviations
+FULL_WEIGHT_LENGTH = 3.0
+FIT_ROUNDS = 2  #: fits of a curve: of all flights, then without outliers
+GRID_PER_KNOT = 6  #: strengths for each knot at which a class of one parameter is tried first
+#: a direction counts as scatter if its eigenvalue is more than this times the largest one that noise alone gives
+#: (Marchenko and Pastur 1967, for infinitely many samples)
+EIGENVALUE_MARGIN = 1.2
 
 
 @dataclass(frozen=True)
@@ -35,10 +44,10 @@ class ClassCalibration:
     """What `calibration` measures of a class on flights that it was not learned from; by default nothing.
 
     readout: what its strengths are in the effect's units; None where too few flights show the effect.
-    The others are fractions of the evidence for the class. nameless_share, second_share: what a nameless disturbance,
-    or a second effect, gains beside the class; four of five flights with it have at most so much. distance_scatter:
-    scatter of the nats by which a flight with the class lies farther from it than nominal flights from none, beside
-    the scatter of nominal flights.
+    The others are shares, which are fractions of the evidence for the class. nameless_share, second_share: what a
+    nameless disturbance, or a second effect, gains beside the class; four of five flights with it have at most so much.
+    distance_scatter: standard deviation of the nats by which a flight with the class lies farther from it than nominal
+    flights from none, beside that of nominal flights.
     """
 
     readout: Readout | None = None
@@ -87,7 +96,7 @@ class EffectClass:
 
     def mean(self, strength: np.ndarray) -> np.ndarray:
         """Expected shift (n, Q) at strengths (n, parameters), in units of the class."""
-        parts, hats = _parts(strength, self.signed), _hats(_size(strength), self.knots)
+        parts, hats = _parts(strength, self.signed), _hats(_magnitude(strength), self.knots)
         together = parts[:, :, None] * hats[:, None]
         return together.reshape(len(strength), -1) @ self.table.reshape(together[0].size, -1)
 
@@ -100,24 +109,24 @@ class EffectClass:
         return strength, self.mean(strength)
 
 
-def _size(strength: np.ndarray) -> np.ndarray:
-    """Lengths (n,) of strengths (n, parameters)."""
+def _magnitude(strength: np.ndarray) -> np.ndarray:
+    """Magnitudes (n,) of strengths (n, parameters)."""
     return np.abs(strength[:, 0]) if strength.shape[1] == 1 else np.linalg.norm(strength, axis=1)
 
 
 def _parts(strength: np.ndarray, signed: bool) -> np.ndarray:
     """What multiplies each part of a curve (n, parts)."""
-    return np.column_stack([strength, _size(strength)]) if signed else strength
+    return np.column_stack([strength, _magnitude(strength)]) if signed else strength
 
 
-def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Weights (n, k) of the knots at strengths (n,): straight lines in the logarithm, constant outside."""
-    x = np.minimum(np.maximum(np.log(np.maximum(size, SMALLEST)), knots[0]), knots[-1])
+def _hats(magnitude: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Weights (n, k) of the knots at magnitudes (n,): straight lines in the logarithm, constant outside."""
+    x = np.minimum(np.maximum(np.log(np.maximum(magnitude, SMALLEST)), knots[0]), knots[-1])
     lower_knot = np.minimum(np.maximum(np.searchsorted(knots, x) - 1, 0), len(knots) - 2)
-    share = (x - knots[lower_knot]) / (knots[lower_knot + 1] - knots[lower_knot])
+    upper = (x - knots[lower_knot]) / (knots[lower_knot + 1] - knots[lower_knot])
     out = np.zeros((len(x), len(knots)))
     place = np.arange(len(x))
-    out[place, lower_knot], out[place, lower_knot + 1] = 1.0 - share, share
+    out[place, lower_knot], out[place, lower_knot + 1] = 1.0 - upper, upper
     return out
 
 
@@ -149,7 +158,7 @@ def learn_class(name: str, effect: str, shape: float | None, flights: ClassFligh
         flights = flights._replace(amount=strength[:, None]).chosen(np.abs(strength) > LEAST_SHIFT)
     else:
         flights = flights._replace(amount=amount / np.median(np.abs(amount[amount != 0.0])))
-    for _ in range(FITS):
+    for _ in range(FIT_ROUNDS):
         learned, near = _fitted(name, effect, shape, flights)
         flights = flights.chosen(near)
     return learned
@@ -157,7 +166,7 @@ def learn_class(name: str, effect: str, shape: float | None, flights: ClassFligh
 
 def _along_main_direction(shift: np.ndarray, sign: np.ndarray) -> np.ndarray:
     """Shifts (n, Q) along the direction in which most of them lie (n,); positive where sign (n,), the effect's, is."""
-    unit = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), LONGEST_UNIT) * sign[:, None]
+    unit = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), FULL_WEIGHT_LENGTH) * sign[:, None]
     direction = np.linalg.svd(unit, full_matrices=False)[2][0]
     return shift @ (direction * np.sign((unit @ direction).sum()))
 
@@ -165,18 +174,18 @@ def _along_main_direction(shift: np.ndarray, sign: np.ndarray) -> np.ndarray:
 def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights) -> tuple[EffectClass, np.ndarray]:
     """The class of flights whose amounts are strengths, and which of them lie about its curve as most do, bool (n,)."""
     strength, shift, coordinates = flights
-    size = np.linalg.norm(strength, axis=1)
-    signed = bool((strength < 0.0).mean() > SIGNED)
-    low, high = np.log(np.quantile(size, [WEAKEST_QUANTILE, 1.0]))
+    magnitude = np.linalg.norm(strength, axis=1)
+    signed = bool((strength < 0.0).mean() > LEAST_NEGATIVE_FRACTION)
+    low, high = np.log(np.quantile(magnitude, [FIRST_KNOT_QUANTILE, 1.0]))
     knots = np.linspace(low, high, max(int(np.ceil((high - low) / KNOT)), 1) + 1)
     parts = _parts(strength, signed)
-    columns = (parts[:, :, None] * _hats(size, knots)[:, None]).reshape(len(size), -1)
-    weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_WEIGHED)
+    columns = (parts[:, :, None] * _hats(magnitude, knots)[:, None]).reshape(len(strength), -1)
+    weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_WEIGHT_LENGTH)
     table = np.linalg.lstsq(columns * weight[:, None], shift * weight[:, None], rcond=1e-6)[0]
     expected = columns @ table
     length = np.linalg.norm(expected, axis=1)
-    distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHED)
-    near = distance < OUTLIER * np.median(distance)
+    distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHT_LENGTH)
+    near = distance < OUTLIER_RATIO * np.median(distance)
     axes, variances = _scatter(coordinates[near] - expected[near], length[near], columns.shape[1])
     table = table.reshape(parts.shape[1], len(knots), -1)
     return EffectClass(name, effect, shape, parameters=strength.shape[1], signed=signed, knots=knots, table=table,
@@ -189,14 +198,15 @@ def _scatter(residual: np.ndarray, length: np.ndarray, fitted: int) -> tuple[np.
     residual (n, Q): flights less their expected shift, of this length (n,); what nominal flights scatter is not
     counted. fitted: coefficients of each coordinate of the curve.
     """
-    clear = length >= min(float(np.median(length)), CLEAR)
+    clear = length >= min(float(np.median(length)), LEAST_SCATTER_LENGTH)
     relative = residual[clear] / length[clear, None]
     many = len(relative)
     noise = float(np.mean(length[clear] ** -2.0))
-    _, size, axes = np.linalg.svd(relative / np.sqrt(max(many - fitted * clear.mean(), 1.0)), full_matrices=False)
-    stands = stands_out(size ** 2, noise, residual.shape[1], many)
-    stands[RANK:] = False
-    return axes[stands].T, size[stands] ** 2 - noise
+    freedom = max(many - fitted * clear.mean(), 1.0)
+    _, deviation, axes = np.linalg.svd(relative / np.sqrt(freedom), full_matrices=False)
+    stands = stands_out(deviation ** 2, noise, residual.shape[1], many)
+    stands[MOST_AXES:] = False
+    return axes[stands].T, deviation[stands] ** 2 - noise
 
 
 def stands_out(variance: np.ndarray, noise: float, dimensions: int, many: int) -> np.ndarray:
@@ -204,4 +214,4 @@ def stands_out(variance: np.ndarray, noise: float, dimensions: int, many: int) -
 
     many: samples of which the covariance is, each of so many dimensions.
     """
-    return variance > CHANCE * noise * (1.0 + np.sqrt(dimensions / many)) ** 2
+    return variance > EIGENVALUE_MARGIN * noise * (1.0 + np.sqrt(dimensions / many)) ** 2

@@ -4,8 +4,8 @@ A random force and torque that follows one of the flight's own signals, a wave o
 or for some seconds; or a property of the plant that no effect of the registry changes. Such flights say what `unknown`
 looks like (outlier exposure: Hendrycks, Mazeika, Dietterich, ICLR 2019).
 
-Shares, weights and ranges were chosen with the library of 2026-11-24; no measurement says how often real disturbances
-are of each kind, and no other values are recorded as tried.
+Probabilities, weights and ranges were chosen with the library of 2026-11-24; no measurement says how often real
+disturbances are of each kind, and no other values are recorded as tried.
 """
 
 import math
@@ -45,33 +45,34 @@ class Follows(IntEnum):
 
 
 #: groups of signals by the quantity they come from; CONSTANT, TIME and the keys of SCALE are in neither
-OF_MOTION = (Follows.VELOCITY, Follows.SPEED, Follows.BODY_RATE, Follows.TILT, Follows.POSITION,
+MOTION_SIGNALS = (Follows.VELOCITY, Follows.SPEED, Follows.BODY_RATE, Follows.TILT, Follows.POSITION,
              Follows.SQUARED_VELOCITY)
-OF_THRUST = (Follows.THRUST, Follows.ROLL_THRUST, Follows.PITCH_THRUST, Follows.ONE_ROTOR)
-WEIGHT = {Follows.VELOCITY: 3, Follows.BODY_RATE: 3, Follows.NOISE: 3, Follows.TILT: 2}  #: times as often as the others
-DRAWN = tuple(f for f in Follows for _ in range(WEIGHT.get(f, 1)))  #: each as often as it is drawn
+THRUST_SIGNALS = (Follows.THRUST, Follows.ROLL_THRUST, Follows.PITCH_THRUST, Follows.ONE_ROTOR)
+#: signals that are drawn more often than the others, and how many times
+URN_WEIGHT = {Follows.VELOCITY: 3, Follows.BODY_RATE: 3, Follows.NOISE: 3, Follows.TILT: 2}
+FOLLOWS_URN = tuple(f for f in Follows for _ in range(URN_WEIGHT.get(f, 1)))  #: what signals are drawn from
 #: height (m), period (s) and correlation time (s) of those that have one, between which it is log-uniform
 SCALE = {Follows.NEAR_GROUND: (0.02, 0.4), Follows.WAVE: (0.025, 5.0), Follows.NOISE: (0.004, 2.0)}
-WRENCH_SHARE = 0.75  #: share of the disturbances that are a force and torque, not a property
-WHOLE_FLIGHT_SHARE = 0.7  #: share of these that act for the whole flight
-BEGIN_S, DURATION_S = (2.0, 20.0), (1.0, 8.0)  #: of the others, uniform
+WRENCH_PROBABILITY = 0.75  #: that a disturbance is a force and torque, not a property
+WHOLE_FLIGHT_PROBABILITY = 0.7  #: that a force and torque acts for the whole flight
+BEGIN_S, DURATION_S = (2.0, 20.0), (1.0, 8.0)  #: of one that does not, uniform
 FORCE_N = (1e-4, 7e-3)  #: length of a wrench's six numbers, log-uniform
 LEVER_M = 0.01  #: torque in N m for a number in N
-FACTOR = (0.003, 0.5)  #: logarithm of the factor of a property, log-uniform
-#: of properties that are 0, what is added at most, in their units
-ADDED = {"range_drift": 0.03, "range_dip": 0.02, "motor_hiss": 0.01, "motor_slowness": 0.01, "motor_dead_zone": 150.0,
-         "range_mixed": 1.0}
+LOG_FACTOR = (0.003, 0.5)  #: magnitude of the logarithm of a property's factor, log-uniform
+#: most that is added to a property that is 0, in its unit
+ADDITIONS = {"range_drift": 0.03, "range_dip": 0.02, "motor_hiss": 0.01, "motor_slowness": 0.01,
+             "motor_dead_zone": 150.0, "range_mixed": 1.0}
 #: properties whose default is 0 although every vehicle has a value
-OF_VEHICLES = frozenset({"rotor_x", "rotor_y", "rotor_inertia", "yaw_torque_over_thrust"})
+VEHICLE_PROPERTIES = frozenset({"rotor_x", "rotor_y", "rotor_inertia", "yaw_torque_over_thrust"})
 #: properties that are no vehicle's, or of parts that these flights do not have
-LEFT_OUT = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_voltage", "voltage_exponent", "firmware",
+EXCLUDED = frozenset({"step", "gravity", "acc_range", "gyro_range", "nominal_voltage", "voltage_exponent", "firmware",
                       "battery_cells", "power_per_thrust15", "motor_noise_time", "motor_hiss_time", "range_bias_fade",
                       "thrust_curve", "thrust_scale", "rate_scale", "thrust_per_speed2", "loss_burst"})
 #: scales by which signals are divided, about as large as these are in an ordinary flight; chosen. Those of the thrust
-#: and of its difference between sides are shares of the weight, that of the tilt is a sine
+#: and of its difference between sides are fractions of the weight, that of the tilt is a sine
 SPEED_SCALE_MPS, RATE_SCALE_RADPS, TIME_SCALE_S, TILT_SCALE = 0.3, 0.2, 10.0, 0.05
 THRUST_SCALE, DIFFERENCE_SCALE = 0.05, 0.02
-FOR_EVER = 1e9  #: s, beyond any flight; and beyond any parameter
+UNBOUNDED = 1e9  #: s, beyond any flight; and a bound beyond any value of a parameter
 
 #: parameters of the wrench. follows: a `Follows`; axis (0 to 2), scale (as in SCALE), rotor (0 to 3): of those signals
 #: that have one; force (N) and torque (N m) where the signal is 1; begin, end (s): when it acts
@@ -83,7 +84,7 @@ FOLLOWS, AXIS, SCALE_OF, ROTOR, FORCE, BEGIN, END = map(
 
 @jit
 def _of_motion(follows, axis, s):
-    """Signal of one of OF_MOTION: a velocity, a turning rate, a tilt or a place; axis: 0 to 2."""
+    """Signal of one of MOTION_SIGNALS: a velocity, a turning rate, a tilt or a place; axis: 0 to 2."""
     v = at.VELOCITY
     if follows == Follows.VELOCITY:
         return s[v + axis] / SPEED_SCALE_MPS
@@ -100,7 +101,7 @@ def _of_motion(follows, axis, s):
 
 @jit
 def _of_thrust(follows, rotor, s):
-    """Signal of one of OF_THRUST: thrust over the weight, of all rotors, between two sides or of one; rotor: 0 to 3."""
+    """Signal of one of THRUST_SIGNALS: thrust over the weight of all rotors, of two sides or of one; rotor: 0 to 3."""
     weight, t = s[at.MASS] * s[at.GRAVITY], at.THRUST
     if follows == Follows.THRUST:
         return ((s[t] + s[t + 1] + s[t + 2] + s[t + 3]) / weight - 1.0) / THRUST_SCALE
@@ -133,9 +134,9 @@ def _disturbance(p, s, memory, stream, out):
         x = 1.0
     elif follows == Follows.TIME:
         x = s[at.TIME] / TIME_SCALE_S
-    elif follows in OF_MOTION:
+    elif follows in MOTION_SIGNALS:
         x = _of_motion(follows, int(p[AXIS]), s)
-    elif follows in OF_THRUST:
+    elif follows in THRUST_SIGNALS:
         x = _of_thrust(follows, int(p[ROTOR]), s)
     else:
         x = _of_scale(follows, p[SCALE_OF], s, memory, stream)
@@ -145,7 +146,7 @@ def _disturbance(p, s, memory, stream, out):
 
 def _number(name: str) -> Parameter:
     """A parameter of any value."""
-    return Parameter(name, "1", 0.0, -FOR_EVER, FOR_EVER, 0.0, name)
+    return Parameter(name, "1", 0.0, -UNBOUNDED, UNBOUNDED, 0.0, name)
 
 
 DISTURBANCE = Effect("disturbance", "a nameless force and torque", tuple(_number(n) for n in NAMES),
@@ -157,7 +158,7 @@ def _change(row, values) -> None:
     name, element, amount = properties()[int(values["property"])], int(values["element"]), values["amount"]
     own = np.array(row[name], float)
     here = np.ones(own.shape, bool) if not own.shape or element < 0 else np.arange(len(own)) == element % len(own)
-    row[name] = own + amount * here if name in ADDED else own * np.where(here, amount, 1.0)
+    row[name] = own + amount * here if name in ADDITIONS else own * np.where(here, amount, 1.0)
 
 
 #: property: its place in `properties`, as parameters are numbers; element: of a property with several, -1 for all;
@@ -169,9 +170,9 @@ PROPERTY = Effect("property", "a property of the plant that no effect changes",
 @cache
 def properties() -> tuple[str, ...]:
     """Properties of the plant that no effect of the registry changes, and that may be scaled or added to."""
-    out = _changed() | LEFT_OUT
+    out = _changed() | EXCLUDED
     return tuple(name for name, _, default, _ in plant.FIELDS
-                 if name not in out and (default != 0.0 or name in ADDED or name in OF_VEHICLES))
+                 if name not in out and (default != 0.0 or name in ADDITIONS or name in VEHICLE_PROPERTIES))
 
 
 def _changed() -> set[str]:
@@ -188,27 +189,29 @@ def _changed() -> set[str]:
 
 def draw(rng: np.random.Generator) -> list[Active]:
     """A disturbance, ready to be flown."""
-    return [_drawn_property(rng) if rng.random() >= WRENCH_SHARE else _drawn_wrench(rng)]
+    return [_drawn_property(rng) if rng.random() >= WRENCH_PROBABILITY else _drawn_wrench(rng)]
 
 
 def _drawn_property(rng: np.random.Generator) -> Active:
     """Any property, all its elements or one of them, smaller or larger."""
     place = int(rng.integers(len(properties())))
-    name, size = properties()[place], log_uniform(*FACTOR, rng)
-    amount = ADDED[name] * size / FACTOR[1] if name in ADDED else np.exp(size * rng.choice([-1, 1]))
+    name, log_factor = properties()[place], log_uniform(*LOG_FACTOR, rng)
+    amount = ADDITIONS[name] * log_factor / LOG_FACTOR[1] if name in ADDITIONS \
+        else np.exp(log_factor * rng.choice([-1, 1]))
     element = float(rng.integers(-1, 4))
     return Active(PROPERTY, {"property": float(place), "element": element, "amount": float(amount)})
 
 
 def _drawn_wrench(rng: np.random.Generator) -> Active:
     """A force and torque in any direction that follows any signal."""
-    follows, axis = Follows(int(rng.choice(DRAWN))), int(rng.integers(3))
+    follows, axis = Follows(int(rng.choice(FOLLOWS_URN))), int(rng.integers(3))
     direction = _direction(rng)
     direction *= log_uniform(*FORCE_N, rng) / np.linalg.norm(direction)
     direction[3:] *= LEVER_M
     scale, rotor = (log_uniform(*SCALE[follows], rng), 0) if follows in SCALE else (0.0, int(rng.integers(4)))
     begin = float(rng.uniform(*BEGIN_S))
-    seconds = (0.0, FOR_EVER) if rng.random() < WHOLE_FLIGHT_SHARE else (begin, begin + float(rng.uniform(*DURATION_S)))
+    seconds = (0.0, UNBOUNDED) if rng.random() < WHOLE_FLIGHT_PROBABILITY \
+        else (begin, begin + float(rng.uniform(*DURATION_S)))
     values = (follows, axis, scale, rotor, *direction, *seconds)
     return Active(DISTURBANCE, dict(zip(NAMES, map(float, values), strict=True)))
 

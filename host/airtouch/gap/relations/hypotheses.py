@@ -15,7 +15,8 @@ from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, pri
 from airtouch.gap.relations.effect_class import EffectClass
 
 TURNS = 3  #: turns, at most, in which the effects of a hypothesis are fitted in turn; chosen
-SIZES = np.geomspace(3.0, 300.0, 10)  #: of a nameless disturbance, nominal standard deviations, equally likely; chosen
+#: lengths of the shift by a nameless disturbance, nominal standard deviations, equally likely; chosen
+NAMELESS_LENGTHS = np.geomspace(3.0, 300.0, 10)
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class LearnedModel:
     """What was learned from simulated flights: classes of effects, their interaction, nameless disturbances.
 
     interaction (Q, r): directions, times the standard deviation, in which two effects are not their sum, relative to
-    the size of the smaller one; nameless (Q, r): the same of nameless disturbances, relative to their size.
+    the length of the smaller one's shift; nameless (Q, r): the same of nameless disturbances, relative to their length.
     """
 
     classes: tuple[EffectClass, ...]
@@ -35,11 +36,11 @@ class LearnedModel:
 class Hypothesis:
     """Effects at their likeliest strengths.
 
-    level: log density over none, nats; evidence: the same averaged over strengths.
+    peak: log of the likelihood ratio to no effect, nats; evidence: that of the ratio averaged over strengths.
     """
 
     fits: tuple[Fit, ...]
-    level: float
+    peak: float
     evidence: float
 
     @property
@@ -77,14 +78,14 @@ class FlightHypotheses:
     def with_class(self, effect_class: EffectClass) -> Hypothesis:
         """The hypothesis of one class alone."""
         base, f = log_density(self.values), fit(effect_class, self.values, self.rescaling(()))
-        return Hypothesis((f,), f.level - base, f.evidence - base)
+        return Hypothesis((f,), f.peak - base, f.evidence - base)
 
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
                       ) -> list[Hypothesis]:
         """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
         rescaling = self.rescaling(hypothesis.fits)
         residual = rescaling(self.values - hypothesis.shift)
-        cost = hypothesis.evidence - hypothesis.level
+        cost = hypothesis.evidence - hypothesis.peak
         out = [self.at_fits((*hypothesis.fits, fit(c, residual, rescaling)), cost)
                for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
@@ -92,7 +93,7 @@ class FlightHypotheses:
     def with_two(self, one: EffectClass, two: EffectClass) -> Hypothesis:
         """The hypothesis of two classes: the second fitted beside the first, then both in turn."""
         first = fit(one, self.values, self.rescaling(()))
-        rescaling = rescaling_of(first.factors())
+        rescaling = rescaling_of(first.loadings())
         second = fit(two, rescaling(self.values - first.shift), rescaling)
         return self.refitted(self.at_fits((first, second)))
 
@@ -105,7 +106,7 @@ class FlightHypotheses:
                 rescaling, beside = self.rescaling(others), np.sum([o.shift for o in others], axis=0)
                 fits[i] = fit(f.effect_class, rescaling(self.values - beside), rescaling)
             tried = self.at_fits(tuple(fits))
-            if tried.level <= best.level:
+            if tried.peak <= best.peak:
                 break
             best = tried
         return best
@@ -119,12 +120,13 @@ class FlightHypotheses:
         """Evidence over none of a hypothesis with a nameless disturbance beside it, nats."""
         rescaling = self.rescaling(hypothesis.fits)
         residual = rescaling(self.values - hypothesis.shift)
-        axes, of_unit_size = principal(rescaling(self.model.nameless.T).T)
+        axes, of_unit_length = principal(rescaling(self.model.nameless.T).T)
         along = (residual @ axes) ** 2
-        variance = 1.0 + np.outer(SIZES ** 2, of_unit_size)  # (sizes, r)
+        variance = 1.0 + np.outer(NAMELESS_LENGTHS ** 2, of_unit_length)  # (lengths, r)
         gain = 0.5 * ((along * (1.0 - 1.0 / variance)) - np.log(variance)).sum(axis=1)
-        averaged = float(logsumexp(rescaling.level + log_density(residual) + gain) - np.log(len(SIZES)))
-        return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.level
+        density = rescaling.log_determinant + log_density(residual)
+        averaged = float(logsumexp(density + gain) - np.log(len(gain)))
+        return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.peak
 
     def at_fits(self, fits: Sequence[Fit], cost: float | None = None) -> Hypothesis:
         """The hypothesis of effects at the strengths of their fits.
@@ -133,15 +135,15 @@ class FlightHypotheses:
         """
         rescaling = self.rescaling(fits)
         residual = rescaling(self.values - np.sum([f.shift for f in fits], axis=0))
-        level = rescaling.level + log_density(residual) - log_density(self.values)
-        own = [f.evidence - f.level for f in fits]
-        return Hypothesis(tuple(fits), level, level + (sum(own) if cost is None else cost + own[-1]))
+        peak = rescaling.log_determinant + log_density(residual) - log_density(self.values)
+        own = [f.evidence - f.peak for f in fits]
+        return Hypothesis(tuple(fits), peak, peak + (sum(own) if cost is None else cost + own[-1]))
 
     def rescaling(self, fits: Sequence[Fit]) -> Rescaling:
         """The rescaling by which the scatter of a flight under effects has the covariance 1; none changes nothing."""
         if not fits:
             return unchanged(len(self.values))
-        sizes = [float(np.linalg.norm(f.shift)) for f in fits]
-        smaller = float(np.sqrt(sum(min(a, b) ** 2 for a, b in combinations(sizes, 2))))
+        lengths = [float(np.linalg.norm(f.shift)) for f in fits]
+        smaller = float(np.sqrt(sum(min(a, b) ** 2 for a, b in combinations(lengths, 2))))
         interaction = [smaller * self.model.interaction] if smaller else []
-        return rescaling_of(np.concatenate([*(f.factors() for f in fits), *interaction], axis=1))
+        return rescaling_of(np.concatenate([*(f.loadings() for f in fits), *interaction], axis=1))

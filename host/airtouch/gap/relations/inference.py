@@ -20,26 +20,34 @@ from airtouch.gap.relations.readout import Reading, Readout, read_out
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.simulation.effects import get
 
-#: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
-#: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
+# A share is a fraction of the evidence of the effects named.
+
+#: nats. An effect must gain as many over no effect, a second one over the first. A larger number misses weak effects, a
+#: smaller one names effects in nominal flights: 1 of 150 nominal flights gained more, 99 of 100 flights with an effect
+#: from its weakest strength on gained as many (all of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
-#: nats that a nameless disturbance may gain beside the right effects, whatever their evidence; 7 was tried on
-#: 2026-11-25 and taken back after the opened set of seed 112233 (host/docs/looks.md)
+#: nats. A nameless disturbance may gain as many beside the right effects, whatever their evidence; chosen. A smaller
+#: number answers `unknown` more often: 7 was tried on 2026-11-25 and taken back after the opened set of seed 112233
+#: (host/docs/looks.md)
 NAMELESS_ALLOWANCE = 10.0
-#: nats by which effects must be likelier than those without the last one and with a nameless disturbance in its place;
-#: 36 of 44 wrong pairs, found where the right effect was left out, were not
+#: nats. Effects must be so much likelier than without the last one and with a nameless disturbance in its place. A
+#: larger number names fewer pairs: of 44 wrong pairs, found where the right effect was left out, 36 were not
 NAMELESS_MARGIN = 30.0
-#: share of the effects' evidence that a nameless disturbance may gain beside that of their classes, because no curve is
-#: exact; chosen on flights of `learning.SEED`
+#: share that a nameless disturbance may gain beside the effects, added to that of their classes, as no curve is exact;
+#: chosen on flights of `learning.SEED`. A larger number answers `unknown` less often
 MODEL_ERROR_SHARE = 0.01
-PAIR_ERROR_SHARE = 0.01  #: the same once more for several effects, because they are not their sum; chosen there
-#: scatters of the distance of right effects by which a flight may lie off: 2 to 3 of 100 right flights with an evidence
-#: below 10,000 nats lie farther, half of them because they hit something (2,750 flights of `learning.SEED`, scatters
-#: and limit by other halves)
+PAIR_ERROR_SHARE = 0.01  #: share added once more for several effects, as two effects are not their sum; chosen there
+#: standard deviations of the distance of right effects. A flight may lie as far from the effects named; farther ones
+#: are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because they
+#: hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves)
 MOST_SCATTERS = 3.5
-MOST_EFFECTS = 3  #: effects that a flight is named to have, at most; chosen
-BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn; chosen
-TEMPERATURE = 2.0  #: divisor of the evidence in probabilities: the densities' tails are heavier than normal; chosen
+MOST_EFFECTS = 3  #: effects that are named together, at most; chosen. Each more costs a round of fits
+#: hypotheses to which one more effect is added, and additions to each that are fitted in turn; chosen. A larger number
+#: takes more time
+BEAM = 3
+#: divisor of the evidence in probabilities, as the densities' tails are heavier than normal; chosen. A larger number
+#: makes probabilities less certain
+TEMPERATURE = 2.0
 
 
 @dataclass(frozen=True)
@@ -120,10 +128,10 @@ def _nameless(flight: FlightHypotheses, best: Hypothesis) -> Against:
 
 def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
     """How much farther a flight lies from effects than nominal flights from none."""
-    scatter = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
-    share = float(np.hypot(scatter, library.pair_scatter * (len(best.fits) > 1)))
-    return Against(library.excess(flight.squared_distance(best)), MOST_SCATTERS * library.scatter(share, best.evidence),
-                   of_distance=True)
+    of_classes = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
+    share = float(np.hypot(of_classes, library.pair_distance_scatter * (len(best.fits) > 1)))
+    limit = MOST_SCATTERS * library.distance_scatter(share, best.evidence)
+    return Against(library.excess(flight.squared_distance(best)), limit, of_distance=True)
 
 
 def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:

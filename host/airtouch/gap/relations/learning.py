@@ -27,7 +27,7 @@ Say = Callable[[str], None]  #: what a long run reports its progress to
 class Stream(IntEnum):
     """Second number of a random generator's seed, after SEED, one for each purpose.
 
-    `disturbed_flights` has the number of a flight there: those of the numbers below share the numbers drawn.
+    `drawn_flights` and `disturbed_flights` have the number of a flight in this place.
     """
 
     WEAKEST = 5
@@ -100,12 +100,18 @@ def halved(highest: float, most: int, hides: Callable[[float], bool]) -> float:
     return strength
 
 
-def weakest_strength(highest: float, length_of_shift: Callable[[float], float]) -> float:
-    """The highest strength of a class, halved until it shifts flights by WEAKEST_SHIFT or less.
+def weakest_strength(highest: float, shifts: Callable[[float], Sequence[np.ndarray]]) -> float:
+    """The highest strength of a class, halved until the median shift of its flights is WEAKEST_SHIFT or shorter.
 
-    length_of_shift: of flights at a strength, in standard deviations of nominal ones; infinite where none ends well.
+    shifts: those (coordinates,) of the flights at a strength that end well, in standard deviations of nominal ones. A
+    strength at which none ends well is halved.
     """
-    return halved(highest, HALVINGS, lambda strength: length_of_shift(strength) <= WEAKEST_SHIFT)
+    def hides(strength: float) -> bool:
+        """Whether the median shift at a strength is short."""
+        lengths = [np.linalg.norm(shift) for shift in shifts(strength)]
+        return bool(lengths) and float(np.median(lengths)) <= WEAKEST_SHIFT
+
+    return halved(highest, HALVINGS, hides)
 
 
 def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,

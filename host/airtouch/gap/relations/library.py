@@ -1,4 +1,4 @@
-"""What was learned of one vehicle in one scenario, as a file: coordinates of its flights and classes of effects."""
+"""The library: what was learned of one vehicle in one scenario, its file, and for which flights it holds."""
 
 import io
 import json
@@ -20,12 +20,16 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-FARTHEST_NOMINAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none; chosen
-PARTS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
-SHARES = ("nameless_share", "second_share", "distance_scatter")  #: of a calibration; arrays of all classes in a file
-STORED = np.float16  #: most numbers of a file; rounding moves a coordinate by less than a tenth of its scatter
-#: ends of the names of the arrays that are stored in float32
-EXACT = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
+#: standard deviations of the distance of nominal flights from the median; farther ones are not as those that were
+#: learned from; chosen
+FARTHEST_NOMINAL = 4.0
+CLASS_ARRAYS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
+#: fields of a calibration that are fractions of the evidence; each an array of all classes in a file
+SHARE_FIELDS = ("nameless_share", "second_share", "distance_scatter")
+#: type of most arrays of a file; it moves a coordinate by less than a tenth of its nominal standard deviation
+HALF_PRECISION = np.float16
+#: ends of the names of the arrays of a file that are in float32
+SINGLE_PRECISION = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
 
 
 class NominalDistance(NamedTuple):
@@ -36,42 +40,66 @@ class NominalDistance(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Coordinates:
+    """The map from a flight's features to its coordinates, Q of them, of which nominal flights have the covariance 1.
+
+    Features are standardised, multiplied by `projection` (features, Q), and `middle` (Q,), the nominal mean, is
+    subtracted.
+    """
+
+    standard: Standard
+    projection: np.ndarray
+    middle: np.ndarray
+
+    def __call__(self, features: np.ndarray) -> np.ndarray:
+        """Coordinates (n, Q) of features (n, features)."""
+        return self.standard(features) @ self.projection - self.middle
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by their names in a file."""
+        return {"standard.middle": self.standard.middle, "standard.deviation": self.standard.deviation,
+                "projection": self.projection, "middle": self.middle}
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, np.ndarray]) -> "Coordinates":
+        """The map of `arrays`, maybe among others."""
+        return cls(Standard(arrays["standard.middle"], arrays["standard.deviation"]), arrays["projection"],
+                   arrays["middle"])
+
+    def rounded(self) -> "Coordinates":
+        """The map as a file holds it."""
+        return Coordinates.of({name: array.astype(float) for name, array in _rounded(self.arrays()).items()})
+
+
+@dataclass(frozen=True)
 class Library:
     """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
-    projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
-    less the middle.
-    pair_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
+    pair_distance_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
     """
 
     scenario: str
     vehicle: str
-    standard: Standard
-    projection: np.ndarray
-    middle: np.ndarray
+    coordinates: Coordinates
     model: LearnedModel
     distance: NominalDistance
-    pair_scatter: float
+    pair_distance_scatter: float = 0.0
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Other processes read the shipped library from their own package: it is 30 MB of a study that is sent."""
         return (shipped, ()) if self is shipped() else super().__reduce_ex__(protocol)
 
-    def coordinates(self, features: np.ndarray) -> np.ndarray:
-        """Coordinates (n, Q) of features (n, features)."""
-        return self.standard(features) @ self.projection - self.middle
-
     @property
-    def nominal_scatter(self) -> float:
+    def nominal_distance_scatter(self) -> float:
         """Standard deviation of the excess distance of nominal flights, nats."""
         return 0.5 * self.distance.deviation
 
-    def scatter(self, share: float, evidence: float) -> float:
+    def distance_scatter(self, share: float, evidence: float) -> float:
         """Standard deviation of the excess distance of flights with effects, nats.
 
         share: what of it is beyond that of nominal flights, over the evidence; evidence: of the effects, nats.
         """
-        return float(np.hypot(self.nominal_scatter, share * evidence))
+        return float(np.hypot(self.nominal_distance_scatter, share * evidence))
 
     def excess(self, squared: float) -> float:
         """Excess of a squared distance over that of the median nominal flight, in nats."""
@@ -80,7 +108,7 @@ class Library:
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
         middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_scatter
+        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_distance_scatter
 
     @property
     def effects(self) -> frozenset[str]:
@@ -102,48 +130,51 @@ class Library:
         return replace(self, model=replace(self.model, classes=tuple(classes)))
 
 
-def save(library: Library, path: Path) -> None:
-    """Write a library as npz, most numbers in half precision; raises AirTouchError where it cannot be written."""
-    write_bytes(packed(library), path, True)
+def save(library: Library, path: Path, force: bool = False) -> None:
+    """Write a library as npz, most numbers in half precision; raises AirTouchError as `logs.files.write_bytes`."""
+    write_bytes(packed(library), path, force)
+
+
+def _rounded(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays in the precision of a file."""
+    return {name: array.astype(np.float32 if name.endswith(SINGLE_PRECISION) else HALF_PRECISION)
+            for name, array in arrays.items()}
 
 
 def packed(library: Library) -> bytes:
     """The bytes of a library's file."""
     model = library.model
-    arrays = {"standard.middle": library.standard.middle, "standard.deviation": library.standard.deviation,
-              "projection": library.projection, "middle": library.middle, "interaction": model.interaction,
-              "nameless": model.nameless,
-              **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARES}}
+    arrays = {**library.coordinates.arrays(), "interaction": model.interaction, "nameless": model.nameless,
+              **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARE_FIELDS}}
     for i, c in enumerate(model.classes):
-        arrays |= {f"{i}.{part}": getattr(c, part) for part in PARTS}
+        arrays |= {f"{i}.{part}": getattr(c, part) for part in CLASS_ARRAYS}
         if (readout := c.calibration.readout) is not None:
             arrays |= {f"{i}.strength": readout.strength, f"{i}.amount": readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
-             "pair_scatter": library.pair_scatter,
+             "pair_scatter": library.pair_distance_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
              "readouts": [(r := c.calibration.readout) and r.parameters for c in model.classes]}
-    rounded: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(EXACT) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
-    np.savez_compressed(file, **rounded, words=np.array(json.dumps(words)))
+    np.savez_compressed(file, words=np.array(json.dumps(words)), **_rounded(arrays))  # type: ignore[arg-type]
     return file.getvalue()
 
 
 def read(content: bytes) -> Library:
-    """The library in the bytes of a file; raises ValueError where it has not one number of SHARES for each class."""
+    """The library in the bytes of a file; raises ValueError where SHARE_FIELDS have not one number for each class."""
     with np.load(io.BytesIO(content)) as file:
         words = json.loads(str(file["words"]))
         arrays = {k: file[k].astype(float) for k in file.files if k != "words"}
-    if any(len(arrays[name]) != len(words["classes"]) for name in SHARES):
-        raise ValueError(f"a library of {len(words['classes'])} classes must have as many of {', '.join(SHARES)}")
+    if any(len(arrays[name]) != len(words["classes"]) for name in SHARE_FIELDS):
+        raise ValueError(f"a library of {len(words['classes'])} classes must have as many of {', '.join(SHARE_FIELDS)}")
     classes = tuple(
-        EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in PARTS},
+        EffectClass(name, effect, shape, parameters, signed, **{part: arrays[f"{i}.{part}"] for part in CLASS_ARRAYS},
                     calibration=ClassCalibration(_readout(words["readouts"][i], i, arrays),
-                                                 **{share: float(arrays[share][i]) for share in SHARES}))
+                                                 **{share: float(arrays[share][i]) for share in SHARE_FIELDS}))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
     return Library(
-        words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
-        arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
-        distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"])
+        words["scenario"], words["vehicle"], Coordinates.of(arrays),
+        LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
+        distance=NominalDistance(*words["distance"]), pair_distance_scatter=words["pair_scatter"])
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:
@@ -158,13 +189,23 @@ def shipped() -> Library:
 
 
 def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Library | None:
-    """The library for flights of a vehicle whose nominal flights have these features; None where there is none.
+    """The shipped library, None where it does not hold for flights of a vehicle: see `why_no_library`."""
+    return None if why_no_library(vehicle, nominal) else shipped()
 
-    It must be of the same vehicle as declared, and the nominal flights must lie where simulated ones lie: those of
-    another mission, of another simulator or of a real vehicle do not.
+
+def why_no_library(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> str:
+    """Why the shipped library does not hold for flights of a vehicle, "" where it does.
+
+    vehicle: as declared; nominal: features of its nominal flights, None of one whose log lacks columns.
     """
-    known = [f for f in nominal if f is not None]
     library = shipped()
-    if not known or len(known) < len(nominal) or replace(load(library.vehicle), name=vehicle.name) != vehicle:
-        return None
-    return library if library.lies_as_nominal(library.coordinates(np.array(known))) else None
+    known = [f for f in nominal if f is not None]
+    if not known:
+        return "no nominal flight has features to compare"
+    if len(known) < len(nominal):
+        return "the log of a nominal flight lacks columns"
+    if replace(load(library.vehicle), name=vehicle.name) != vehicle:
+        return f"the vehicle is declared unlike {library.vehicle}"
+    if not library.lies_as_nominal(library.coordinates(np.array(known))):
+        return f"the nominal flights lie elsewhere than simulated ones of the scenario {library.scenario!r}"
+    return ""

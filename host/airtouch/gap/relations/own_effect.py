@@ -1,6 +1,6 @@
 """Classes of effects that a library lacks, such as a user's own: learned from some hundred simulated flights.
 
-What an effect does to the signals is so known in closed loop too, where it changes the plant and no force shows it.
+By them the diagnosis knows what the effect does in closed loop, also where it changes the plant and no force shows it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.relations.calibration import HIGHEST_START, calibrate_class
 from airtouch.gap.relations.effect_class import LEAST_SHIFT, ClassCalibration, ClassFlights, EffectClass, learn_class
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, fly, scaled, weakest_strength
-from airtouch.gap.relations.library import SHARES, Library
+from airtouch.gap.relations.library import SHARE_FIELDS, Library
 from airtouch.gap.relations.settings import OWN_EFFECT, OwnEffectSettings
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.random_draws import kinds_of, log_uniform
@@ -51,7 +51,7 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
     """
     drawing = Drawing(name, kinds_of(get(name))[name])
     high = drawing.kind.highest
-    low = min(weakest_strength(high, partial(_length_of_shift, library, scene, drawing)), HIGHEST_START * high)
+    low = min(weakest_strength(high, partial(_shifts, library, scene, drawing)), HIGHEST_START * high)
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()]))
                  for i in range(settings.pairs)]
     flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
@@ -70,13 +70,14 @@ def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> Cl
     """A calibration with shares no smaller than those of the known classes: a curve through few flights is less exact.
     """
     calibrations = (calibration, *(c.calibration for c in known))
-    return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in calibrations) for name in SHARES))
+    return ClassCalibration(calibration.readout,
+                            *(max(getattr(one, name) for one in calibrations) for name in SHARE_FIELDS))
 
 
-def _length_of_shift(library: Library, scene: Scene, drawing: Drawing, strength: float) -> float:
-    """By how much an effect at a strength moves the coordinates of one flight; infinite where it does not end well."""
+def _shifts(library: Library, scene: Scene, drawing: Drawing, strength: float) -> list[np.ndarray]:
+    """The shift (Q,) of the coordinates of one flight by an effect at a strength; none where it does not end well."""
     pair = _pair(library, scene, drawing, (0, strength))
-    return np.inf if pair is None else float(np.linalg.norm(pair.flight - pair.nominal))
+    return [] if pair is None else [pair.flight - pair.nominal]
 
 
 def _pair(library: Library, scene: Scene, drawing: Drawing, numbered: tuple[int, float]) -> Pair | None:

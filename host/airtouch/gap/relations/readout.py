@@ -15,11 +15,15 @@ from airtouch.simulation.effects import Effect
 
 #: by name of a parameter: its value and standard deviation, in its unit
 Reading = Mapping[str, tuple[float, float]]
-WIDTH = float(np.log(2.0))  #: standard deviation, in the log strength, of the weights of calibration flights; chosen
+#: standard deviation, in the log strength, of the weights of calibration flights; chosen. A larger number averages more
+#: flights and follows a bend of the relation less
+KERNEL_WIDTH = float(np.log(2.0))
 #: flights that say that amount and strength are proportional, for strengths at the ends of the calibration; chosen
 RIDGE = 0.1
-OF_ONE_SIGN = 0.9  #: share of the calibration flights of a strength's sign whose amounts agree in theirs; chosen
-FITTED = 2.0  #: flights that a local regression uses up: intercept and slope
+#: fraction of the calibration flights with a strength of one sign whose amounts must be of one sign, so that a strength
+#: shows that of the amount; chosen
+LEAST_SIGN_AGREEMENT = 0.9
+LINE_COEFFICIENTS = 2.0  #: degrees of freedom that a local line uses up: intercept and slope
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class Readout:
         if self.strength.shape[1] > 1 or self.amount.shape[1] > 1:
             return True
         positive = self.amount[self.strength[:, 0] * strength[0] > 0.0, 0] > 0.0
-        return max(positive.mean(), 1.0 - positive.mean()) >= OF_ONE_SIGN
+        return max(positive.mean(), 1.0 - positive.mean()) >= LEAST_SIGN_AGREEMENT
 
     def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,).
@@ -63,7 +67,7 @@ class Readout:
         ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
         weight = _weights(distance)
         columns = np.column_stack([np.ones_like(distance), distance])
-        normal = (columns * weight[:, None]).T @ columns + RIDGE * np.diag([0.0, WIDTH ** 2])
+        normal = (columns * weight[:, None]).T @ columns + RIDGE * np.diag([0.0, KERNEL_WIDTH ** 2])
         coefficients = np.linalg.solve(normal, columns.T @ (weight * ratio))
         sign = np.sign(np.median(self.amount[same_sign, 0])) if self.shows_sign(np.array([strength])) else 1.0
         amount = float(sign * np.exp(coefficients[0]))
@@ -83,16 +87,17 @@ def _weights(distance: np.ndarray) -> np.ndarray:
     """Weights (n,) of calibration flights at distances (n,) in the logarithm of the strength.
 
     They fall with the distance as a normal density does; from a strength beyond the calibration the nearest flight is
-    taken to be WIDTH away.
+    taken to be KERNEL_WIDTH away.
     """
-    beyond = max(float(np.abs(distance).min()) - WIDTH, 0.0)
-    return np.exp(-0.5 * (np.clip(np.abs(distance) - beyond, 0.0, None) / WIDTH) ** 2)
+    beyond = max(float(np.abs(distance).min()) - KERNEL_WIDTH, 0.0)
+    return np.exp(-0.5 * (np.clip(np.abs(distance) - beyond, 0.0, None) / KERNEL_WIDTH) ** 2)
 
 
 def _deviation(residual: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Standard deviation (k,) of residuals (n, k) with weights (n,), of which the regression has used up FITTED."""
+    """Standard deviation (k,) of residuals (n, k) with weights (n,), less LINE_COEFFICIENTS degrees of freedom."""
     effective = weight.sum() ** 2 / (weight ** 2).sum()  # number of flights, Kish 1965
-    variance = (weight[:, None] * residual ** 2).sum(axis=0) / weight.sum() * effective / max(effective - FITTED, 1.0)
+    freedom = max(effective - LINE_COEFFICIENTS, 1.0)
+    variance = (weight[:, None] * residual ** 2).sum(axis=0) / weight.sum() * effective / freedom
     return np.sqrt(variance)
 
 

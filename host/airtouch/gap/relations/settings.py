@@ -15,7 +15,7 @@ class CalibrationSettings:
     nominal_flights: int = 300  #: whose distances from no effect are measured
     class_flights: int = 80  #: of each class, of which those that show it count; for its shares and its parameters
     with_second: int = 12  #: of these, those beside whose effect a second one is tried
-    flights_of_two: int = 150  #: flights with two effects, for `Library.pair_scatter`
+    flights_of_two: int = 150  #: flights with two effects, for `Library.pair_distance_scatter`
     tried: int = 3  #: flights at each strength, on the way down to the weakest one that shows
     least_flights: int = 12  #: flights that show the effect; with fewer a class gives no parameters
 
