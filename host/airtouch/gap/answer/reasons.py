@@ -91,8 +91,8 @@ def cell_in_words(cell: int) -> str:
 
 def _nats_against(selection: Selection) -> tuple[str, str]:
     """The nats that speak against the effects named, 0 at least, and their limit, as they are shown."""
-    remainder = against(selection)
-    return f"{max(remainder.nats, 0.0):.0f}", f"{remainder.limit:.0f}"
+    evidence = against(selection)
+    return f"{max(evidence.nats, 0.0):.0f}", f"{evidence.limit:.0f}"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:

@@ -32,9 +32,9 @@ def over_prediction_ratio(selection: Selection) -> float:
 
 def against_over_limit(selection: Selection) -> float:
     """How much speaks against the effects named over its limit: what they leave, or over-prediction."""
-    remainder = against(selection)
-    never_negative = float(np.logaddexp(remainder.nats, 0.0))  # softplus: the nats where these are many, else above 0
-    return max(never_negative / remainder.limit, over_prediction_ratio(selection))
+    evidence = against(selection)
+    never_negative = float(np.logaddexp(evidence.nats, 0.0))  # softplus: the nats where these are many, else above 0
+    return max(never_negative / evidence.limit, over_prediction_ratio(selection))
 
 
 def is_explained(selection: Selection) -> bool:
