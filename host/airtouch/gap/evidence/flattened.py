@@ -128,7 +128,7 @@ def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:
-    """Bins and channels (bins, COUNT) of the replay view that count, by state. means_only: `Data.means_only`."""
+    """Whether each bin of each channel (bins, COUNT) of the replay view counts, by state. See `Data.means_only`."""
     keep = {state: judged_bins(state) for state in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
@@ -167,7 +167,7 @@ def _offsets(data: Data, layout: Layout) -> list[Offset]:
 
 
 def _offset_of_one(data: Data, flight: int, channel: int) -> list[Spectra]:
-    """Spectra by flight and state of 1 in one channel of one flight, in the air."""
+    """Spectra by flight and state of a signal that is 1 in one channel of one flight in the air, else 0."""
     ones = np.zeros((len(data.flights[flight]), COUNT))
     ones[~data.flights[flight].on_ground, channel] = 1.0
     return [{state: short_time_spectra(ones, begin, state) if j == flight else np.zeros_like(data.residual[j][state])

@@ -22,7 +22,10 @@ TWO_FOLDS = ((0, 1), (1, 0))  #: cross-validation: the number of the half that i
 
 @dataclass(frozen=True)
 class BlockSet:
-    """Which blocks of which flights: (flight, state, chosen bool array), for fitting or judging."""
+    """A set of blocks of flights, for fitting or judging.
+
+    pieces: of each flight and state, whether each of its blocks is in the set (`layout.Piece`).
+    """
 
     pieces: tuple[Piece, ...]
 

@@ -27,7 +27,7 @@ def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
 
 
 class ParameterSlopes(NamedTuple):
-    """Change per unit of one scaled parameter.
+    """Change per natural step of one parameter.
 
     column, complex (n,): of the residual; rise (bins, axes): of the logarithm of the commands' expected power;
     extra_torque_power (replay,): of the torque; nonlinear: whether the parameter changes the control loop, so that the

@@ -54,5 +54,5 @@ def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) 
 
 
 def beside_edges(active: Sequence[Active]) -> list[Active]:
-    """The effects that show elsewhere than at edges alone: in the replay, or in the loop that is part of it."""
+    """The effects that show elsewhere than at edges alone: in the replay, or in the loop within it."""
     return [a for a in active if not signature_of(a.effect).edges_only]

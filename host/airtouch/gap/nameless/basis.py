@@ -31,14 +31,14 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     thrust = lagged(decay, vehicle.thrust(flight.pwm)) @ MIX.T
     thrust /= 0.25 * float(row["mass"]) * vehicle.gravity_mps2
     changing = np.gradient(thrust, axis=0) / PERIOD_S * LAG_S
-    speed = flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
+    velocity = flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
     time = np.arange(len(flight)) * PERIOD_S / TIME_S
-    closeness = (HEIGHT_M / np.maximum(flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], HEIGHT_M)) ** 2
-    height = closeness @ MIX[:3].T
-    above = flight.signals[:, at.HEIGHT]
-    low = 1.0 / (1.0 + (above / LOW_M) ** 2)
-    columns = np.column_stack([np.ones(len(flight)), air, thrust, changing, speed, np.hypot(*speed[:, :2].T),
-                               np.zeros((len(flight), 3)), time, time * thrust[:, 0], height, low, above])
+    of_rotors = (HEIGHT_M / np.maximum(flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], HEIGHT_M)) ** 2
+    near = of_rotors @ MIX[:3].T
+    height = flight.signals[:, at.HEIGHT]
+    low = 1.0 / (1.0 + (height / LOW_M) ** 2)
+    columns = np.column_stack([np.ones(len(flight)), air, thrust, changing, velocity, np.hypot(*velocity[:, :2].T),
+                               np.zeros((len(flight), 3)), time, time * thrust[:, 0], near, low, height])
     columns[:, 1:] *= air[:, None]
     out = np.repeat(columns[:, :, None], 3, axis=2)
     world_x = BASIS.index("world_x")

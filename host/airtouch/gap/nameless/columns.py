@@ -113,7 +113,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
 def _loop_columns(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 2, LOOP_COLUMNS) in the air of the torque that the model makes of the commands, by flight.
 
-    Each band's alone, weighted as what is left of the torque is; made once.
+    Each column has one band alone, weighted as the residual of the torque is; made once.
     """
     def make() -> list[np.ndarray]:
         """The spectra, by flight."""

@@ -11,14 +11,14 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
 BELIEF = 2.0  #: nominal flights that the scatter of all channels of a band counts as for that of one channel; chosen
 #: least standard deviation of log power between flights, simulated and recorded, as no effect's spectrum, and no
-#: recorded flight's air, is modelled any better; chosen. Larger numbers take less power for a change
+#: recorded flight's air, is modelled any better; chosen. A larger number counts more of a change as nominal
 LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
 #: nats that a column, or a cell's power, must gain on the half that it is fitted to; chosen, chance gives about one
 CHANCE = 4.0
 UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen
 LONGEST = 1.5  #: longest of these steps, of the natural logarithm of the power; chosen
-SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) number of each cell's view and sensor, all bands together
-ABOVE_MEANS = above_means()
+SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) for each cell the number of the first cell of its view and sensor
+ABOVE_MEANS = above_means()  #: (CELLS,) bool
 NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and standard deviation of a prior that says nothing
 
 

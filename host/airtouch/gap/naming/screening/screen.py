@@ -1,4 +1,4 @@
-"""Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
+"""Screening: every variant of every candidate beside a base, at a fraction of what its fit would cost."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
