@@ -46,7 +46,7 @@ def row(flight: Flight, study: Study, vehicle: vehicles.Vehicle) -> str:
     f = frequencies(AIR)
     inside = (f >= BAND_HZ[0]) & (f < BAND_HZ[1])
     data = Data(study, [flight])
-    power = np.abs(data.base[0][AIR][:, inside, 3:6]) ** 2 / study.floor.power[AIR][inside, 3:6]
+    power = np.abs(data.residual[0][AIR][:, inside, 3:6]) ** 2 / study.floor.power[AIR][inside, 3:6]
     ratio = np.nanmean(power, axis=1)
     far = (ratio[:, [ROLL, YAW]] > FAR).any(axis=1)
     when = ", ".join(f"{s:.0f}" for s in data.first[0][AIR][far] * PERIOD_S)

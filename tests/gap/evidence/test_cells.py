@@ -10,9 +10,9 @@ from airtouch.gap.evidence.cells import (
     REST_VIEW,
     above_means,
     band_cells,
+    cell_indices,
     cell_numbers,
     channel_cells,
-    parts_of,
     place_of,
     sensor_cells,
 )
@@ -26,7 +26,7 @@ NAMES = [c.name for c in CHANNELS]
     (REST_VIEW, 1, "rate_y", (0.6, 2.0)), (COMMAND_VIEW, 2, "command_roll", (0.6, 2.0))])
 def test_place_of_a_cell_is_its_view_channel_and_band(view, band, channel, band_hz):
     number = cell_numbers(view, band, NAMES.index(channel))
-    assert parts_of(number) == (view, band, NAMES.index(channel))
+    assert cell_indices(number) == (view, band, NAMES.index(channel))
     assert place_of(number) == (view, channel, pytest.approx(band_hz))
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.data import Data, command_torque, gap_spectra, step_doubt
+from airtouch.gap.evidence.data import Data, command_torque, residual_spectra, step_doubt
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change
 from airtouch.gap.signals.channels import COUNT, FORCE, TORQUE, residual
 from airtouch.gap.signals.quiet_blocks import QuietPower
@@ -63,7 +63,7 @@ def test_torque_is_seen_by_the_law_of_where_it_comes_from(effects, by_command, o
     modelled = data.measured_torque[0] - nominal
     expected = data.measured_torque[0] - COMMANDED * modelled + COMMANDED * (commanded - nominal) \
         + OUTSIDE * (both - commanded)
-    gap = gap_spectra(data, effects)[0][AIR]
+    gap = residual_spectra(data, effects)[0][AIR]
     np.testing.assert_allclose(gap[:, FIRST_BIN:, TORQUE], expected[:, FIRST_BIN:], atol=1e-8)
     for some, change in ((by_command, commanded - nominal), (outside, both - commanded)):
         assert (np.abs(change[:, FIRST_BIN:]).max() > 1e-3) == bool(some), "the effect acts above the means"
@@ -72,8 +72,8 @@ def test_torque_is_seen_by_the_law_of_where_it_comes_from(effects, by_command, o
 
 def test_without_a_response_what_only_scales_the_torque_leaves_it_alone():
     data = Data(FLOOR, [flown()])
-    alone, beside, weak = (gap_spectra(data, some)[0][AIR] for some in ([INERTIA], [INERTIA, WEAK], [WEAK]))
-    np.testing.assert_array_equal(alone[:, :, TORQUE], data.base[0][AIR][:, :, TORQUE])
+    alone, beside, weak = (residual_spectra(data, some)[0][AIR] for some in ([INERTIA], [INERTIA, WEAK], [WEAK]))
+    np.testing.assert_array_equal(alone[:, :, TORQUE], data.residual[0][AIR][:, :, TORQUE])
     np.testing.assert_array_equal(beside[:, :, TORQUE], weak[:, :, TORQUE])
     scaled = torque_of(flown(), [INERTIA, WEAK], data)
     assert np.abs(scaled - weak[:, :, TORQUE]).max() > 0.1, "it would scale it"
@@ -93,7 +93,7 @@ def test_a_step_makes_the_torque_uncertain_by_what_the_limits_cut_of_it():
     assert not data.quiet[0].any()
     doubt = step_doubt(data, [LATE], [0])
     size = CUT_DOUBT * WEIGHT * COMMANDED * 0.4
-    expected = np.zeros((*data.base[0][AIR].shape[:2], COUNT))
+    expected = np.zeros((*data.residual[0][AIR].shape[:2], COUNT))
     expected[:, FIRST_BIN:, TORQUE] = (size * np.abs(command_torque(data, 0)[:, FIRST_BIN:])) ** 2
     np.testing.assert_allclose(doubt[0][AIR], expected, rtol=1e-12)
     assert doubt[0][AIR].any() and not doubt[0][REST].any() and doubt[1] == {}, "of the flight that was asked for alone"

@@ -51,14 +51,14 @@ def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
     data = Data(FLOOR, [hover(1, louder=louder, length_s=12.0)])
     problem = problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
-    values, other = problem.elements.base, beside * problem.elements.power
-    likeliest = strongest(problem, noise, values, other)
+    residual, other = problem.elements.residual, beside * problem.elements.floor_power
+    likeliest = strongest(problem, noise, residual, other)
     strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
     terms = [noise.fitted(np.full(1, x)) for x in strengths]
-    levels = [problem.likelihood(values, other + problem.random_power([t])) for t in terms]
+    levels = [problem.likelihood(residual, other + problem.random_power([t])) for t in terms]
     best = strengths[int(np.argmax(levels))]
     assert noise.scaled(likeliest.values)[0] == pytest.approx(best, rel=0.01)
-    level = problem.likelihood(values, other + problem.random_power([likeliest]))
+    level = problem.likelihood(residual, other + problem.random_power([likeliest]))
     assert level > max(levels) - 1e-2 and (best > 2.0 * LEAST_STRENGTH) == (louder > 1.0)
 
 
@@ -67,7 +67,8 @@ def test_a_random_effect_that_adds_no_power_stays_as_it_is():
     problem = problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
     elsewhere = replace(noise, gate=(("another flight", 0.0, 12.0),))
-    assert strongest(problem, elsewhere, problem.elements.base, np.zeros(len(problem.elements.base))) is elsewhere
+    residual = problem.elements.residual
+    assert strongest(problem, elsewhere, residual, np.zeros(len(residual))) is elsewhere
 
 
 def test_variance_is_the_inverse_of_the_information_of_the_strength():
@@ -78,9 +79,9 @@ def test_variance_is_the_inverse_of_the_information_of_the_strength():
     data = Data(FLOOR, [hover(3, louder=1.5, length_s=20.0)])
     blocks, problem = whole_of(data), problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
-    likeliest = strongest(problem, noise, problem.elements.base, np.zeros(len(problem.elements.base)))
+    likeliest = strongest(problem, noise, problem.elements.residual, np.zeros(len(problem.elements.residual)))
     x, step = likeliest.scaled(likeliest.values), 1e-3
-    up, down = (np.log(problem.elements.power + problem.random_power([noise.fitted(x * np.exp(h))]))
+    up, down = (np.log(problem.elements.floor_power + problem.random_power([noise.fitted(x * np.exp(h))]))
                 for h in (step, -step))
     information = OVERLAP_WEIGHT * np.sum((((up - down) / (2.0 * step)) ** 2)[problem.elements.valid])
     with_tails = float(x[0] ** 2 / strength_variance(data, blocks, [likeliest], likeliest)[0, 0]) / information

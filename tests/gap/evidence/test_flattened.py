@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.cells import SENSOR_AXES
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.flattened import FREEDOM_OF_BLOCK, LEAST_FREEDOM, OFFSETS, Offset
-from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
+from airtouch.gap.evidence.flattened import OFFSETS, Offset
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.signals.channels import COUNT, TORQUE
-from airtouch.gap.signals.spectra import AIR, REST
+from airtouch.gap.signals.channels import CHANNELS, COUNT
+from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from hovers import FLOOR, hover
 
 SPREAD = np.zeros(COUNT)
@@ -31,10 +29,10 @@ def two():
 
 def test_offsets_are_of_the_channels_that_differ_in_each_flight(two):
     flat = flat_of(two)
-    channels = [{int(c) for c in flat.elements.channel[o.places]} for o in flat.offsets]
-    flights = [{int(f) for f in flat.elements.flight[o.places]} for o in flat.offsets]
+    channels = [{int(c) for c in flat.elements.channel[o.indices]} for o in flat.offsets]
+    flights = [{int(f) for f in flat.elements.flight[o.indices]} for o in flat.offsets]
     assert channels == [{0}, {2}, {4}] * 2 and flights == [{0}] * 3 + [{1}] * 3
-    assert [o.spread for o in flat.offsets] == [0.1, 0.2, 0.5] * 2
+    assert [o.prior_std for o in flat.offsets] == [0.1, 0.2, 0.5] * 2
 
 
 def test_a_unit_offset_is_what_a_constant_force_adds_in_the_air(two):
@@ -44,9 +42,9 @@ def test_a_unit_offset_is_what_a_constant_force_adds_in_the_air(two):
     moved = replace(first_flight, acceleration=first_flight.acceleration + forward)
     before, after = flat_of(two), flat_of([moved, two[1]])
     offset = before.offsets[0]
-    added = np.zeros(len(before.elements.base), complex)
-    added[offset.places] = offset.column
-    np.testing.assert_allclose(after.elements.base - before.elements.base, added, atol=1e-9)
+    added = np.zeros(len(before.elements.residual), complex)
+    added[offset.indices] = offset.column
+    np.testing.assert_allclose(after.elements.residual - before.elements.residual, added, atol=1e-9)
 
 
 def test_an_offset_at_other_places_is_nothing_where_it_changes_nothing():
@@ -56,19 +54,29 @@ def test_an_offset_at_other_places_is_nothing_where_it_changes_nothing():
     assert not offset.at(np.array([1, 3])).any() and not len(offset.at(np.zeros(0, int)))
 
 
-@pytest.mark.parametrize("blocks", [0, 2, 100])
-def test_freedom_is_three_a_block_within_its_limits(blocks):
-    study = replace(FLOOR, floor=replace(FLOOR.floor, block_counts={AIR: blocks, REST: blocks}))
-    freedom = flat_of([hover(1, length_s=10.0)], study).elements.freedom
-    assert set(freedom) == {min(max(FREEDOM_OF_BLOCK * blocks, LEAST_FREEDOM), REPLAY_FREEDOM)}
+@pytest.mark.parametrize(("blocks", "freedom"), [(0, 2.0), (2, 6.0), (3, 9.0), (100, 12.0)])
+def test_freedom_is_three_a_block_from_two_to_twelve(blocks, freedom):
+    study = replace(FLOOR, floor=replace(FLOOR.floor, block_counts={AIR: blocks, REST: 100}))
+    flat = flat_of([hover(1, length_s=10.0, resting_s=3.0)], study)
+    in_air = flat.air.block_of_value >= 0
+    assert set(flat.elements.freedom[in_air]) == {freedom} and set(flat.elements.freedom[~in_air]) == {12.0}
 
 
-def test_torque_and_blocks_of_the_values(two):
-    """Axis by axis a bin of a block has each channel once; only blocks in the air are numbered."""
-    flat = flat_of(two)
-    channel = flat.elements.channel[:flat.replay_count]
-    np.testing.assert_array_equal(flat.is_torque, (channel >= TORQUE.start) & (channel < TORQUE.stop))
-    assert (channel[:SENSOR_AXES] == np.arange(SENSOR_AXES)).all()
-    on_ground = flat.air.block_of_value < 0
-    assert on_ground.any() and (flat.elements.flight[:flat.replay_count][on_ground] == 0).all()
-    assert len(flat.air.begin) == flat.air.block_of_value.max() + 1
+def test_an_angular_acceleration_changes_the_values_of_the_torque_alone(two):
+    """A yaw rate that grows faster and faster, which no force shows."""
+    turned = replace(two[0], rates=two[0].rates + np.arange(len(two[0]))[:, None] ** 3 * [0.0, 0.0, 1e-9])
+    before, after = flat_of(two), flat_of([turned, two[1]])
+    changed = np.abs(after.elements.residual - before.elements.residual)[:before.replay_count] > 1e-6
+    names = np.array([c.name for c in CHANNELS])[before.elements.channel[:before.replay_count]]
+    in_air = before.air.block_of_value >= 0
+    assert set(names[changed & in_air]) == set(names[before.is_torque & changed]) == {"torque_z"}
+    assert set(names[before.is_torque]) == {"torque_x", "torque_y", "torque_z"}
+
+
+def test_blocks_in_the_air_are_those_that_fit_into_its_seconds(two):
+    """Blocks of 2.56 s, each 1.28 s after the one before: six in 9 s of the first flight, six in 10 s of the second."""
+    air = flat_of(two).air
+    assert air.begin.tolist() == [300 + 128 * k for k in range(6)] + [128 * k for k in range(6)]
+    assert air.flight.tolist() == [0] * 6 + [1] * 6
+    values, = {int(n) for n in np.bincount(air.block_of_value[air.block_of_value >= 0])}
+    assert values == (len(frequencies(AIR)) * 3 + 2 * 3 + 2), "all bins of force; torque's means; roll and pitch rate's"

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, parts_of
+from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, cell_indices
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.judge import cell_gains, judge, left_over
+from airtouch.gap.evidence.judge import cell_gains, judge, judged_blocks
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
@@ -40,16 +40,16 @@ def test_the_right_effect_gains_in_its_own_channel_alone(pushed):
     """A constant forward force is in the lowest band of the force along x, in the air and at rest."""
     data, blocks = pushed
     gains = cell_gains(data, blocks, [biased(PUSH)])
-    view, band, channel = parts_of(int(np.argmax(gains)))
+    view, band, channel = cell_indices(int(np.argmax(gains)))
     assert (view, band, channel) == (REPLAY_VIEW, 0, COLUMN["force_x"]) and gains.max() > 10.0
-    np.testing.assert_allclose(gains[parts_of(np.arange(CELLS)).channel != COLUMN["force_x"]], 0.0, atol=1e-9)
+    np.testing.assert_allclose(gains[cell_indices(np.arange(CELLS)).channel != COLUMN["force_x"]], 0.0, atol=1e-9)
 
 
 def test_what_a_right_effect_leaves_is_noise_of_the_expected_power(pushed):
     data, blocks = pushed
-    remainder = left_over(data, blocks, [biased(PUSH)])
-    lift = remainder.problem.elements.channel == COLUMN["force_x"]
-    energy = np.abs(remainder.gap[lift]) ** 2 / remainder.power[lift]
+    judged = judged_blocks(data, blocks, [biased(PUSH)])
+    lift = judged.problem.elements.channel == COLUMN["force_x"]
+    energy = np.abs(judged.residual[lift]) ** 2 / judged.expected_power[lift]
     assert energy.mean() == pytest.approx(1.0, abs=4.0 / np.sqrt(OVERLAP_WEIGHT * lift.sum()))
 
 
@@ -58,8 +58,8 @@ def test_an_offset_is_fitted_anew_and_costs_what_its_prior_says():
     spread = np.zeros(COUNT)
     spread[COLUMN["force_x"]] = 2.0 * PUSH
     data = Data(replace(FLOOR, floor=replace(FLOOR.floor, offset=spread)), [hover(1, (PUSH, 0.0, 0.0), length_s=12.0)])
-    remainder = left_over(data, whole_of(data), ())
-    assert remainder.cost == pytest.approx(0.5 * 0.5 ** 2, rel=0.1)
-    assert judge(data, whole_of(data), ()) == remainder.log_likelihood - remainder.cost
+    judged = judged_blocks(data, whole_of(data), ())
+    assert judged.cost == pytest.approx(0.5 * 0.5 ** 2, rel=0.1)
+    assert judge(data, whole_of(data), ()) == judged.log_likelihood - judged.cost
     alone = Data(FLOOR, data.flights)
     assert judge(data, whole_of(data), ()) > judge(alone, whole_of(alone), ()) + 10.0

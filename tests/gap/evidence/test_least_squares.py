@@ -98,11 +98,12 @@ def problem():
 def test_weights_are_those_of_the_likelihoods_slope(problem):
     """Least squares with these weights rise as minus the log likelihood does, for small changes of the values."""
     rng = np.random.default_rng(4)
-    values = 3.0 * problem.elements.base
-    added = problem.elements.power * rng.uniform(0.0, 2.0, len(values))
+    values = 3.0 * problem.elements.residual
+    added = problem.elements.floor_power * rng.uniform(0.0, 2.0, len(values))
     weights = weights_of(problem, values, added)
     for _ in range(5):
-        column = np.sqrt(problem.elements.power) * (rng.normal(size=len(values)) + 1j * rng.normal(size=len(values)))
+        noise = rng.normal(size=(2, len(values)))
+        column = np.sqrt(problem.elements.floor_power) * (noise[0] + 1j * noise[1])
         up, down = (problem.likelihood(values + sign * 1e-5 * column, added) for sign in (1.0, -1.0))
         assert 2.0 * (weights @ (column.conj() * values).real) == pytest.approx(-(up - down) / 2e-5, rel=1e-4, abs=1e-2)
     unknown = replace(problem, flat=replace(problem.flat, elements=replace(
@@ -113,21 +114,21 @@ def test_weights_are_those_of_the_likelihoods_slope(problem):
 @pytest.mark.parametrize("louder", [0.0, 5.0])
 def test_offsets_that_are_subtracted_are_the_likeliest(problem, louder):
     """Each against SciPy's maximum of likelihood and prior; two steps of least squares come near it."""
-    values, added = problem.elements.base, louder * problem.elements.power
+    values, added = problem.elements.residual, louder * problem.elements.floor_power
     gap, cost = without_offsets(problem, values, added)
     amounts = []
     for offset in problem.offsets:
         changed = values.copy()
 
         def lost(amount, offset=offset, changed=changed):
-            changed[offset.places] = values[offset.places] - amount * offset.column
-            return 0.5 * (amount / offset.spread) ** 2 - problem.likelihood(changed, added)
+            changed[offset.indices] = values[offset.indices] - amount * offset.column
+            return 0.5 * (amount / offset.prior_std) ** 2 - problem.likelihood(changed, added)
 
-        best = minimize_scalar(lost, bounds=(-5.0 * offset.spread, 5.0 * offset.spread), method="bounded",
+        best = minimize_scalar(lost, bounds=(-5.0 * offset.prior_std, 5.0 * offset.prior_std), method="bounded",
                                options={"xatol": 1e-9})
-        here = offset.places[np.argmax(np.abs(offset.column))]
+        here = offset.indices[np.argmax(np.abs(offset.column))]
         amount = ((values - gap)[here] / offset.column[np.argmax(np.abs(offset.column))]).real
-        np.testing.assert_allclose((values - gap)[offset.places], amount * offset.column, atol=1e-9)
-        assert amount == pytest.approx(best.x, abs=0.02 * offset.spread) and lost(amount) < best.fun + 0.01
-        amounts.append(amount / offset.spread)
+        np.testing.assert_allclose((values - gap)[offset.indices], amount * offset.column, atol=1e-9)
+        assert amount == pytest.approx(best.x, abs=0.02 * offset.prior_std) and lost(amount) < best.fun + 0.01
+        amounts.append(amount / offset.prior_std)
     assert cost == pytest.approx(0.5 * np.sum(np.square(amounts))) and np.abs(amounts).max() > 0.5

@@ -48,7 +48,7 @@ def test_data_are_freed_with_their_last_use(no_collector):
     """Thousands of flights are diagnosed one after another: none waits for the garbage collector."""
     data = Data(declared_study(VEHICLE, ()), [flight(20.0)])
     freed = weakref.ref(data)
-    problem_of(data, whole_of(data)).values([])
+    problem_of(data, whole_of(data)).residual([])
     judge(data, whole_of(data), ())
     del data
     assert freed() is None

@@ -63,7 +63,7 @@ def bands(power, f, edges):
 
 def added_power(data, name, **values):
     term = replace(terms(name)[0], values={**terms(name)[0].values, **values})
-    return random_effects.power(data, term)
+    return random_effects.extra_power(data, term)
 
 
 @pytest.mark.parametrize("cutoff", [0.0, 30.0])
@@ -107,7 +107,7 @@ def test_power_of_thrust_noise_is_that_of_drawn_noise(steady, time):
     lifting = (drawn.sum(axis=1) / VEHICLE.mass_kg)[::per_sample]
     f, power = welch(np.column_stack([lifting, turning]), 100.0, nperseg=LENGTH[AIR], axis=0)
     term = next(t for t in terms("motor_noise") if t.values["time"] == time)
-    expected = random_effects.power(steady, replace(term, values={**term.values, "rms": rms}))[0]
+    expected = random_effects.extra_power(steady, replace(term, values={**term.values, "rms": rms}))[0]
     model = expected[AIR][0][:, [FORCE.stop - 1, *range(TORQUE.start, TORQUE.stop)]]
     above = 2.0 / np.pi * np.arctan(1.0 / (2.0 * np.pi * 250.0 * time))  # share of the lift's power above 250 Hz:
     model[:, 0] += above * 4.0 * (rms * LIFT_N / VEHICLE.mass_kg) ** 2 / 50.0  # it folds evenly, and is left out
@@ -122,7 +122,8 @@ def test_within_a_gate_a_block_has_that_share_of_the_power(steady):
     """The share of the window's square, SciPy's Hann window, that the gate covers."""
     (noise,) = terms("imu_noise")
     gate = (("synthetic", 3.0, 5.5), ("another", 0.0, 12.0))
-    whole, gated = (random_effects.power(steady, replace(noise.fitted(np.ones(1)), gate=g))[0][AIR] for g in ((), gate))
+    one = noise.fitted(np.ones(1))
+    whole, gated = (random_effects.extra_power(steady, replace(one, gate=g))[0][AIR] for g in ((), gate))
     window = get_window("hann", LENGTH[AIR]) ** 2
     t = 0.01 * np.arange(1200)
     acts = (t >= 3.0 - 1e-9) & (t < 5.5 - 1e-9)
@@ -150,7 +151,7 @@ def test_power_of_noise_is_that_of_simulated_flights(study):
     calm, noisy = (Data(study, fly(4, e, seed=7)) for e in ((), {"imu_noise": {"factor": 2.0}}))
     expected = added_power(calm, "imu_noise", factor=2.0)
     f = frequencies(AIR)
-    before, after = (np.concatenate([np.abs(b[AIR]) ** 2 for b in d.base]) for d in (calm, noisy))
+    before, after = (np.concatenate([np.abs(b[AIR]) ** 2 for b in d.residual]) for d in (calm, noisy))
     blocks = len(before)
     model = np.concatenate([e[AIR] for e in expected])
     edges = (4.0, 10.0, 20.0, 35.0, 50.0)
@@ -160,7 +161,7 @@ def test_power_of_noise_is_that_of_simulated_flights(study):
         by_chance = limit(of_mean(blocks, bins), 24)
         assert np.abs(of_band[[0, 1, 2, 5]]).max() < by_chance
         assert np.abs(of_band[3:5]).max() < max(by_chance, LOOP_DB)
-    resting = [np.concatenate([np.abs(b[REST][:, :, :3]) ** 2 for b in d.base]) for d in (calm, noisy)]
+    resting = [np.concatenate([np.abs(b[REST][:, :, :3]) ** 2 for b in d.residual]) for d in (calm, noisy)]
     ground = np.concatenate([e[REST] for e in expected])[:, :, :3].mean(axis=(0, 1))
     grown = resting[1].mean(axis=(0, 1)) - resting[0].mean(axis=(0, 1))
     few = limit(of_mean(*resting[0].shape[:2], LENGTH[REST]), 3)
@@ -174,7 +175,7 @@ def test_power_of_lines_is_that_of_simulated_flights(study_apart, amplitude):
     data = Data(study_apart, fly(2, effects, seed=11))
     expected = added_power(data, "vibration", amplitude=amplitude, gyro=0.05)
     f = frequencies(AIR)
-    for b, e in zip(data.base, expected, strict=True):
+    for b, e in zip(data.residual, expected, strict=True):
         measured = np.abs(b[AIR][:, :, :6]) ** 2 - study_apart.floor.power[AIR][:, :6]
         modelled = np.where(np.isnan(measured), np.nan, e[AIR][:, :, :6])
         total = decibels(bands(measured, f, (4.0, 50.0)), bands(modelled, f, (4.0, 50.0)))[0]

@@ -33,14 +33,14 @@ def central(function, which, step=0.01):
 
 
 def test_slopes_of_the_loop_are_its_differences(problem, slopes):
-    def torque_power(x):
-        return problem.torque_power(active_at(MEAN, x))
+    def extra_torque_power(x):
+        return problem.extra_torque_power(active_at(MEAN, x))
 
     def log_ratio(x):
         return np.log(problem.data.study.loop.ratio(active_at(MEAN, x)))
 
     lag, mass = slopes.by_parameter[0], slopes.by_parameter[-1]
-    for slope, function in ((lag.torque_power, torque_power), (lag.rise, log_ratio)):
+    for slope, function in ((lag.extra_torque_power, extra_torque_power), (lag.rise, log_ratio)):
         expected = central(function, 0)
         assert np.abs(expected).max() > 0.0
         assert np.abs(slope - expected).max() < 0.1 * np.abs(expected).max()
@@ -57,14 +57,14 @@ def test_slopes_of_the_loop_are_taken_anew_wherever_the_fit_stands(slopes):
 @pytest.mark.parametrize("uncertain_floor", [False, True])
 def test_gradient_by_the_power_is_that_of_the_likelihood(problem, slopes, uncertain_floor):
     """The gap stays as it is: only the power that is expected of it changes."""
-    values = problem.values(active_at(MEAN, AT))
+    residual = problem.residual(active_at(MEAN, AT))
 
     def level(x):
-        of_loop = problem.loop_power(active_at(MEAN, x), uncertain_floor)
-        return problem.likelihood(values, of_loop.power) - of_loop.cost
+        of_loop = problem.loop_change(active_at(MEAN, x), uncertain_floor)
+        return problem.likelihood(residual, of_loop.extra_power) - of_loop.cost
 
-    added = problem.loop_power(active_at(MEAN, AT), uncertain_floor).power
-    gradient, information = slopes.power_slopes(AT, values, added, uncertain_floor)
+    added = problem.loop_change(active_at(MEAN, AT), uncertain_floor).extra_power
+    gradient, information = slopes.power_slopes(AT, residual, added, uncertain_floor)
     for i in range(len(AT)):
         expected = central(level, i)
         assert gradient[i] == pytest.approx(expected, rel=0.03)
@@ -85,9 +85,9 @@ def test_slopes_of_a_linear_effect_are_its_differences(still):
     for i, slope in enumerate(slopes_at(still, [BIAS], x).by_parameter):
         one = x.copy()
         one[i] = 1.0
-        change = still.values(active_at([BIAS], one)) - still.values(active_at([BIAS], x))
+        change = still.residual(active_at([BIAS], one)) - still.residual(active_at([BIAS], x))
         np.testing.assert_allclose(slope.column, change, atol=1e-6 * np.abs(change).max())
-        assert not slope.nonlinear and not slope.torque_power.any()
+        assert not slope.nonlinear and not slope.extra_torque_power.any()
 
 
 def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(still):

@@ -9,7 +9,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.layout import Layout
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.torque_power import beside_edges, loops_differ, torque_power
+from airtouch.gap.evidence.torque_power import beside_edges, extra_torque_power, loops_differ
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COUNT, TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
@@ -35,9 +35,9 @@ def problem(study):
 
 
 def test_another_loop_changes_the_power_of_the_torque_alone(problem):
-    added, is_torque = problem.torque_power([LATE]), problem.flat.is_torque
+    added, is_torque = problem.extra_torque_power([LATE]), problem.flat.is_torque
     assert np.abs(added[is_torque]).max() > 0.0 and not added[~is_torque].any()
-    assert (problem.elements.power[:len(added)] + added > 0.0).all(), "a loop can take away no more than there is"
+    assert (problem.elements.floor_power[:len(added)] + added > 0.0).all(), "a loop can take away no more than there is"
 
 
 @pytest.mark.parametrize(("part", "grown", "added"), [
@@ -50,11 +50,12 @@ def test_that_part_of_the_floor_grows_which_the_loop_makes(part, grown, added):
     data = Data(FLOOR, [hover(1, length_s=12.0)])
     every_bin = {state: np.ones((len(frequencies(state)), COUNT), bool) for state in (AIR, REST)}
     layout = Layout(whole_of(data).pieces, every_bin)  # without a response torque counts in its means alone
-    channel, base = layout.channels(), layout.gather(data.base)
+    channel, residual = layout.channels(), layout.gather(data.residual)
     is_torque = (channel >= TORQUE.start) & (channel < TORQUE.stop)
     flat = SimpleNamespace(
-        layout=layout, replay_count=len(base), elements=SimpleNamespace(base=base, valid=np.isfinite(base)),
-        noise=np.random.default_rng(2).uniform(1.0, 2.0, len(base)), is_torque=is_torque)
+        layout=layout, replay_count=len(residual),
+        elements=SimpleNamespace(residual=residual, valid=np.isfinite(residual)),
+        noise=np.random.default_rng(2).uniform(1.0, 2.0, len(residual)), is_torque=is_torque)
     floor = FLOOR.floor.power[AIR][:, TORQUE]
     one = np.ones((2, *floor.shape))
     before = part * floor
@@ -64,19 +65,20 @@ def test_that_part_of_the_floor_grows_which_the_loop_makes(part, grown, added):
     per_bin = np.zeros((len(floor), COUNT))
     per_bin[FIRST_BIN:, TORQUE] = added
     expected = flat.noise * layout.per_bin({AIR: per_bin, REST: np.zeros(every_bin[REST].shape)})
-    np.testing.assert_allclose(torque_power(with_loop, flat, [LATE]), expected, atol=1e-12 * flat.noise.max())
+    np.testing.assert_allclose(extra_torque_power(with_loop, flat, [LATE]), expected, atol=1e-12 * flat.noise.max())
     assert (expected != 0.0).any() and not expected[~is_torque].any()
 
 
 def test_what_leaves_the_loop_adds_no_power(problem):
-    assert not problem.torque_power([]).any() and not problem.torque_power([HEAVY]).any()
-    np.testing.assert_array_equal(problem.torque_power([LATE, HEAVY])[~problem.flat.is_torque], 0.0)
+    assert not problem.extra_torque_power([]).any() and not problem.extra_torque_power([HEAVY]).any()
+    np.testing.assert_array_equal(problem.extra_torque_power([LATE, HEAVY])[~problem.flat.is_torque], 0.0)
 
 
 def test_without_a_loop_nothing_is_known_of_it():
     data = Data(FLOOR, [hover(1, length_s=8.0)])
     problem = problem_of(data, whole_of(data))
-    assert not problem.torque_power([LATE]).any() and len(problem.torque_power([LATE])) == problem.flat.replay_count
+    extra = problem.extra_torque_power([LATE])
+    assert not extra.any() and len(extra) == problem.flat.replay_count
     assert not loops_differ(data, [], [LATE])
 
 

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.judge import judge
 from airtouch.gap.nameless import model
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import WIDEST
-from airtouch.gap.nameless.regression import PartResiduals, coefficients
+from airtouch.gap.nameless.regression import BlockResiduals, coefficients
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signatures import candidates
 from airtouch.simulation import effects
@@ -50,7 +50,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
     flights = fly(1, 45, {"sideways": {"push": PUSH}})
     data = Data(study, flights)
-    push_per_speed = [coefficients(PartResiduals(data, p, ()), 1, study.nameless_floor)[BASIS.index("vx")]
+    push_per_speed = [coefficients(BlockResiduals(data, p, ()), 1, study.nameless_floor)[BASIS.index("vx")]
                       for p in halves(data)]
     np.testing.assert_allclose(push_per_speed, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, flights) > 30.0

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import WIDEST, allowed_columns
-from airtouch.gap.nameless.regression import PartResiduals, coefficients
+from airtouch.gap.nameless.regression import BlockResiduals, coefficients
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.signatures import candidates
 from gap_flights import fly
@@ -16,10 +16,10 @@ from gap_flights import fly
 def test_torque_that_answers_the_commands_otherwise_shows_in_simulated_flights(study):
     """Half as much inertia again; recorded flights' loop is not modelled as well."""
     data = Data(study, fly(1, 50, {"inertia": {"fraction": 0.5}}))
-    halves_coefficients = [coefficients(PartResiduals(data, p, ()), 4, study.nameless_floor) for p in halves(data)]
+    halves_coefficients = [coefficients(BlockResiduals(data, p, ()), 4, study.nameless_floor) for p in halves(data)]
     assert all(f[len(BASIS):].any() for f in halves_coefficients)
     among = np.arange(WIDEST) < len(BASIS)
-    recorded = [coefficients(PartResiduals(data, p, ()), 4, study.nameless_floor, among)
+    recorded = [coefficients(BlockResiduals(data, p, ()), 4, study.nameless_floor, among)
                 for p in halves(data)]
     assert not any(f[len(BASIS):].any() for f in recorded)
 

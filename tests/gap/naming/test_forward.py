@@ -27,7 +27,7 @@ POLICY = policy_of(scattered(exact=True), 30.0)  #: of simulated flights
 def select(monkeypatch):
     """A selection among candidates {name: (own gain, evidence)}, which gain as much beside others as alone.
 
-    Returns the state, and the names that were judged in each round.
+    Returns the partial selection, and the names that were judged in each round.
     """
     def run(candidates, passing=None, screened=(), least_evidence=FIRST_GAIN):
         def candidate(name, base_gain=0.0):
@@ -50,21 +50,21 @@ def select(monkeypatch):
     return run
 
 
-def names(state):
-    return [(s.name, s.is_named) for s in state.steps]
+def names(partial):
+    return [(s.name, s.is_named) for s in partial.steps]
 
 
 def test_the_largest_gain_is_added_first_up_to_most_effects(select):
-    state, _ = select({n: (100.0 * k, 20.0) for k, n in enumerate("abcde", 1)})
-    assert names(state) == [("e", True), ("d", True), ("c", True)] and len(state.steps) == MOST_EFFECTS
-    assert state.gain == 1200.0
+    partial, _ = select({n: (100.0 * k, 20.0) for k, n in enumerate("abcde", 1)})
+    assert names(partial) == [("e", True), ("d", True), ("c", True)] and len(partial.steps) == MOST_EFFECTS
+    assert partial.gain == 1200.0
 
 
 def test_a_small_gain_or_a_screened_candidate_is_not_added(select):
-    state, _ = select({"a": (FIRST_GAIN - 0.1, 20.0), "b": (100.0, 20.0)}, screened=("b",))
-    assert state.steps == () and state.gain == 0.0
-    state, _ = select({"a": (50.0, 20.0), "b": (LEAST_GAIN - 0.1, 20.0)})
-    assert names(state) == [("a", True)], "beside another it needs more"
+    partial, _ = select({"a": (FIRST_GAIN - 0.1, 20.0), "b": (100.0, 20.0)}, screened=("b",))
+    assert partial.steps == () and partial.gain == 0.0
+    partial, _ = select({"a": (50.0, 20.0), "b": (LEAST_GAIN - 0.1, 20.0)})
+    assert names(partial) == [("a", True)], "beside another it needs more"
 
 
 def test_evidence_decides_a_close_race_up_to_certain(select):
@@ -74,10 +74,10 @@ def test_evidence_decides_a_close_race_up_to_certain(select):
 
 def test_three_deviations_are_added_and_no_more(select):
     deviations = {n: (200.0 + k, FIRST_GAIN - 0.1) for k, n in enumerate("abcde")}
-    state, _ = select(deviations)
-    assert names(state) == [("e", False), ("d", False), ("c", False)] and state.deviations == MOST_DEVIATIONS
-    state, _ = select({**deviations, "f": (30.0, FIRST_GAIN)})
-    assert names(state)[3:] == [("f", True)] and state.names == ["f"]
+    partial, _ = select(deviations)
+    assert names(partial) == [("e", False), ("d", False), ("c", False)] and partial.deviations == MOST_DEVIATIONS
+    partial, _ = select({**deviations, "f": (30.0, FIRST_GAIN)})
+    assert names(partial)[3:] == [("f", True)] and partial.names == ["f"]
 
 
 def test_first_name_beside_a_deviation_needs_as_much_gain_as_evidence(select):
@@ -95,8 +95,8 @@ def test_how_much_evidence_names_an_effect_depends_on_the_flights(select):
 def test_random_misfit_is_a_deviation(select):
     deviations = {n: (400.0 + k, FIRST_GAIN - 0.1) for k, n in enumerate("abcde")}
     evident = {"f": (150.0, 20.0), "imu_noise": (140.0, 20.0)}
-    state, _ = select({**deviations, **evident})
-    assert names(state) == [("e", False), ("d", False), ("c", False), ("f", True), ("imu_noise", False)]
+    partial, _ = select({**deviations, **evident})
+    assert names(partial) == [("e", False), ("d", False), ("c", False), ("f", True), ("imu_noise", False)]
 
 
 def test_small_gains_are_not_judged_again_beside_a_deviation(select):
@@ -109,17 +109,17 @@ def test_small_gains_are_not_judged_again_beside_a_deviation(select):
 
 def test_passing_effect_is_the_first_step(select):
     passing = Candidate("wake", (), 60.0, evidence=30.0)
-    state, _ = select({"a": (100.0, 20.0)}, passing)
-    assert names(state) == [("wake", True), ("a", True)]
-    assert state.single_effects["wake"] is passing and state.least_nats["wake"] == LEAST_GAIN
+    partial, _ = select({"a": (100.0, 20.0)}, passing)
+    assert names(partial) == [("wake", True), ("a", True)]
+    assert partial.single_effects["wake"] is passing and partial.least_nats["wake"] == LEAST_GAIN
 
 
 @pytest.mark.parametrize(("closer", "first"), [(0.9, ("named", True)), (1.1, ("deviation", False))])
 def test_deviation_goes_before_a_name_by_a_misfit_share(select, closer, first):
     """Two of thousands of nats; the deviation gains `closer` of the share more than what nominal flights lack."""
     named = 20_000.0 * (1.0 - closer * MISFIT_SHARE_DEVIATION)
-    state, _ = select({"deviation": (20_000.0, FIRST_GAIN - 0.1), "named": (named, FIRST_GAIN)})
-    assert names(state)[0] == first
+    partial, _ = select({"deviation": (20_000.0, FIRST_GAIN - 0.1), "named": (named, FIRST_GAIN)})
+    assert names(partial)[0] == first
 
 
 @pytest.mark.parametrize("nominal_loss", [True, False])

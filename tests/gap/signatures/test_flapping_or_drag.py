@@ -69,8 +69,8 @@ def test_a_fit_tells_flapping_from_drag_by_its_moment_alone(study, tilt):
         return judge(data, blocks, fit(data, blocks, [term]).terms) - judge(data, blocks, ())
 
     def energy(*wrenches):
-        ours, theirs = (problem.values(activate(w)) for w in (*wrenches, {})[:2])
-        return OVERLAP_WEIGHT * float(np.sum(squared(ours - theirs) / problem.elements.power))
+        ours, theirs = (problem.residual(activate(w)) for w in (*wrenches, {})[:2])
+        return OVERLAP_WEIGHT * float(np.sum(squared(ours - theirs) / problem.elements.floor_power))
 
     (flapping,), (drag, *_) = candidates.terms("blade_flapping"), candidates.terms("rotor_drag")
     in_the_centre = replace(flapping, values={**flapping.values, **NO_MOMENT})

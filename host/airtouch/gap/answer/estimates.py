@@ -56,7 +56,7 @@ def from_spectra(data: Data, term: Term, fitted: FittedTerms, halves: Sequence[F
     term: one of `fitted`, which is fitted to all the data; halves: fits of the same effects to each half, or none.
     """
     if term.shows_in == MEAN:
-        place = fitted.place(term)
+        place = fitted.slice_of(term)
         x, covariance = fitted.scaled[place], fitted.covariance[place, place]
     else:
         x, covariance = term.scaled(term.values), strength_variance(data, whole_of(data), fitted.terms, term)

@@ -171,6 +171,6 @@ def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term
     random = random_of(effects)
     if not random:
         return power
-    of_random = sum(sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
+    of_random = sum(sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
                     for data in (Data(study, [g.flight]) for g in gaps))
     return power * floor / (floor + of_random / len(gaps))

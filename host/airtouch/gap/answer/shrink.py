@@ -18,7 +18,7 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS
 from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.judge import CELL_GAIN, LeftOver, cell_gains, left_over
+from airtouch.gap.evidence.judge import CELL_GAIN, JudgedBlocks, cell_gains, judged_blocks
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Closure, Quantity
@@ -169,18 +169,18 @@ def _held_out(data: Data, halves: Sequence[BlockSet], terms: Sequence[Sequence[T
     The energy is that of what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
-        remainder = left_over(data, halves[half], terms[1 - half])
-        cell = remainder.problem.flat.cells
-        use = remainder.problem.elements.valid & cells[half][cell]
-        yield cell[use], _energy(remainder)[use]
+        judged = judged_blocks(data, halves[half], terms[1 - half])
+        cell = judged.problem.flat.cells
+        use = judged.problem.elements.valid & cells[half][cell]
+        yield cell[use], _energy(judged)[use]
 
 
 def _standing_out(data: Data, half: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Mask (CELLS,) of the cells that show a gap in a half of the data, or in which effects fitted to it gain."""
-    remainder = left_over(data, half, ())
-    cell, valid = remainder.problem.flat.cells, remainder.problem.elements.valid
+    judged = judged_blocks(data, half, ())
+    cell, valid = judged.problem.flat.cells, judged.problem.elements.valid
     count = np.bincount(cell, valid, CELLS)
-    mean = np.bincount(cell, _energy(remainder) * valid, CELLS) / np.maximum(count, 1)
+    mean = np.bincount(cell, _energy(judged) * valid, CELLS) / np.maximum(count, 1)
     error = np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1)))
     out = mean > 1.0 + STANDARD_ERRORS * error + MARGIN
     if terms:
@@ -188,6 +188,6 @@ def _standing_out(data: Data, half: BlockSet, terms: Sequence[Term]) -> np.ndarr
     return out & (count >= FEWEST_VALUES)
 
 
-def _energy(remainder: LeftOver) -> np.ndarray:
+def _energy(judged: JudgedBlocks) -> np.ndarray:
     """Energy (n,) of each value, LARGEST_ENERGY at most."""
-    return np.minimum(squared(remainder.gap) / remainder.power, LARGEST_ENERGY)
+    return np.minimum(squared(judged.residual) / judged.expected_power, LARGEST_ENERGY)

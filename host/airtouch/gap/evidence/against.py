@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 
 class Against(NamedTuple):
-    """Nats that speak against the named effects, and the limit: as many as may where these are right.
+    """Nats that speak against the named effects, and the limit up to which these may still be right.
 
-    of_distance: whether they are the excess of a flight's distance (`relations.inference`), not the gain of a nameless
-    disturbance or model.
+    of_distance: whether the nats are the excess of a flight's distance (`relations.inference`), not the gain of a
+    nameless disturbance or model.
     """
 
     nats: float
@@ -16,5 +16,5 @@ class Against(NamedTuple):
 
     @property
     def is_too_much(self) -> bool:
-        """Whether more speaks against the effects than may."""
+        """Whether the nats exceed the limit."""
         return self.nats > self.limit

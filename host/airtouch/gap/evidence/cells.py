@@ -1,9 +1,9 @@
 """Cells of flattened spectra: each is one channel in one band of frequencies of one view, and has a number.
 
-    number = VIEW_STRIDE * view + COUNT * band + channel        `cell_numbers`; `parts_of` is its inverse
+    number = VIEW_STRIDE * view + COUNT * band + channel        `cell_numbers`; `cell_indices` is its inverse
 
-view: REPLAY_VIEW, REST_VIEW or COMMAND_VIEW; channel: its place in `channels.CHANNELS`, of which there are COUNT; band:
-its place in `blocks.BANDS_HZ`, counted from 0, but from 1 in the command view (COMMAND_FIRST_BAND). So band 0 is the
+view: REPLAY_VIEW, REST_VIEW or COMMAND_VIEW; channel: its index in `channels.CHANNELS`, of which there are COUNT; band:
+its index in `blocks.BANDS_HZ`, counted from 0, but from 1 in the command view (COMMAND_FIRST_BAND). So band 0 is the
 one with the means, which the command view does not have.
 
 `channel_cells`, `sensor_cells` and `band_cells` make groups of cells: they give each cell the number of the first cell
@@ -26,8 +26,8 @@ NYQUIST_HZ = 0.5 / PERIOD_S  #: end of the highest band
 SENSOR_AXES = 3  #: channels of one sensor (x, y and z), which follow one another in `channels.CHANNELS`
 
 
-class CellParts(NamedTuple):
-    """The parts of cells' numbers: view, band and channel, integers (n,); of one number one integer each."""
+class CellIndices(NamedTuple):
+    """Indices of the view, band and channel of n cells, integers (n,); of one cell one integer each."""
 
     view: np.ndarray
     band: np.ndarray
@@ -35,7 +35,7 @@ class CellParts(NamedTuple):
 
 
 class CellPlace(NamedTuple):
-    """What a cell stands for: number of its view, name of its channel, ends of its band."""
+    """What a cell stands for: number of its view, name of its channel, lower and upper end of its band, Hz."""
 
     view: int
     channel: str
@@ -47,15 +47,15 @@ def cell_numbers(view: np.ndarray | int, band: np.ndarray, channel: np.ndarray) 
     return band * COUNT + channel + VIEW_STRIDE * view
 
 
-def parts_of(cell: np.ndarray | int) -> CellParts:
+def cell_indices(cell: np.ndarray | int) -> CellIndices:
     """View, band and channel of cells by their numbers: the inverse of `cell_numbers`."""
     view, within = np.divmod(cell, VIEW_STRIDE)
-    return CellParts(view, *np.divmod(within, COUNT))
+    return CellIndices(view, *np.divmod(within, COUNT))
 
 
 def channel_cells() -> np.ndarray:
     """For each cell (CELLS,) the number of the first cell of its view and channel, all bands together."""
-    view, _, channel = parts_of(np.arange(CELLS))
+    view, _, channel = cell_indices(np.arange(CELLS))
     return cell_numbers(view, np.zeros_like(channel), channel)
 
 
@@ -64,24 +64,24 @@ def sensor_cells() -> np.ndarray:
 
     A sensor has SENSOR_AXES channels; of the commands thrust, roll and pitch count as one, yaw as another.
     """
-    view, band, channel = parts_of(np.arange(CELLS))
+    view, band, channel = cell_indices(np.arange(CELLS))
     return cell_numbers(view, band, channel - channel % SENSOR_AXES)
 
 
 def band_cells() -> np.ndarray:
     """For each cell (CELLS,) the number of the first cell of its view and band, all channels together."""
-    view, band, _ = parts_of(np.arange(CELLS))
+    view, band, _ = cell_indices(np.arange(CELLS))
     return cell_numbers(view, band, np.zeros_like(band))
 
 
 def above_means() -> np.ndarray:
     """Whether each cell (CELLS,) is in a band above band 0, which has the means; every cell of the commands is."""
-    return parts_of(np.arange(CELLS)).band > 0
+    return cell_indices(np.arange(CELLS)).band > 0
 
 
 def place_of(cell: int) -> CellPlace:
-    """What the cell of a number stands for."""
-    view, band, channel = (int(part) for part in parts_of(cell))
+    """What the cell with a number stands for."""
+    view, band, channel = (int(index) for index in cell_indices(cell))
     lowest = COMMAND_FIRST_BAND if view == COMMAND_VIEW else 0
     low, high = BANDS_HZ[max(band - lowest, 0):][:2]
     return CellPlace(view, CHANNELS[channel].name, (low, min(high, NYQUIST_HZ)))

@@ -1,4 +1,4 @@
-"""Effects on the logged times alone: how far the clock and the losses are from nominal flights'."""
+"""Effects on the logged times alone: how far jitter and lost rows exceed those of nominal flights."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -22,7 +22,10 @@ CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen. A lar
 
 
 class TimesFault(NamedTuple):
-    """Size of a fault of the logged times, and the log likelihood that it gains over nominal flights'."""
+    """Size of a fault of the logged times, and the log likelihood, nats, that it gains over the nominal size.
+
+    size: s of jitter, or fraction of lost samples.
+    """
 
     size: float
     gain: float
@@ -50,22 +53,22 @@ def jitter(data: Data) -> TimesFault:
 
 
 def loss(data: Data) -> TimesFault:
-    """Loss of rows: its size is the share of lost samples.
+    """Loss of rows: its size is the fraction of lost samples.
 
-    The gain is that of samples each lost with the measured share, over the nominal one (binomial).
+    The gain is that of samples each lost with the measured fraction, over the nominal one (binomial).
     """
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
     least = LEAST_LOST if data.study.loop is None else LEAST_LOST_OF_LOOP
-    share, nominal = float(missing.mean()), max(data.study.floor.lost, least)
-    if share <= nominal:
-        return TimesFault(share, 0.0)
+    fraction, nominal = float(missing.mean()), max(data.study.floor.lost, least)
+    if fraction <= nominal:
+        return TimesFault(fraction, 0.0)
     n = len(missing) / SAMPLES_OF_ONE
-    arrived = (1.0 - share) * np.log((1.0 - share) / (1.0 - nominal))
-    return TimesFault(share, float(n * (share * np.log(share / nominal) + arrived)))
+    arrived = (1.0 - fraction) * np.log((1.0 - fraction) / (1.0 - nominal))
+    return TimesFault(fraction, float(n * (fraction * np.log(fraction / nominal) + arrived)))
 
 
 class MeasuredTerm(NamedTuple):
-    """An effect on the logged times with its parameter as measured, and its gain, nats."""
+    """An effect on the logged times with its parameter as measured, and its gain over nominal times, nats."""
 
     term: Term
     gain: float
@@ -78,12 +81,12 @@ def clock_gain(data: Data, term: Term) -> MeasuredTerm:
 
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
-    """Sum of the gains in log likelihood of those terms that act on the logged times."""
+    """Nats that those terms gain together which act on the logged times."""
     return sum(clock_gain(data, t).gain for t in terms if t.shows_in == CLOCK)
 
 
 def clock_left(data: Data, terms: Sequence[Term]) -> float:
-    """Nats that the logged times gain beyond nominal flights', less those of the faults that effects explain."""
+    """Nats that jitter and lost rows gain over nominal ones, without those of the faults that effects explain."""
     of_times = [t for t in terms if t.shows_in == CLOCK]
     loss_explained = any(t.signature.loses_rows for t in of_times)
     jitter_explained = any(not t.signature.loses_rows for t in of_times)

@@ -1,6 +1,7 @@
-"""Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says.
+"""Flights as a diagnosis sees them: short-time spectra of the residual, measured minus modelled.
 
-COUNT: the channels of `signals.channels`, in whose units the spectra are.
+COUNT: the number of channels of `signals.channels`, in whose units the spectra are. AIR, REST: the states of a block
+(`signals.spectra`).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -19,19 +20,20 @@ from airtouch.gap.study import Study
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
-# Of these three a larger number needs more memory, a smaller one computes more spectra anew.
-KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights that are not long; chosen
-KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached; chosen
-LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are; chosen
+# Of these three, all chosen, a larger number needs more memory, a smaller one computes more spectra anew.
+KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights of KEPT_SAMPLES or less
+KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached
+LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are
 Spectra = dict[str, np.ndarray]  #: of one flight by state (AIR, REST), complex (blocks, bins, COUNT), unit/sqrt(Hz)
 BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Flights with their blocks and the spectra of the gap before any effect is added, each made at its first use.
+    """Flights with their blocks and the spectra of their residual without effects, each made at its first use.
 
-    study: what nominal flights show; flights: those that are judged; workspace: what is cached of them.
+    study: what nominal flights show; flights: those that are judged; workspace: what is cached of them. Cached spectra
+    are shared: nobody may write to them. Two objects are equal only where they are one, as no two share a cache.
     """
 
     study: Study
@@ -65,7 +67,10 @@ class Data:
 
     @cached_property
     def quiet(self) -> list[np.ndarray]:
-        """In which blocks in the air and axes (blocks, 3) no set-point stepped, by flight; empty without a response."""
+        """Whether no set-point stepped, by flight, for each block in the air and axis (blocks, 3), bool.
+
+        The list is empty without a response.
+        """
         response = self.study.response
         return [] if response is None else [response.quiet(command_torque(self, i)) for i in range(len(self.flights))]
 
@@ -78,24 +83,24 @@ class Data:
                 for f, first, where in zip(self.flights, self.first, quiet, strict=True)]
 
     @cached_property
-    def base(self) -> list[Spectra]:
-        """Spectra (blocks, bins, COUNT) of the gap without effects, by flight and state, unit/sqrt(Hz)."""
-        return gap_spectra(self, ())
+    def residual(self) -> list[Spectra]:
+        """Spectra (blocks, bins, COUNT) of the residual without effects, by flight and state, unit/sqrt(Hz)."""
+        return residual_spectra(self, ())
 
 
-def gap_spectra(data: Data, active: Sequence[Active], flights: Iterable[int] | None = None) -> list[Spectra]:
-    """Spectra of the gap with effects in the model, by flight and state.
+def residual_spectra(data: Data, active: Sequence[Active], flights: Iterable[int] | None = None) -> list[Spectra]:
+    """Spectra (blocks, bins, COUNT) of the residual with effects in the model, by flight and state, unit/sqrt(Hz).
 
     The channels of the commands are 0: the command view judges them. Where nominal flights show how the gyro follows
     the commands (`Study.response`), torque is compared with what that leads to expect, else with the replay's.
-    flights: places in `Data.flights` of those that are worked out, all by default; the others' are empty.
+    flights: indices in `Data.flights` of those that are worked out, all by default; the others' are empty.
     """
     needed = range(len(data.flights)) if flights is None else set(flights)
-    return [_gap_of(data, i, active) if i in needed else {} for i in range(len(data.flights))]
+    return [_residual_of(data, i, active) if i in needed else {} for i in range(len(data.flights))]
 
 
-def _gap_of(data: Data, i: int, active: Sequence[Active]) -> Spectra:
-    """`gap_spectra` of flight i."""
+def _residual_of(data: Data, i: int, active: Sequence[Active]) -> Spectra:
+    """The entry of flight i in `residual_spectra`."""
     response = data.study.response
     replayed = [a for a in active if not signature_of(a.effect).commands_only]
     if response is None:
@@ -105,33 +110,32 @@ def _gap_of(data: Data, i: int, active: Sequence[Active]) -> Spectra:
 
 def _by_response(data: Data, i: int, response: Response, active: Sequence[Active], replayed: Sequence[Active],
                  ) -> Spectra:
-    """Spectra of the gap of flight i, torque compared with what the commands lead to expect.
+    """Spectra of the residual of flight i, torque compared with what the commands lead to expect.
 
     replayed: the effects that do not show in the commands alone.
     """
-    gap = _replay_spectra(data, i, replayed)
+    residual = _replay_spectra(data, i, replayed)
     if data.flights[i].rates is None:
-        return gap
+        return residual
     loop = data.study.loop
     assert loop is not None  # a response is known of nominal flights, and so is their loop
     not_loop = [a for a in replayed if not loop.changes_loop((a,))]
     by_command = [a for a in not_loop if a.effect.wrench is None]
-    torque = _torque(data.measured_torque[i], *(_replay_spectra(data, i, some) for some in ((), by_command, not_loop)))
+    torque = _torque_spectra(data, i, by_command, not_loop)
     change = loop.torque_change(active, frequencies(AIR))
-    return {**gap, AIR: response.with_torque_gap(gap[AIR], data.quiet[i], torque, change)}
+    return {**residual, AIR: response.with_torque_gap(residual[AIR], data.quiet[i], torque, change)}
 
 
-def _torque(measured: np.ndarray, nominal: Spectra, driven: Spectra, disturbed: Spectra) -> TorqueSpectra:
-    """Torque of a flight in the air, from spectra of the gap under three hypotheses.
+def _torque_spectra(data: Data, i: int, by_command: Sequence[Active], not_loop: Sequence[Active]) -> TorqueSpectra:
+    """Torque of flight i in the air, and what effects change of it; None for a change that no effect makes.
 
-    nominal: without effects; driven: with those that act through the commands; disturbed: with outside torques as well.
-    Two that are of the same effects are the same object of the cache, and their difference is None.
+    by_command: effects that act through the commands; not_loop: these, and beside them those that push from outside.
     """
-    gap = nominal[AIR][:, :, TORQUE]
-    by_command = None if driven[AIR] is nominal[AIR] else driven[AIR][:, :, TORQUE] - gap
-    disturbance = None if disturbed[AIR] is driven[AIR] else \
-        disturbed[AIR][:, :, TORQUE] - driven[AIR][:, :, TORQUE]
-    return TorqueSpectra(measured, measured - gap, by_command, disturbance)
+    nominal, driven, disturbed = (_replay_spectra(data, i, some)[AIR][:, :, TORQUE]
+                                  for some in ((), by_command, not_loop))
+    return TorqueSpectra(data.measured_torque[i], data.measured_torque[i] - nominal,
+                         driven - nominal if by_command else None,
+                         disturbed - driven if len(not_loop) > len(by_command) else None)
 
 
 def command_torque(data: Data, i: int) -> np.ndarray:
@@ -140,10 +144,10 @@ def command_torque(data: Data, i: int) -> np.ndarray:
 
 
 def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> list[Spectra] | None:
-    """Power by flight and state, as `gap_spectra`, by which the gap is uncertain where a set-point stepped.
+    """Power (blocks, bins, COUNT) by flight and state by which the residual is uncertain where a set-point stepped.
 
     The limits of the commands clip the torque of a step, and effects of the loop change how much they clip. None where
-    they do not. flights: as for `gap_spectra`.
+    they do not. Power in unit^2/Hz; flights: as for `residual_spectra`.
     """
     response, loop = data.study.response, data.study.loop
     change = loop.torque_change(active, frequencies(AIR)) if response is not None and loop is not None else None
@@ -151,7 +155,7 @@ def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> 
         return None
     out: list[Spectra] = [{} for _ in data.flights]
     for i in set(flights):
-        out[i] = {state: np.zeros(x.shape) for state, x in data.base[i].items()}
+        out[i] = {state: np.zeros(x.shape) for state, x in data.residual[i].items()}
         if data.flights[i].rates is not None:
             doubt = response.doubt(data.quiet[i], command_torque(data, i), change)
             out[i][AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
@@ -159,7 +163,7 @@ def step_doubt(data: Data, active: Sequence[Active], flights: Iterable[int]) -> 
 
 
 def _without_scaling(data: Data, i: int, active: Sequence[Active]) -> Spectra:
-    """Spectra of the gap of flight i without a response of nominal flights.
+    """Spectra of the residual of flight i without a response of nominal flights.
 
     Effects that only scale the torque are left out of it. Here the torque counts in its means alone; they are the trim,
     which such an effect would shrink although it does not cause it.
@@ -175,7 +179,7 @@ def _without_scaling(data: Data, i: int, active: Sequence[Active]) -> Spectra:
 
 
 def _replay_spectra(data: Data, i: int, active: Sequence[Active]) -> Spectra:
-    """Spectra of what was measured in flight i minus what the model makes of the logged commands."""
+    """Spectra of what was measured in flight i minus what the model makes of the logged commands; cached."""
     return _cached(data, "spectra", i, active, lambda: _replayed(data, i, active))
 
 
@@ -184,7 +188,7 @@ def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
     flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
     bridged = bridged_residual(flight, (*data.study.calibration, *active))
     out = {}
-    for state, begin in data.first[i].items():  # commands are the command view's: nothing is left of them here
+    for state, begin in data.first[i].items():  # the command view judges the commands: here they stay 0
         replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, state)
         out[state] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[state][:, :, :COMMAND.start] = replayed
@@ -194,7 +198,8 @@ def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
 def _cached(data: Data, name: str, i: int, active: Sequence[Active], make: Callable[[], Spectra]) -> Spectra:
     """Spectra of flight i under a hypothesis, made once while it is among the last used; of no effect always.
 
-    Those of KEPT_SPECTRA hypotheses are kept, of fewer where all flights have more than KEPT_SAMPLES.
+    The key is the flight's index with the names and values of the effects (`Active.key`), never the identity of an
+    object. Those of KEPT_SPECTRA hypotheses are kept, of fewer where all flights have more than KEPT_SAMPLES.
     """
     if not active:
         return data.workspace.cached(f"{name} of no effect", i, make)

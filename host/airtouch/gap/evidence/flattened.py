@@ -19,27 +19,27 @@ from airtouch.gap.signals.spectra import AIR, REST, frequencies, judged_bins, sh
 from airtouch.gap.workspace import Workspace
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
-#: degrees of freedom that each nominal block adds to the floor's; chosen. A larger number trusts a floor of few blocks
-#: more than it may, so that what is only an error of the floor counts as evidence
+#: degrees of freedom that each block of nominal flights adds to those of the floor; chosen. A larger number trusts a
+#: floor of few blocks more than is right, so that what is only an error of the floor counts as evidence
 FREEDOM_OF_BLOCK = 3.0
-LEAST_FREEDOM = 2.0  #: degrees of freedom of the floor, however few its blocks are; chosen. A larger number errs alike
+LEAST_FREEDOM = 2.0  #: degrees of freedom of a floor of no block; chosen. A larger number errs as FREEDOM_OF_BLOCK does
 
 
 class Offset(NamedTuple):
-    """What a unit offset of one channel of one flight adds to the gap.
+    """An offset of one channel of one flight, of which each nominal flight has another.
 
-    places (m,): of the values that it changes, in ascending order; column, complex (m,): how much there; spread:
-    standard deviation of the offset's prior, in the channel's unit.
+    indices (m,): of the values that it changes, ascending; column, complex (m,): what an offset of 1 adds to the
+    residual there, 1/sqrt(Hz); prior_std: standard deviation of the offset's prior, in the channel's unit.
     """
 
-    places: np.ndarray
+    indices: np.ndarray
     column: np.ndarray
-    spread: float
+    prior_std: float
 
-    def at(self, places: np.ndarray) -> np.ndarray:
-        """What a unit offset adds, complex (k,), to the values at k places, all different; 0 where it changes none."""
-        out = np.zeros(len(places), complex)
-        _, there, here = np.intersect1d(places, self.places, assume_unique=True, return_indices=True)
+    def at(self, indices: np.ndarray) -> np.ndarray:
+        """What an offset of 1 adds, complex (k,), to the values at k indices, all different; 0 where it adds none."""
+        out = np.zeros(len(indices), complex)
+        _, there, here = np.intersect1d(indices, self.indices, assume_unique=True, return_indices=True)
         out[there] = self.column[here]
         return out
 
@@ -48,14 +48,14 @@ class Offset(NamedTuple):
 class Elements:
     """What is known of flattened values (n,) before any hypothesis.
 
-    base: complex, the gap without effects, unit/sqrt(Hz), 0 where it is not valid; power: its expected power,
-    unit^2/Hz; valid: bool, False where the log lacks what the value is made of; channel: its place in
-    `channels.CHANNELS`; flight: its place in `Data.flights`; freedom, tail_scale: degrees of freedom and scale of the
-    likelihood's tails.
+    residual: complex, without effects, unit/sqrt(Hz), 0 where it is not valid; floor_power: expected of it, what lost
+    rows add included, unit^2/Hz; valid: bool, False where the log lacks what the value is made of; channel: its index
+    in `channels.CHANNELS`; flight: its index in `Data.flights`; freedom, tail_scale: degrees of freedom and scale of
+    the likelihood's tails.
     """
 
-    base: np.ndarray
-    power: np.ndarray
+    residual: np.ndarray
+    floor_power: np.ndarray
     valid: np.ndarray
     channel: np.ndarray
     flight: np.ndarray
@@ -71,9 +71,9 @@ class Elements:
 class Flattened:
     """Some blocks of flights as values (n,): first those of the replay view, then those of the commands.
 
-    layout: of the replay view's values; elements: of all values; noise (replay,): power of the replay view's floor,
-    without what lost rows add; offsets: those between flights, no two with a place in common; air: the blocks in the
-    air of the replay view; workspace: what others keep of these blocks.
+    layout: of the replay view's values; commands: the command view; elements: of all values; noise (replay,): floor
+    power of the replay view without what lost rows add; offsets: those between flights, of which no two change the same
+    value; air: the blocks in the air of the replay view; workspace: what is cached of these blocks.
     """
 
     layout: Layout
@@ -93,7 +93,7 @@ class Flattened:
     def likelihood(self) -> Likelihood:
         """The likelihood of all values."""
         e = self.elements
-        return Likelihood(e.power, e.freedom, e.tail_scale, e.valid)
+        return Likelihood(e.floor_power, e.freedom, e.tail_scale, e.valid)
 
     @functools.cached_property
     def is_torque(self) -> np.ndarray:
@@ -103,7 +103,7 @@ class Flattened:
 
     @functools.cached_property
     def cells(self) -> np.ndarray:
-        """Number (n,) of the cell of each value (`cells`)."""
+        """Number (n,) of the cell of each value (see the module `cells`)."""
         bands = {state: np.digitize(frequencies(state), BANDS_HZ)[:, None] - 1 for state in (AIR, REST)}
         replay = self.layout.per_bin({state: cell_numbers(view, bands[state], np.arange(COUNT))
                                       for state, view in ((AIR, REPLAY_VIEW), (REST, REST_VIEW))})
@@ -128,7 +128,7 @@ def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:
-    """Bins and channels (bins, COUNT) of the replay view that count, by state. means_only: `Data.means_only`."""
+    """Whether each bin of each channel (bins, COUNT) of the replay view counts, by state. See `Data.means_only`."""
     keep = {state: judged_bins(state) for state in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
@@ -138,14 +138,14 @@ def _counted(means_only: bool) -> dict[str, np.ndarray]:
 
 
 def _of_replay(data: Data, layout: Layout, noise: np.ndarray) -> Elements:
-    """The values of the replay view. noise (replay,): power of the floor, without what lost rows add."""
-    base, counts = layout.gather(data.base), data.study.floor.block_counts
-    valid = np.isfinite(base)
-    power = noise + layout.gather([{AIR: lost, REST: np.zeros(spectra_of[REST].shape)}
-                                   for lost, spectra_of in zip(data.bridging, data.base, strict=True)]).real
+    """The values of the replay view. noise (replay,): see `Flattened`."""
+    residual, counts = layout.gather(data.residual), data.study.floor.block_counts
+    valid = np.isfinite(residual)
+    floor_power = noise + layout.gather([{AIR: lost, REST: np.zeros(of_flight[REST].shape)}
+                                         for lost, of_flight in zip(data.bridging, data.residual, strict=True)]).real
     freedom = layout.per_piece(
         lambda _, state: np.clip(FREEDOM_OF_BLOCK * counts[state], LEAST_FREEDOM, REPLAY_FREEDOM))
-    return Elements(np.where(valid, base, 0.0), np.where(valid, power, 1.0), valid, layout.channels(),
+    return Elements(np.where(valid, residual, 0.0), np.where(valid, floor_power, 1.0), valid, layout.channels(),
                     layout.per_piece(lambda flight, _: flight).astype(int), freedom, tail_scale(freedom))
 
 
@@ -157,18 +157,18 @@ def _of_commands(commands: CommandElements) -> Elements:
 
 def _offsets(data: Data, layout: Layout) -> list[Offset]:
     """One for each of OFFSETS channels of each flight whose mean differs between nominal flights."""
-    spread, out = data.study.offset, []
+    prior_std, out = data.study.offset, []
     for flight in range(len(data.flights)):
-        for channel in np.flatnonzero(spread[:OFFSETS] > 0.0):
-            column = layout.gather(_unit_offset(data, flight, int(channel)))
-            places = np.flatnonzero(column)
-            out.append(Offset(places, column[places], float(spread[channel])))
+        for channel in np.flatnonzero(prior_std[:OFFSETS] > 0.0):
+            column = layout.gather(_offset_of_one(data, flight, int(channel)))
+            indices = np.flatnonzero(column)
+            out.append(Offset(indices, column[indices], float(prior_std[channel])))
     return out
 
 
-def _unit_offset(data: Data, flight: int, channel: int) -> list[Spectra]:
-    """Spectra by flight and state of 1 in one channel of one flight, in the air."""
+def _offset_of_one(data: Data, flight: int, channel: int) -> list[Spectra]:
+    """Spectra by flight and state of a signal that is 1 in one channel of one flight in the air, else 0."""
     ones = np.zeros((len(data.flights[flight]), COUNT))
     ones[~data.flights[flight].on_ground, channel] = 1.0
-    return [{state: short_time_spectra(ones, begin, state) if j == flight else np.zeros_like(data.base[j][state])
+    return [{state: short_time_spectra(ones, begin, state) if j == flight else np.zeros_like(data.residual[j][state])
              for state, begin in first.items()} for j, first in enumerate(data.first)]

@@ -1,4 +1,8 @@
-"""Fit of mean effects by Gauss-Newton on the whitened spectra, the offsets between flights beside them."""
+"""Fit of mean effects by Gauss-Newton on the whitened residual, the offsets between flights beside them.
+
+A step that does not gain is shortened by damping (Levenberg 1944, Quart. Appl. Math. 2, 164; Marquardt 1963, J. SIAM
+11, 431): the normal matrix gets `damping` times its own diagonal on top.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -9,75 +13,79 @@ import numpy as np
 from airtouch.gap.evidence.least_squares import Bounds, bounded_step, bounds_of, normal_equations, weights_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
-from airtouch.gap.signatures.term import Term, mean_places
+from airtouch.gap.signatures.term import Term, mean_slices
 
 ITERATIONS = 8  #: most steps; chosen for time. A smaller number ends more fits before they stand still
 #: nats that a step must gain for the fit to go on; chosen for time. A larger number ends fits too early
 LEAST_STEP_GAIN = 0.02
-#: attempts at a step, each shorter than the one before (Levenberg-Marquardt); chosen for time. With a smaller number
-#: more steps fail
+#: attempts at a step, each with more damping than the last; chosen for time. With a smaller number more steps fail
 TRIES = 5
-DAMPING_FACTOR = 0.1  #: on the damping after a step that gained; its inverse after an attempt that failed; chosen
-#: damping after the first attempt that failed, 0.1 but for its last bit; chosen. A larger number makes shorter steps
-FIRST_DAMPING = 0.01 / DAMPING_FACTOR
+#: factor on the damping after a step that gained; its inverse after an attempt that failed; chosen
+DAMPING_FACTOR = 0.1
+#: damping, a fraction of the diagonal, from which it grows at least: a first attempt has none, and the second has
+#: LEAST_DAMPING / DAMPING_FACTOR = 0.1, which divides a step in one parameter by 1.1; chosen. A larger number makes
+#: shorter steps
+LEAST_DAMPING = 0.01
 ROUNDING = 1e-9  #: nats that a step must gain at least, above what rounding may gain; chosen
 #: standard deviation, natural steps, of the prior of parameters that only the commands show; chosen. A larger number
 #: holds them back less
-COMMAND_PRIOR = 1.5
+COMMAND_PRIOR_STD = 1.5
 NEAR_NEUTRAL = 0.05  #: scaled parameter at which a new effect begins, as some have no slope at neutral itself; chosen
 #: scaled parameters at which effects of the loop may begin; chosen. With fewer a fit may end at a lower peak
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,), the covariance (k, k) where the last step began, and the gap (n,) that they leave."""
+    """Scaled parameters x (k,), their covariance (k, k) where the last step began, and the residual (n,) at x."""
 
     x: np.ndarray
     covariance: np.ndarray
-    values: np.ndarray
+    residual: np.ndarray
 
 
-class _State(NamedTuple):
-    """Where a fit stands: parameters, offsets, gap (n,), power (n,) over the floor, minus the log posterior."""
+class _Point(NamedTuple):
+    """A point of the posterior: parameters (k,), offsets (m,), residual (n,), extra power (n,), minus its log, nats."""
 
     x: np.ndarray
     offsets: np.ndarray
-    values: np.ndarray
-    power: np.ndarray
+    residual: np.ndarray
+    extra_power: np.ndarray
     cost: float
 
 
 class Posterior:
     """Posterior of mean effects' parameters beside random effects that stay as they are.
 
-    extra_power (n,): that of the random effects; uncertain_floor: whether the commands' floor is as uncertain as under
-    such; spread: standard deviation of the parameters' prior; prior (k + m,): of parameters and offsets.
+    random_power (n,): extra power of the random effects; prior_std: standard deviation of the parameters' prior, (k,)
+    or one for all; uncertain_floor: whether the commands' floor is as uncertain as under random effects. The attribute
+    `prior_stds` (k + m,) is that of parameters and offsets.
     """
 
-    def __init__(self, problem: Problem, mean: Sequence[Term], extra_power: np.ndarray | float,
-                 spread: np.ndarray | float, uncertain_floor: bool) -> None:
+    def __init__(self, problem: Problem, mean: Sequence[Term], random_power: np.ndarray | float,
+                 prior_std: np.ndarray | float, uncertain_floor: bool) -> None:
         self.problem, self.mean = problem, mean
-        self.extra_power, self.uncertain_floor = extra_power, uncertain_floor
+        self.random_power, self.uncertain_floor = random_power, uncertain_floor
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
-        spreads = np.where(of_loop, np.minimum(spread, COMMAND_PRIOR), spread)
-        self.prior = np.concatenate([spreads, [o.spread for o in problem.offsets]])
+        of_parameters = np.where(of_loop, np.minimum(prior_std, COMMAND_PRIOR_STD), prior_std)
+        self.prior_stds = np.concatenate([of_parameters, [o.prior_std for o in problem.offsets]])
 
-    def at(self, x: np.ndarray, offsets: np.ndarray) -> _State:
-        """The state at parameters x (k,) and offsets (m,)."""
+    def at(self, x: np.ndarray, offsets: np.ndarray) -> _Point:
+        """The point at parameters x (k,) and offsets (m,)."""
         active = active_at(self.mean, x)
-        values = self.problem.values(active) if self.mean else self.problem.elements.base.copy()
-        for amount, (places, column, _) in zip(offsets, self.problem.offsets, strict=True):
-            values[places] -= amount * column
-        of_loop = self.problem.loop_power(active, self.uncertain_floor)
-        power = self.extra_power + of_loop.power
-        away = float(((np.concatenate([x, offsets]) / self.prior) ** 2).sum())
-        return _State(x, offsets, values, power, of_loop.cost + (0.5 * away - self.problem.likelihood(values, power)))
+        residual = self.problem.residual(active) if self.mean else self.problem.elements.residual.copy()
+        for amount, (indices, column, _) in zip(offsets, self.problem.offsets, strict=True):
+            residual[indices] -= amount * column
+        of_loop = self.problem.loop_change(active, self.uncertain_floor)
+        extra = self.random_power + of_loop.extra_power
+        away = float(((np.concatenate([x, offsets]) / self.prior_stds) ** 2).sum())
+        cost = of_loop.cost + (0.5 * away - self.problem.likelihood(residual, extra))
+        return _Point(x, offsets, residual, extra, cost)
 
 
 class _Step(NamedTuple):
-    """The state after a step, the parameters' covariance, the damping for the next, and whether the step gained."""
+    """The point after a step, the parameters' covariance, the damping for the next, and whether the step gained."""
 
-    state: _State
+    point: _Point
     covariance: np.ndarray
     damping: float
     gained: bool
@@ -86,15 +94,15 @@ class _Step(NamedTuple):
 def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) -> MeanFit:
     """Mean effects of highest posterior, from scaled parameters x (k,) on, in `most` steps at most.
 
-    The slopes are kept from step to step, as most effects are close to linear. They are taken anew after a step that
-    failed, or that ended far from where they were taken. The fit ends with a step that gains less than LEAST_STEP_GAIN,
-    or that fails with slopes taken where it began.
+    No step lowers the posterior. The slopes are kept from step to step, as most effects are close to linear. They are
+    taken anew after a step that failed, or that ended far from where they were taken. The fit ends with a step that
+    gains less than LEAST_STEP_GAIN, or that fails with slopes taken where it began.
     """
     problem, mean = posterior.problem, posterior.mean
     bounds = bounds_of(mean)
     x, offsets, covariance = np.clip(x, *bounds), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.offsets:
-        return MeanFit(x, covariance, problem.elements.base)
+        return MeanFit(x, covariance, problem.elements.residual)
     now = posterior.at(x, offsets)
     slopes: SpectraSlopes | None = None
     stuck, damping = False, 0.0
@@ -106,22 +114,23 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
             break
         stuck = not gained
-    return MeanFit(now.x, covariance, now.values)
+    return MeanFit(now.x, covariance, now.residual)
 
 
-def _step(posterior: Posterior, slopes: SpectraSlopes, now: _State, bounds: Bounds, damping: float) -> _Step:
-    """A step, shortened until it gains, TRIES times at most."""
-    problem, size = posterior.problem, len(now.x)
-    equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior, now.values,
-                                 weights_of(problem, now.values, now.power), np.concatenate([now.x, now.offsets]),
-                                 problem.offsets)
-    equations = equations.with_power(slopes.power_slopes(now.x, now.values, now.power, posterior.uncertain_floor))
+def _step(posterior: Posterior, slopes: SpectraSlopes, now: _Point, bounds: Bounds, damping: float) -> _Step:
+    """A step from the point `now`, shortened until it gains, in TRIES attempts at most."""
+    problem, k = posterior.problem, len(now.x)
+    weights = weights_of(problem, now.residual, now.extra_power)
+    equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior_stds, now.residual, weights,
+                                 np.concatenate([now.x, now.offsets]), problem.offsets)
+    by_power = slopes.power_slopes(now.x, now.residual, now.extra_power, posterior.uncertain_floor)
+    equations = equations.with_power(by_power)
     for _ in range(TRIES):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
-        new = posterior.at(np.clip(now.x + change[:size], *bounds), now.offsets + change[size:])
+        new = posterior.at(np.clip(now.x + change[:k], *bounds), now.offsets + change[k:])
         if new.cost < now.cost - ROUNDING:
             return _Step(new, covariance, damping * DAMPING_FACTOR, True)
-        damping = max(damping / DAMPING_FACTOR, FIRST_DAMPING)
+        damping = max(damping, LEAST_DAMPING) / DAMPING_FACTOR
     return _Step(now, covariance, damping, False)
 
 
@@ -133,21 +142,21 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
     size = sum(len(t.free) for t in mean)
     start = np.full(size, np.nan) if start is None else start
     x = np.where(np.isnan(start), NEAR_NEUTRAL, start)
-    for t, place in mean_places(mean):
-        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(start[place]).all():
-            x = _best_on_grid(problem, mean, x, range(place.start, place.stop))
+    for t, own in mean_slices(mean):
+        if t.signature.loop_only and len(problem.flat.commands) and np.isnan(start[own]).all():
+            x = _best_on_grid(problem, mean, x, range(own.start, own.stop))
     return x
 
 
-def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, place: range) -> np.ndarray:
-    """The parameters (k,) with that one of an effect's (`place`) moved to that entry of GRID that is likeliest."""
+def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
+    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest of all such moves."""
     low, high = bounds_of(mean)
     best, out = -np.inf, x
-    for i, amount in itertools.product(place, GRID):
+    for i, amount in itertools.product(own, GRID):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
-        of_loop = problem.loop_power(active_at(mean, trial))
-        level = problem.likelihood(problem.elements.base, of_loop.power) - of_loop.cost
+        of_loop = problem.loop_change(active_at(mean, trial))
+        level = problem.likelihood(problem.elements.residual, of_loop.extra_power) - of_loop.cost
         if level > best:
             best, out = level, trial
     return out

@@ -1,4 +1,4 @@
-"""How likely some blocks of flights are under effects that were fitted elsewhere, in all and cell by cell."""
+"""How likely some blocks of flights are under effects that were fitted elsewhere, all together and cell by cell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,36 +13,36 @@ from airtouch.gap.evidence.problem import BlockSet, Modelled, Problem, problem_o
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.term import Term
 
-#: nats from which effects count as gaining in a cell; chosen. A larger number leaves out cells that an effect improves
-#: a little, a smaller one takes in those in which it gains by chance
+#: nats that effects must gain in a cell for it to count as improved; chosen. A larger number leaves out cells that an
+#: effect improves a little, a smaller one takes in those in which it gains by chance
 CELL_GAIN = 1.0
 
 
-def judge(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> float:
-    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights fitted anew.
+def judge(data: Data, blocks: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> float:
+    """Log likelihood of blocks under effects fitted elsewhere, nats; offsets between flights fitted anew.
 
     uncertain_floor: the commands' floor is as uncertain as under random effects, though there are none.
     """
-    remainder = left_over(data, part, terms, uncertain_floor)
-    return remainder.log_likelihood - remainder.cost
+    judged = judged_blocks(data, blocks, terms, uncertain_floor)
+    return judged.log_likelihood - judged.cost
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOver:
-    """What effects leave of the gap in some blocks.
+class JudgedBlocks:
+    """Some blocks under effects with their values, and the residual that these leave.
 
-    problem: of the blocks; modelled: what the effects make of it; gap (n,): under them, offsets between flights
-    subtracted; offset_cost: nats that the offsets cost.
+    problem: of the blocks; modelled: the blocks under the effects, before offsets; residual (n,): offsets between
+    flights subtracted, unit/sqrt(Hz); offset_cost: nats that the offsets cost.
     """
 
     problem: Problem
     modelled: Modelled
-    gap: np.ndarray
+    residual: np.ndarray
     offset_cost: float
 
     @property
     def extra_power(self) -> np.ndarray:
-        """Power (n,) that the effects add to that expected."""
+        """Power (n,) that the effects add to the floor's, unit^2/Hz."""
         return self.modelled.extra_power
 
     @property
@@ -52,31 +52,31 @@ class LeftOver:
 
     @cached_property
     def log_likelihood(self) -> float:
-        """Log likelihood of the gap, without the cost."""
-        return self.problem.likelihood(self.gap, self.extra_power)
+        """Log likelihood of the residual, nats, without the cost."""
+        return self.problem.likelihood(self.residual, self.extra_power)
 
     @property
-    def power(self) -> np.ndarray:
-        """Expected power (n,) of the gap."""
-        return self.problem.elements.power + self.extra_power
+    def expected_power(self) -> np.ndarray:
+        """Power (n,) that is expected of the residual, unit^2/Hz."""
+        return self.problem.elements.floor_power + self.extra_power
 
     def log_likelihoods(self) -> np.ndarray:
         """Log likelihood (n,) of each value, without the cost."""
-        return self.problem.likelihood.per_value(self.gap, self.extra_power)
+        return self.problem.likelihood.per_value(self.residual, self.extra_power)
 
 
-def left_over(data: Data, part: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> LeftOver:
-    """What effects with these parameters leave of the gap; offsets between flights fitted anew.
+def judged_blocks(data: Data, blocks: BlockSet, terms: Sequence[Term], uncertain_floor: bool = False) -> JudgedBlocks:
+    """Some blocks under effects fitted elsewhere; offsets between flights fitted anew.
 
     uncertain_floor: see `judge`.
     """
-    problem = problem_of(data, part)
+    problem = problem_of(data, blocks)
     modelled = problem.modelled(terms, uncertain_floor)
-    return LeftOver(problem, modelled, *without_offsets(problem, modelled.gap, modelled.extra_power))
+    return JudgedBlocks(problem, modelled, *without_offsets(problem, modelled.residual, modelled.extra_power))
 
 
-def cell_gains(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
-    """Log likelihood (CELLS,) that effects with these parameters add in each cell: view, channel and band."""
-    without = left_over(data, part, (), uncertain_floor=bool(random_of(terms)))
-    gains = left_over(data, part, terms).log_likelihoods() - without.log_likelihoods()
+def cell_gains(data: Data, blocks: BlockSet, terms: Sequence[Term]) -> np.ndarray:
+    """Nats (CELLS,) that effects with these values gain over none in each cell."""
+    without = judged_blocks(data, blocks, (), uncertain_floor=bool(random_of(terms)))
+    gains = judged_blocks(data, blocks, terms).log_likelihoods() - without.log_likelihoods()
     return np.bincount(without.problem.flat.cells, gains, CELLS)

@@ -1,4 +1,4 @@
-"""Where the values of a flight's blocks stand in one flat array."""
+"""The order in which the values of some blocks of flights stand in one flat array."""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,7 +14,7 @@ Piece = tuple[int, str, np.ndarray]  #: number of a flight, state, and which of 
 
 @dataclass(frozen=True)
 class AirBlocks:
-    """Blocks in the air, numbered through all flights.
+    """Blocks in the air, numbered from 0 through all flights.
 
     block_of_value (n,): number of the block of each flattened value, -1 for one on the ground; begin (b,): first sample
     of each block; flight (b,): number of its flight.
@@ -26,9 +26,10 @@ class AirBlocks:
 
 
 class Layout:
-    """The order of values that count: piece by piece, block by block, bin by bin, channel by channel.
+    """The order of the values that count: piece by piece, block by block, bin by bin, channel by channel.
 
-    pieces: blocks of flights; flights: numbers of these; keep[state] (bins, COUNT): bins of each channel that count.
+    pieces: blocks of flights; keep[state] (bins, COUNT): whether a bin of a channel counts, bool. The attribute
+    `flights` is the set of the numbers of the flights that have a piece.
     """
 
     def __init__(self, pieces: Sequence[Piece], keep: Mapping[str, np.ndarray]) -> None:
@@ -39,11 +40,11 @@ class Layout:
 
     def gather(self, by_flight: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
         """Values (n,) that count of spectra (blocks, bins, COUNT), by flight and state."""
-        return _joined((by_flight[i][state].take(places)
-                        for (i, state, _), places in zip(self.pieces, self._places, strict=True)), complex)
+        return _joined((by_flight[i][state].take(indices)
+                        for (i, state, _), indices in zip(self.pieces, self._indices, strict=True)), complex)
 
     def per_piece(self, value: Callable[[int, str], float]) -> np.ndarray:
-        """For each value the number (n,) of its flight and state."""
+        """What a function gives for the flight and state of each value, (n,)."""
         return _joined(np.full(size, value(i, state))
                        for (i, state, _), size in zip(self.pieces, self.sizes, strict=True))
 
@@ -52,7 +53,7 @@ class Layout:
         return _joined(np.tile(table[state][self.keep[state]], int(chosen.sum())) for _, state, chosen in self.pieces)
 
     def channels(self) -> np.ndarray:
-        """The channel (n,) of each value."""
+        """The channel (n,) of each value, its index in `channels.CHANNELS`."""
         table = {state: np.broadcast_to(np.arange(COUNT), keep.shape) for state, keep in self.keep.items()}
         return self.per_bin(table).astype(int)
 
@@ -69,12 +70,12 @@ class Layout:
         return AirBlocks(_joined(block_of_value, int), np.array(begin, int), np.array(flight, int))
 
     @functools.cached_property
-    def _places(self) -> list[np.ndarray]:
+    def _indices(self) -> list[np.ndarray]:
         """Of each piece, the indices of its values in the flattened spectra of its flight."""
         return [np.flatnonzero(chosen[:, None, None] & self.keep[state]) for _, state, chosen in self.pieces]
 
 
-def _joined(parts: Iterable[np.ndarray], kind: type = float) -> np.ndarray:
-    """Arrays one after another; an empty one of a kind where there is none."""
-    parts = list(parts)
-    return np.concatenate(parts) if parts else np.zeros(0, kind)
+def _joined(arrays: Iterable[np.ndarray], kind: type = float) -> np.ndarray:
+    """Arrays one after another; where there is none an empty one of type `kind`."""
+    arrays = list(arrays)
+    return np.concatenate(arrays) if arrays else np.zeros(0, kind)

@@ -1,4 +1,4 @@
-"""Steps of weighted ridge regression on flattened spectra: those of a fit, and the offsets between flights.
+"""Steps of weighted ridge regression on the flattened residual: those of a fit, and the offsets between flights.
 
 k: scaled parameters of mean effects; m: offsets; n: flattened values.
 """
@@ -32,54 +32,54 @@ class BoundedStep(NamedTuple):
 
 
 class WithoutOffsets(NamedTuple):
-    """The gap (n,) with offsets between flights subtracted, and what these cost, nats: minus the log of their prior."""
+    """The residual (n,) less offsets between flights, and what these cost, nats: minus the log of their prior."""
 
-    gap: np.ndarray
+    residual: np.ndarray
     cost: float
 
 
 class NormalEquations(NamedTuple):
-    """Equations of a step: matrix (k + m, k + m) times the step is right (k + m,)."""
+    """Equations of a step of parameters and offsets: matrix (k + m, k + m) times the step is right (k + m,)."""
 
     matrix: np.ndarray
     right: np.ndarray
 
     def with_power(self, slopes: LikelihoodSlopes) -> "NormalEquations":
-        """These with what the parameters gain by changing the expected power, as `SpectraSlopes.power_slopes` says."""
+        """The equations where the parameters change the expected power too: `SpectraSlopes.power_slopes`."""
         k, matrix, right = len(slopes.gradient), self.matrix.copy(), self.right.copy()
         matrix[:k, :k] += slopes.information
         right[:k] += slopes.gradient
         return NormalEquations(matrix, right)
 
 
-def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
+def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior_stds: np.ndarray, residual: np.ndarray,
                      weights: np.ndarray, at: np.ndarray, offsets: Sequence[Offset] = ()) -> NormalEquations:
-    """Normal equations of the ridge regression that lowers values + sum(step * column) - sum(step * offset).
+    """Normal equations of a ridge regression: its step leaves residual + sum(step * column) - sum(step * offset).
 
-    They minimise sum(weight |value|^2) + sum(((at + step) / prior)^2) / 2, hence the factors 2.
+    Of this r they minimise sum(weight |r|^2) + sum(((at + step) / prior_std)^2) / 2, hence the factors 2.
 
-    columns (k, n): change of the values per parameter; prior (k + m,): standard deviations of parameters and offsets
-    about 0; values (n,): the gap; weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
-    begins; offsets: m of them, no two with a place in common.
+    columns (k, n): change of the residual per parameter; prior_stds (k + m,): standard deviations of parameters and
+    offsets about 0; residual (n,); weights (n,): `weights_of`; at (k + m,): parameters and offsets where the step
+    begins; offsets: m of them, of which no two change the same value.
     """
-    columns = np.ascontiguousarray(columns, complex).reshape(-1, len(values))
+    columns = np.ascontiguousarray(columns, complex).reshape(-1, len(residual))
     k, m = len(columns), len(offsets)
-    matrix, right = np.diag(1.0 / prior ** 2), -at / prior ** 2
+    matrix, right = np.diag(1.0 / prior_stds ** 2), -at / prior_stds ** 2
     if k:
-        parts = columns.view(float)  # real and imaginary parts side by side
-        weighted_parts = parts * np.repeat(weights, 2)
-        matrix[:k, :k] += 2.0 * (weighted_parts @ parts.T)
-        right[:k] -= 2.0 * (weighted_parts @ np.ascontiguousarray(values, complex).view(float))
-    for i, (places, column, _) in zip(range(k, k + m), offsets, strict=True):
-        weighted = (weights[places] * column).conj()
+        as_real = columns.view(float)  # real and imaginary parts side by side
+        weighted_real = as_real * np.repeat(weights, 2)
+        matrix[:k, :k] += 2.0 * (weighted_real @ as_real.T)
+        right[:k] -= 2.0 * (weighted_real @ np.ascontiguousarray(residual, complex).view(float))
+    for i, (indices, column, _) in zip(range(k, k + m), offsets, strict=True):
+        weighted = (weights[indices] * column).conj()
         matrix[i, i] += 2.0 * (weighted @ column).real
-        right[i] += 2.0 * (weighted @ values[places]).real
-        matrix[:k, i] = matrix[i, :k] = -2.0 * (columns[:, places] @ weighted).real
+        right[i] += 2.0 * (weighted @ residual[indices]).real
+        matrix[:k, i] = matrix[i, :k] = -2.0 * (columns[:, indices] @ weighted).real
     return NormalEquations(matrix, right)
 
 
 def bounded_step(equations: NormalEquations, x: np.ndarray, bounds: Bounds, damping: float = 0.0) -> BoundedStep:
-    """The step that solves the equations, but for parameters at a bound.
+    """The step that solves the equations, without those parameters that it would move past a bound where they are.
 
     A parameter at a bound that the step would pass stays there, and the others are solved without it. Its variance is
     that of a parameter beside which all others are known. The end of the step may lie beyond a bound, if it does not
@@ -118,36 +118,36 @@ def bounds_of(mean: Sequence[Term]) -> Bounds:
                   np.concatenate([np.zeros(0), *(b.high for b in of_terms)]))
 
 
-def weights_of(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> np.ndarray:
+def weights_of(problem: Problem, residual: np.ndarray, extra_power: np.ndarray | float) -> np.ndarray:
     """Weights (n,) of a least-squares step whose optimum is that of the likelihood with its tails; 0 where not valid.
 
     Repeated with weights taken anew, the steps end at that optimum (iteratively reweighted least squares).
 
-    values (n,): the gap; extra_power (n,): power over the floor.
+    residual (n,); extra_power (n,): what a hypothesis adds to the floor's.
     """
-    elements = problem.elements
-    power = elements.power + extra_power
-    over_expected = squared(values) / power
-    return OVERLAP_WEIGHT * problem.likelihood.exponent / (elements.tail_scale + over_expected) / power * elements.valid
+    elements, exponent = problem.elements, problem.likelihood.exponent
+    expected_power = elements.floor_power + extra_power
+    over_expected = squared(residual) / expected_power
+    return OVERLAP_WEIGHT * exponent / (elements.tail_scale + over_expected) / expected_power * elements.valid
 
 
-def without_offsets(problem: Problem, values: np.ndarray, extra_power: np.ndarray | float) -> WithoutOffsets:
-    """The gap less the offsets between flights of highest posterior, or close to it.
+def without_offsets(problem: Problem, residual: np.ndarray, extra_power: np.ndarray | float) -> WithoutOffsets:
+    """The residual less the offsets between flights of highest posterior, or close to it.
 
     No two offsets change the same value, so each is found alone, in OFFSET_STEPS steps of weighted ridge regression.
 
-    values (n,): the gap; extra_power (n,): power over the floor.
+    residual (n,); extra_power (n,): what a hypothesis adds to the floor's.
     """
     elements, exponent = problem.elements, problem.likelihood.exponent
-    power, gap, cost = elements.power + extra_power, values.copy(), 0.0
-    for places, column, spread in problem.offsets:
-        amount = 0.0
-        largest_weight = OVERLAP_WEIGHT * exponent[places] * elements.valid[places] / power[places]
+    expected_power, out, cost = elements.floor_power + extra_power, residual.copy(), 0.0
+    for indices, column, prior_std in problem.offsets:
+        amount, expected = 0.0, expected_power[indices]
+        largest_weight = OVERLAP_WEIGHT * exponent[indices] * elements.valid[indices] / expected
         for _ in range(OFFSET_STEPS):
-            weights = largest_weight / (elements.tail_scale[places] + squared(gap[places]) / power[places])
-            normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
-            slope = 2.0 * float(np.vdot(column, weights * gap[places]).real) - amount / spread ** 2
+            weights = largest_weight / (elements.tail_scale[indices] + squared(out[indices]) / expected)
+            normal = 2.0 * float(weights @ squared(column)) + 1.0 / prior_std ** 2
+            slope = 2.0 * float(np.vdot(column, weights * out[indices]).real) - amount / prior_std ** 2
             amount += slope / normal
-            gap[places] = values[places] - amount * column
-        cost += 0.5 * (amount / spread) ** 2
-    return WithoutOffsets(gap, cost)
+            out[indices] = residual[indices] - amount * column
+        cost += 0.5 * (amount / prior_std) ** 2
+    return WithoutOffsets(out, cost)

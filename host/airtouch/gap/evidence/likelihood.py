@@ -17,17 +17,20 @@ from scipy.special import exp1
 
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 
-#: most degrees of freedom of the Student-like tail; chosen: four blocks, three for each. A larger number has lighter
-#: tails, so that single loud blocks count as evidence
+#: most degrees of freedom of the tails in the replay view; chosen: those of four blocks, three each
+#: (`flattened.FREEDOM_OF_BLOCK`). A larger number has lighter tails, so that single loud blocks count as evidence
 REPLAY_FREEDOM = 12.0
 _COLUMN = float64[::1]
 LEAST, MOST = 1e-100, 1e100  #: sizes of a product at which its logarithm is taken; chosen, far from under- and overflow
-#: tails' scales among which `tail_scale` seeks; chosen, beyond any in use, and exp does not overflow
+#: scales among which `tail_scale` seeks; chosen: they hold that of any freedom in use, and exp does not overflow
 BRACKET = 1e-3, 600.0
 
 
 class PowerSlopes(NamedTuple):
-    """Slope (n,) of the log likelihood of each of n values by its expected power; curvature (n,), never negative."""
+    """Slope (n,) of the log likelihood of each of n values by its expected power; curvature (n,), never negative.
+
+    Slope in nats per unit^2/Hz; curvature: minus the second derivative that is expected, in nats per its square.
+    """
 
     slope: np.ndarray
     curvature: np.ndarray
@@ -35,59 +38,59 @@ class PowerSlopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Log likelihood of flattened values; only differences mean something.
+    """Log likelihood of a residual, nats; only differences mean something.
 
-    power (n,): expected without random effects, unit^2/Hz; freedom, tail_scale (n,): degrees of freedom and scale of
-    the tails; valid (n,): bool, which values count. In its functions extra_power (n,) is what a hypothesis adds.
+    floor_power (n,): expected without effects, unit^2/Hz; freedom, tail_scale (n,): degrees of freedom and scale of the
+    tails; valid (n,): bool, which values count. In its functions extra_power (n,) is what a hypothesis adds.
     """
 
-    power: np.ndarray
+    floor_power: np.ndarray
     freedom: np.ndarray
     tail_scale: np.ndarray
     valid: np.ndarray
 
-    def __call__(self, values: np.ndarray, extra_power: np.ndarray | float = 0.0) -> float:
-        """Log likelihood of values (n,)."""
-        size, power = squared(values), self.power + extra_power
-        return -OVERLAP_WEIGHT * minus_log_likelihood(size, power, self.tail_scale, self.exponent, self.valid)
+    def __call__(self, residual: np.ndarray, extra_power: np.ndarray | float = 0.0) -> float:
+        """Log likelihood of a residual (n,)."""
+        size, expected_power = squared(residual), self.floor_power + extra_power
+        return -OVERLAP_WEIGHT * minus_log_likelihood(size, expected_power, self.tail_scale, self.exponent, self.valid)
 
-    def per_value(self, values: np.ndarray, extra_power: np.ndarray | float = 0.0) -> np.ndarray:
+    def per_value(self, residual: np.ndarray, extra_power: np.ndarray | float = 0.0) -> np.ndarray:
         """Log likelihood (n,) of each value, 0 for those that do not count."""
-        levels = _levels(squared(values), self.power + extra_power, self.tail_scale, self.exponent)
+        levels = _levels(squared(residual), self.floor_power + extra_power, self.tail_scale, self.exponent)
         levels[~self.valid] = 0.0
         return levels
 
-    def along(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
-        """Log likelihood as a function of x where others + x * unit is added; only what changes is computed anew.
+    def along(self, size: np.ndarray, extra_power: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
+        """Log likelihood as a function of x where the extra power is extra_power + x * direction, (n,) each.
 
-        size (n,): the values' squared size.
+        Only values whose power changes are computed anew. size (n,): |residual|^2.
         """
-        changing = (unit != 0.0) & self.valid
-        power, tail_scale, exponents = self.power + others, self.tail_scale, self.exponent
-        rest = minus_log_likelihood(size, power, tail_scale, exponents, self.valid & ~changing)
-        size_there, unit_there, power, tail_scale, exponents, valid = (
-            x[changing] for x in (size, unit, power, tail_scale, exponents, self.valid))
+        changing = (direction != 0.0) & self.valid
+        at_0, tail_scale, exponents = self.floor_power + extra_power, self.tail_scale, self.exponent
+        rest = minus_log_likelihood(size, at_0, tail_scale, exponents, self.valid & ~changing)
+        size_there, direction_there, at_0, tail_scale, exponents, valid = (
+            v[changing] for v in (size, direction, at_0, tail_scale, exponents, self.valid))
 
         def at(x: float) -> float:
             """Log likelihood at x."""
-            there = minus_log_likelihood(size_there, power + x * unit_there, tail_scale, exponents, valid)
+            there = minus_log_likelihood(size_there, at_0 + x * direction_there, tail_scale, exponents, valid)
             return -OVERLAP_WEIGHT * (rest + there)
 
         return at
 
-    def power_slopes(self, values: np.ndarray, extra_power: np.ndarray, count: int) -> PowerSlopes:
-        """Slope and curvature by the expected power of each of the first `count` values (n,).
+    def power_slopes(self, residual: np.ndarray, extra_power: np.ndarray, count: int) -> PowerSlopes:
+        """Slope and curvature by the expected power of each of the first `count` values.
 
         The curvature is what is expected of the law without tails (Whittle's). It is larger than that of the law with
         tails, nu / (nu + 2) of it, by (nu + 2) / nu; so errors of effects that it gives are smaller by up to the root
         of that. nu: the degrees of freedom.
         """
-        places = slice(count)
-        power = self.power[places] + extra_power[places]
-        over_expected = squared(values[places]) / power
-        share = OVERLAP_WEIGHT * self.valid[places] / power
-        counted = self.exponent[places] * over_expected / (self.tail_scale[places] + over_expected)
-        return PowerSlopes(share * (counted - 1.0), share / power)
+        first = slice(count)
+        expected_power = self.floor_power[first] + extra_power[first]
+        over_expected = squared(residual[first]) / expected_power
+        per_power = OVERLAP_WEIGHT * self.valid[first] / expected_power
+        counted = self.exponent[first] * over_expected / (self.tail_scale[first] + over_expected)
+        return PowerSlopes(per_power * (counted - 1.0), per_power / expected_power)
 
     @functools.cached_property
     def exponent(self) -> np.ndarray:
@@ -98,16 +101,16 @@ class Likelihood:
         return self.freedom + 1.0
 
 
-def _levels(size: np.ndarray, power: np.ndarray, tail_scale: np.ndarray, exponents: np.ndarray) -> np.ndarray:
-    """Log likelihood (n,) of values of a squared size; in place of the power."""
-    tails = size / power
+def _levels(size: np.ndarray, expected_power: np.ndarray, tail_scale: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+    """Log likelihood (n,) of values of a squared size; it overwrites the expected power."""
+    tails = size / expected_power
     tails /= tail_scale
     np.log1p(tails, out=tails)
     tails *= exponents
-    np.log(power, out=power)
-    power += tails
-    power *= -OVERLAP_WEIGHT
-    return power
+    levels = np.log(expected_power, out=expected_power)
+    levels += tails
+    levels *= -OVERLAP_WEIGHT
+    return levels
 
 
 def tail_scale(freedom: np.ndarray) -> np.ndarray:
@@ -115,8 +118,8 @@ def tail_scale(freedom: np.ndarray) -> np.ndarray:
 
     E[(nu + 1) e / (tail_scale + e)] = 1, where e is exponential and nu are the degrees of freedom (n,).
     """
-    different, place = np.unique(freedom, return_inverse=True)
-    return np.array([_tail_scale(nu) for nu in different])[place] if len(freedom) else freedom
+    different, inverse = np.unique(freedom, return_inverse=True)
+    return np.array([_tail_scale(nu) for nu in different])[inverse] if len(freedom) else freedom
 
 
 @functools.cache
@@ -128,10 +131,10 @@ def _tail_scale(nu: float) -> float:
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")
 def minus_log_likelihood(size, power, tail_scale, exponents, valid):
-    """Sum of log(power) + exponent log(1 + size / power / tail_scale) over those values (n,) that are valid.
+    """Sum of log(power) + exponent log(1 + size / power / tail_scale) over those values (n,) that are valid, nats.
 
-    It is minus the log likelihood, but for a constant and for OVERLAP_WEIGHT, of values of this squared size where
-    this power is expected; where `tail_scale` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
+    It is minus the log likelihood, but for a constant and for OVERLAP_WEIGHT, of values of this squared size; power:
+    the expected one; where `tail_scale` is the exponent less 1, that is `loop.command_spectra.log_likelihood`.
     Sums of logarithms are logarithms of products; what the addition rounds off is carried along (Kahan).
     """
     total, lost = 0.0, 0.0

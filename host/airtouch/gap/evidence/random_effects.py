@@ -1,4 +1,4 @@
-"""Power spectra that random effects add to the gap of a flight.
+"""Power spectra that random effects add to the residual of a flight.
 
 White noise of the IMU, noise of the thrust and the rotors' lines in closed form; others by running the effect itself on
 the flight's signals with several seeds.
@@ -36,27 +36,27 @@ from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
 SEEDS = 4  #: runs of a random effect from which its power is estimated; chosen for time. More estimate it better
-LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by; chosen
-RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster folds into its spectra
-LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that four rotors move
+LEAST_PASSED = 0.1  #: least fraction of the power that a mean of two samples passes, to divide by; chosen
+RATE_HZ = 1.0 / PERIOD_S  #: of the log: what is faster than half of it folds into its spectra
+LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that the rotors' thrust acts on
 
 
-def power(data: Data, term: Term) -> list[Spectra]:
-    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state."""
-    unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
-    of_unit = data.workspace.cached("random", unit.active().key,
-                                    lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
+def extra_power(data: Data, term: Term) -> list[Spectra]:
+    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state, unit^2/Hz."""
+    weak = replace(term, gate=()).fitted(np.ones(len(term.free)))
+    of_strength_1 = data.workspace.cached(
+        "random", weak.active().key, lambda: [_power_of_strength_1(data, i, weak) for i in range(len(data.flights))])
     (name, *_) = term.free
     neutral = neutral_of(parameter_of(term.effect, name))
-    scale = growth(term, (term.values[name] - neutral) / (unit.values[name] - neutral))
+    scale = growth(term, (term.values[name] - neutral) / (weak.values[name] - neutral))
     if term.gate:
         return [{state: scale * v * _covered(data, i, state, term.gate) for state, v in f.items()}
-                for i, f in enumerate(of_unit)]
-    return [{state: scale * v for state, v in f.items()} for f in of_unit]
+                for i, f in enumerate(of_strength_1)]
+    return [{state: scale * v for state, v in f.items()} for f in of_strength_1]
 
 
 def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
-    """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
+    """Fraction (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[state], data.first[i][state]
     weight = hann_window(length)[0][:, 0] ** 2
@@ -65,15 +65,15 @@ def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
 
 
 def growth(term: Term, x: float) -> float:
-    """Added power at scaled strength x over that at 1."""
+    """Extra power at scaled strength x over that at strength 1."""
     if not term.signature.factors:
         return x * x
     factor, of_one = (term.at(np.array([scaled]))[term.free[0]] for scaled in (x, 1.0))
     return max(factor ** 2 - 1.0, 0.0) / (of_one ** 2 - 1.0)
 
 
-def _unit_power(data: Data, i: int, term: Term) -> Spectra:
-    """PSD (blocks, bins, COUNT) by state that a random effect of unit strength adds to flight i."""
+def _power_of_strength_1(data: Data, i: int, term: Term) -> Spectra:
+    """PSD (blocks, bins, COUNT) by state that a random effect of scaled strength 1 adds to flight i, unit^2/Hz."""
     closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
     power_by_state = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
     response = data.study.response
@@ -83,9 +83,9 @@ def _unit_power(data: Data, i: int, term: Term) -> Spectra:
 
 
 def _by_running(data: Data, i: int, term: Term) -> Spectra:
-    """Power by state of an effect that is run on the flight's own signals with several seeds.
+    """PSD by state of an effect, estimated by runs with several seeds on the flight's own signals.
 
-    A channel has one shape of the spectrum, at the strength of each block.
+    A channel has one shape of the spectrum, scaled by the power of each block.
     """
     flight, study = data.flights[i], data.study
     runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
@@ -115,12 +115,12 @@ def _over_a_sample() -> np.ndarray:
 
 
 def _no_power(data: Data, i: int) -> Spectra:
-    """Zeros (blocks, bins, COUNT) by state, of flight i."""
-    return {state: np.zeros(gap.shape) for state, gap in data.base[i].items()}
+    """Zeros in the shape of the residual of flight i, (blocks, bins, COUNT) by state."""
+    return {state: np.zeros(of_state.shape) for state, of_state in data.residual[i].items()}
 
 
 def _imu_noise(data: Data, i: int, term: Term) -> Spectra:
-    """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
+    """PSD of white noise of gyro and accelerometer, the latter through its low-pass and folded by the log."""
     row = prepare(data.study.vehicle, ())[0][0]
     extra = term.values["factor"] ** 2 - 1.0
     out = _no_power(data, i)
@@ -149,24 +149,33 @@ def _torque_noise(study: Study, state: str, gyro: np.ndarray) -> np.ndarray:
     return np.minimum(gyro, floor) + beyond
 
 
-def folded_frequencies(f: np.ndarray) -> np.ndarray:
-    """Frequencies (5, bins), Hz, that a log at RATE_HZ folds to f (bins,): f itself first, up to two rates and f."""
-    return np.array([f, RATE_HZ - f, RATE_HZ + f, 2.0 * RATE_HZ - f, 2.0 * RATE_HZ + f])
+def folded_frequencies(f: np.ndarray, step_s: float) -> np.ndarray:
+    """Frequencies (aliases, bins), Hz, that a log at RATE_HZ folds to f (bins,), f itself first.
+
+    They are those up to half the rate of a control loop with a step of step_s: of a 500 Hz loop five.
+    """
+    aliases = round(PERIOD_S / step_s)
+    folds = [(k * RATE_HZ - f, k * RATE_HZ + f) for k in range(1, aliases // 2 + 1)]
+    return np.array([f, *(alias for fold in folds for alias in fold)][:aliases])
 
 
 def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
-    """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded."""
-    whole = folded_frequencies(f).ravel()
-    b = np.zeros(5)
-    filters.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
-    late = np.exp(-2j * np.pi * whole * float(row["step"]))  # by one step
+    """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded.
+
+    row: parameters of the plant (`simulation.flight.prepare`).
+    """
+    step_s = float(row["step"])
+    aliases = folded_frequencies(f, step_s)
+    b = np.zeros(5)  # of a filter of second order: b0, b1, b2, a1, a2
+    filters.lowpass_coefficients(float(row["acc_lowpass"]), step_s, b)
+    late = np.exp(-2j * np.pi * aliases.ravel() * step_s)  # by one step
     passed = polyval(late, b[:3]) / polyval(late, [1.0, b[3], b[4]])
-    total = (np.abs(passed) ** 2).reshape(5, -1).mean(axis=0)
+    total = (np.abs(passed) ** 2).reshape(len(aliases), -1).mean(axis=0)
     return 2.0 * PERIOD_S * total / filters.noise_gain(b) ** 2
 
 
 def _gyro_share(study: Study) -> np.ndarray:
-    """Share (bins, 3) of the gyro's noise in what moves the roll and pitch commands of nominal flights.
+    """Fraction (bins, 3) of the noise of nominal flights' roll and pitch commands that is the gyro's; of yaw 0.
 
     The commands' noise is what the floor of the angular acceleration holds beyond the gyro's own.
     """
@@ -183,13 +192,13 @@ def _gyro_share(study: Study) -> np.ndarray:
 
 
 def _difference(state: str) -> np.ndarray:
-    """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
+    """PSD (bins,) of white noise differentiated by samples over its own, 1/s^2; the window leaks into bin 0."""
     f = frequencies(state)
     return difference_power(np.maximum(f, LEAKED * f[1])) / PERIOD_S ** 2
 
 
 def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
-    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing; at rest the rotors stand."""
+    """PSD of first-order noise on each rotor's thrust: Lorentzian, through the mixing; at rest the rotors stand."""
     out, study, f = _no_power(data, i), data.study, frequencies(AIR)
     row = prepare(study.vehicle, study.calibration)[0][0]
     thrust = study.vehicle.thrust(data.flights[i].pwm)
@@ -197,7 +206,7 @@ def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
     mixing = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
                        -row["rotor_x"] / row["inertia"][1],
                        np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
-    aliases = folded_frequencies(f)
+    aliases = folded_frequencies(f, float(row["step"]))
     density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
     folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
     folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
@@ -208,9 +217,9 @@ def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
 
 
 def _rotor_lines(data: Data, i: int, term: Term) -> Spectra:
-    """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
+    """PSD of the rotors' lines: equal on each axis of the accelerometer, and of the gyro's differences."""
     out = _no_power(data, i)
-    if not len(data.base[i][AIR]):
+    if not len(data.residual[i][AIR]):
         return out
     line = lines(data).power[i][:, :, None] * term.values["amplitude"] ** 2
     out[AIR][:, :, FORCE] = line

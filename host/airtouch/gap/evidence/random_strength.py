@@ -1,4 +1,4 @@
-"""The strength of random effects of highest likelihood, and its variance."""
+"""The likeliest strength of random effects, and its variance."""
 
 from collections.abc import Sequence
 
@@ -15,41 +15,41 @@ from airtouch.simulation.effects import Active
 
 STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen for time
 GRID_SIZE = 40  #: strengths that are tried before the best is refined; chosen. With fewer a lower peak may be refined
-LEAST_STRENGTH = 0.003  #: least of them, natural steps; chosen. Weaker effects are given this strength
+LEAST_STRENGTH = 0.003  #: least of them, natural steps; chosen. An effect that is not there is given this strength
 LARGEST_STRENGTH = 1e3  #: largest of them, natural steps; chosen, beyond what flights show
-#: curvature of the likelihood in the logarithm of a strength, nats, by which is divided at least; chosen: an interval
-#: of a thousand times the strength is wide enough
+#: least curvature of the likelihood in the logarithm of a strength, nats; chosen: it gives a standard deviation of a
+#: thousand times the strength, which says nothing
 LEAST_CURVATURE = 1e-6
 #: change of the logarithm of a strength over which the curvature is taken; chosen. A larger number sees more of the
 #: likelihood's skewness, a smaller one more of the rounding
 CURVATURE_STEP = 0.15
 
 
-def with_strengths(problem: Problem, random: Sequence[Term], values: np.ndarray, mean: Sequence[Active],
+def with_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
                    ) -> list[Term]:
-    """Random effects with their strengths of highest likelihood, fitted one after another, the others as they are.
+    """Random effects with their likeliest strengths, fitted one after another, the others as they are.
 
-    values (n,): the gap under the mean effects `mean`.
+    residual (n,): under the mean effects `mean`.
     """
-    fitted, loop_power = list(random), problem.loop_power(mean, uncertain_floor=True).power
+    fitted, of_loop = list(random), problem.loop_change(mean, uncertain_floor=True).extra_power
     for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
         for i, term in enumerate(fitted):
-            others = loop_power + problem.random_power([*fitted[:i], *fitted[i + 1:]])
-            fitted[i] = strongest(problem, term, values, others)
+            others = of_loop + problem.random_power([*fitted[:i], *fitted[i + 1:]])
+            fitted[i] = strongest(problem, term, residual, others)
     return fitted
 
 
-def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.ndarray) -> Term:
-    """A random effect with its strength of highest likelihood; unchanged where it adds no power.
+def strongest(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
+    """A random effect with its likeliest strength; unchanged where it adds no power.
 
-    values (n,): the gap; other_power (n,): that others add.
+    residual (n,); extra_power (n,): that of the other effects.
     """
     _, high = term.bounds()
-    unit = problem.random_power([term.fitted(np.ones(len(term.free)))])
-    if not unit.any():
+    of_strength_1 = problem.random_power([term.fitted(np.ones(len(term.free)))])
+    if not of_strength_1.any():
         return term
 
-    likelihood = problem.likelihood.along(squared(values), other_power, unit)
+    likelihood = problem.likelihood.along(squared(residual), extra_power, of_strength_1)
 
     def cost(log_x: float) -> float:
         """Minus the log likelihood at the logarithm of the scaled strength."""
@@ -63,15 +63,16 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.
     return term.fitted(np.full(len(term.free), float(np.exp(optimum.x))))
 
 
-def strength_variance(data: Data, part: BlockSet, terms: Sequence[Term], term: Term) -> np.ndarray:
+def strength_variance(data: Data, blocks: BlockSet, terms: Sequence[Term], term: Term) -> np.ndarray:
     """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature.
 
-    It is 1e6 times the strength squared where the likelihood is flat (LEAST_CURVATURE).
+    It is 1e6 times the strength squared where the likelihood is flat (LEAST_CURVATURE). terms: the hypothesis, with its
+    values; term: the entry of it whose variance is asked for, not an equal one.
     """
     x = term.scaled(term.values)
     levels = []
     for amount in (-CURVATURE_STEP, 0.0, CURVATURE_STEP):
         scaled_term = term.fitted(x * np.exp(amount))
-        levels.append(judge(data, part, [scaled_term if t is term else t for t in terms]))
+        levels.append(judge(data, blocks, [scaled_term if t is term else t for t in terms]))
     curvature = (2.0 * levels[1] - levels[0] - levels[2]) / CURVATURE_STEP ** 2
     return np.diag(x ** 2 / max(curvature, LEAST_CURVATURE))

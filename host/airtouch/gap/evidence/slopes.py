@@ -1,4 +1,4 @@
-"""Slopes of the spectra by the parameters of mean effects, for the steps of a fit."""
+"""Slopes of the residual by the parameters of mean effects, for the steps of a fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from airtouch.gap.evidence.least_squares import bounds_of
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.torque_power import loops_differ
 from airtouch.gap.signals.command_view import LikelihoodSlopes
-from airtouch.gap.signatures.term import Term, mean_places
+from airtouch.gap.signatures.term import Term, mean_slices
 from airtouch.simulation.effects import Active
 
 #: change of a scaled parameter over which slopes are taken; chosen. A larger number sees more of the curvature as
@@ -23,26 +23,26 @@ FAR = 0.3
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
     """Mean effects at scaled parameters x (k,), without those that are neutral there."""
-    return [t.active(x[place]) for t, place in mean_places(mean) if x[place].any() or t.acts_when_neutral]
+    return [t.active(x[own]) for t, own in mean_slices(mean) if x[own].any() or t.acts_when_neutral]
 
 
 class ParameterSlopes(NamedTuple):
-    """Change per unit of one scaled parameter.
+    """Change per natural step of one parameter.
 
-    column, complex (n,): of the flattened spectra; rise (bins, axes): of the logarithm of the commands' power;
-    torque_power (replay,): of the floor of the torque; nonlinear: whether the parameter changes the loop, so that the
-    spectra are no linear function of it.
+    column, complex (n,): of the residual; rise (bins, axes): of the logarithm of the commands' expected power;
+    extra_torque_power (replay,): of the torque; nonlinear: whether the parameter changes the control loop, so that the
+    residual is no linear function of it.
     """
 
     column: np.ndarray
     rise: np.ndarray
-    torque_power: np.ndarray
+    extra_torque_power: np.ndarray
     nonlinear: bool
 
 
 @dataclass(frozen=True, eq=False)
 class SpectraSlopes:
-    """First-order changes of the spectra of `problem` by the k parameters of mean effects.
+    """First-order changes of the residual of `problem` by the k parameters of mean effects.
 
     at (k,): scaled parameters at which all slopes were last taken; nonlinear ones may be newer.
     by_parameter: k of them.
@@ -54,7 +54,7 @@ class SpectraSlopes:
     by_parameter: Sequence[ParameterSlopes]
 
     def moved_to(self, x: np.ndarray, anew: bool = False) -> "SpectraSlopes":
-        """The slopes for scaled parameters x (k,): of nonlinear parameters taken there.
+        """The slopes for scaled parameters x (k,), where those of nonlinear parameters are taken anew.
 
         All are where x is FAR from `at`, or if `anew`.
         """
@@ -64,19 +64,19 @@ class SpectraSlopes:
         newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale), strict=True))
         return replace(self, by_parameter=[newer.get(i, s) for i, s in enumerate(self.by_parameter)])
 
-    def power_slopes(self, x: np.ndarray, values: np.ndarray, extra_power: np.ndarray | float,
+    def power_slopes(self, x: np.ndarray, residual: np.ndarray, extra_power: np.ndarray | float,
                      uncertain_floor: bool) -> LikelihoodSlopes:
         """Slopes of the log likelihood by the k parameters, as far as these change the expected power.
 
-        x (k,): the scaled parameters; values (n,): the gap; extra_power (n,): the power over the floor;
+        x (k,): the scaled parameters; residual (n,); extra_power (n,): what all effects add to the floor's;
         uncertain_floor: see `Problem.modelled`.
         """
         problem = self.problem
         active, rises = active_at(self.mean, x), np.array([s.rise for s in self.by_parameter])
         slopes = problem.flat.commands.slopes(active, rises, uncertain_floor)
-        powers = np.array([s.torque_power for s in self.by_parameter])
+        powers = np.array([s.extra_torque_power for s in self.by_parameter])
         if powers.any():
-            by_power = problem.likelihood.power_slopes(values, np.broadcast_to(extra_power, values.shape),
+            by_power = problem.likelihood.power_slopes(residual, np.broadcast_to(extra_power, residual.shape),
                                                        problem.flat.replay_count)
             slopes = LikelihoodSlopes(slopes.gradient + powers @ by_power.slope,
                                       slopes.information + (powers * by_power.curvature) @ powers.T)
@@ -94,7 +94,7 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
         return []
     high = bounds_of(mean).high
     before = active_at(mean, x)
-    values, power = problem.values(before), problem.torque_power(before)
+    residual, extra_torque_power = problem.residual(before), problem.extra_torque_power(before)
     out = []
     for i in which:
         step = STEP if x[i] + STEP <= high[i] else -STEP
@@ -102,6 +102,6 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
         shifted[i] += step
         after = active_at(mean, shifted)
         out.append(ParameterSlopes(
-            (problem.values(after) - values) / step, problem.flat.commands.rise(before, after) / step,
-            (problem.torque_power(after) - power) / step, loops_differ(problem.data, before, after)))
+            (problem.residual(after) - residual) / step, problem.flat.commands.rise(before, after) / step,
+            (problem.extra_torque_power(after) - extra_torque_power) / step, loops_differ(problem.data, before, after)))
     return out

@@ -1,10 +1,10 @@
-"""Power that effects of the loop add to the floor of the torque in the replay view."""
+"""Extra power of the torque in the replay view: what effects of the control loop add to its floor."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.gap.evidence.data import Data, gap_spectra, step_doubt
+from airtouch.gap.evidence.data import Data, residual_spectra, step_doubt
 from airtouch.gap.evidence.flattened import Flattened
 from airtouch.gap.loop.torque_share import Change
 from airtouch.gap.signals.channels import COUNT, TORQUE
@@ -18,8 +18,8 @@ from airtouch.simulation.effects import Active
 TORQUE_DOUBT = 0.25
 
 
-def torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.ndarray:
-    """Power (replay,) that effects add to the floor of the torque in the replay view; 0 in other channels.
+def extra_torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.ndarray:
+    """Power (replay,) that effects add to the floor of the torque, unit^2/Hz; 0 in other channels.
 
     It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
     """
@@ -29,8 +29,8 @@ def torque_power(data: Data, flat: Flattened, active: Sequence[Active]) -> np.nd
     if loop_change is None:
         return np.zeros(count)
     gather, flights = flat.layout.gather, flat.layout.flights
-    base, valid = flat.elements.base[:count], flat.elements.valid[:count]
-    change = np.where(valid, gather(gap_spectra(data, effects, flights)) - base, 0.0)
+    without, valid = flat.elements.residual[:count], flat.elements.valid[:count]
+    change = np.where(valid, gather(residual_spectra(data, effects, flights)) - without, 0.0)
     step_power = step_doubt(data, effects, flights)
     doubt = TORQUE_DOUBT ** 2 * squared(change) * flat.is_torque
     if step_power is not None:
@@ -54,5 +54,5 @@ def loops_differ(data: Data, before: Sequence[Active], after: Sequence[Active]) 
 
 
 def beside_edges(active: Sequence[Active]) -> list[Active]:
-    """The effects that show elsewhere than at edges alone: in the replay, or in the loop that is part of it."""
+    """The effects that show elsewhere than at edges alone: in the replay, or in the loop within it."""
     return [a for a in active if not signature_of(a.effect).edges_only]

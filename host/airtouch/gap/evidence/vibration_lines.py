@@ -3,9 +3,9 @@
 An out-of-balance rotor shakes the IMU once a turn; the log's 100 Hz fold that line to somewhere below 50 Hz. Motor
 commands tell how the speed wanders: the mean of the rotors follows the thrust, which changes slowly, while differences
 between them are aliases of the rate loop but for their mean (trim). How fast a rotor turns for its thrust is seldom
-known to the percent that would tell where the fold puts the line. So the place of all lines together, and how far those
-of single rotors are apart, are found from the flights: two numbers for all of them. Lines of rotors that turn alike add
-up as their phases happen to stand, so that flights of one vehicle differ: each has its own share of the power.
+known to the percent that would tell where the fold puts the line. So the shift of all lines together, and the spread of
+those of single rotors around it, are estimated from the flights: two numbers for all of them. Lines of rotors that turn
+alike add up as their phases happen to stand, so that flights of one vehicle differ: each has its own power.
 """
 
 import itertools
@@ -30,7 +30,7 @@ from airtouch.simulation.plant import hover_speed
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
 #: rad^2/s, variance that a rotor's phase gains over the commanded one; chosen. A larger number makes wider lines
 WANDER = 0.3
-SPREADS_HZ = (0.0, 1.0, 3.0)  #: spreads of the single rotors' lines around their common place, tried one by one; chosen
+SPREADS_HZ = (0.0, 1.0, 3.0)  #: spreads of the single rotors' lines around their mean that are tried; chosen
 #: relative error of a rotor's speed where the vehicle declares thrust over speed squared, or the log has the speed;
 #: chosen. A larger number looks for lines farther from where they should be, and may find others
 KNOWN_SPEED = 0.02
@@ -39,16 +39,17 @@ RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: lines are looked for above it, as forces of other origin are strong below; chosen
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
 FINER = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)  #: multiples of the best that are tried then, up to its neighbours
-AROUND = 3  #: bins on either side of the rough place in which the place is refined; chosen, more than the rough step
-MOST_BLOCKS = 40  #: most blocks in which the place of lines is looked for; chosen for time
+AROUND = 3  #: bins on either side of the rough shift in which it is refined; chosen, more than the rough step of 2
+MOST_BLOCKS = 40  #: most blocks by which the shift is estimated; chosen for time
 
 
 @dataclass(frozen=True)
 class Lines:
     """The lines of some flights, together 1 m/s^2 in hover.
 
-    power: PSD (blocks, bins) of an accelerometer axis, for each flight; shift: bins from the place that the vehicle's
-    thrust over speed squared gives; spread_hz: of the single rotors' lines around it.
+    power: PSD (blocks, bins) of an accelerometer axis, (m/s^2)^2/Hz, for each flight; shift: bins from where the
+    vehicle's thrust over speed squared puts the lines; spread_hz: standard deviation of the single rotors' lines
+    around that.
     """
 
     power: list[np.ndarray]
@@ -57,26 +58,27 @@ class Lines:
 
 
 def lines(data: Data) -> Lines:
-    """The lines of the flights of `data` (`data.Data`); computed once."""
+    """The lines of the flights of `data`; computed once."""
     return data.workspace.cached("lines", (), lambda: _search(data))
 
 
 def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
     """Power (blocks, BINS) of exp(i angle) of all rotors, each 0.5 (speed / hover)^2, as blocks hold it.
 
-    speed (n, 4) rad/s at 100 Hz; first: samples at which the blocks begin. Bins as numpy.fft has them.
+    speed (n, 4): of the rotors, rad/s, at 100 Hz; hover: their speed in hover, rad/s; first: samples at which the
+    blocks begin. Bins as numpy.fft orders them.
     """
     window = hann_window(BINS)[0][:, 0]
-    place = first[:, None] + np.arange(BINS)
+    samples = first[:, None] + np.arange(BINS)
     total = np.zeros((len(first), BINS))
     for one in speed.T:
         turning = 0.5 * (one / hover) ** 2 * np.exp(1j * PERIOD_S * np.cumsum(one))
-        total += np.abs(np.fft.fft(turning[place] * window, axis=1)) ** 2
+        total += np.abs(np.fft.fft(turning[samples] * window, axis=1)) ** 2
     return total * 2.0 * PERIOD_S / (window ** 2).sum()
 
 
 def widened(power: np.ndarray, spread_hz: float) -> np.ndarray:
-    """Two-sided power (blocks, BINS) of rotors whose phases walk by WANDER and whose frequencies are uncertain.
+    """Two-sided power (blocks, BINS) where phases walk randomly (WANDER) and frequencies are uncertain.
 
     power: that of `two_sided`; spread_hz: standard deviation of the frequency (Gaussian).
     """
@@ -86,7 +88,7 @@ def widened(power: np.ndarray, spread_hz: float) -> np.ndarray:
 
 
 def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
-    """One-sided PSD (blocks, BINS // 2 + 1) of the real part of what has a two-sided power (blocks, BINS).
+    """One-sided PSD (blocks, BINS // 2 + 1) of the real part of a signal with a two-sided power (blocks, BINS).
 
     shift: bins by which the power is moved before it is folded.
     """
@@ -98,7 +100,7 @@ def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
 
 
 def speeds(flight: Flight, study: Study) -> np.ndarray:
-    """Rotor speeds (n, 4), rad/s: logged ones, or those of the mean command with each rotor's trim."""
+    """Rotor speeds (n, 4), rad/s: as logged, else those of the mean command with each rotor's trim."""
     if flight.log.has(*RPM):
         return interpolate_missing(flight.log.stack(RPM)) * np.pi / 30.0
     replayed = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
@@ -108,9 +110,9 @@ def speeds(flight: Flight, study: Study) -> np.ndarray:
 
 
 def _search(data: Data) -> Lines:
-    """The place and spread of the lines that explain some blocks of all flights best.
+    """The lines with the likeliest shift and spread, by some blocks of all flights.
 
-    First the place at one spread, in every other bin, then place and spread together around it.
+    First the shift at one spread, in every other bin, then shift and spread together around it.
     """
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
@@ -123,16 +125,16 @@ def _search(data: Data) -> Lines:
         return Lines([folded(widened(z, 0.0)) for z in powers], 0, 0.0)
     rough = max(range(-reach, reach + 1, 2), key=lambda shift: sample.gain(SPREADS_HZ[1], shift))
     around = range(max(rough - AROUND, -reach), min(rough + AROUND, reach) + 1)
-    spread, shift = max(itertools.product(SPREADS_HZ, around), key=lambda place: sample.gain(*place))
+    spread, shift = max(itertools.product(SPREADS_HZ, around), key=lambda pair: sample.gain(*pair))
     power = [folded(widened(z, spread), shift) for z in powers]
-    return Lines(_with_flight_shares(data, power), int(shift), spread)
+    return Lines(_scaled_by_flight(data, power), int(shift), spread)
 
 
 class _Sample:
-    """Some blocks of all flights, and how well lines at a place explain them."""
+    """Some blocks of all flights, and how likely lines of a shift and spread make them."""
 
     def __init__(self, data: Data, powers: list[np.ndarray]) -> None:
-        blocks = np.concatenate([b[AIR][:, :, FORCE] for b in data.base])
+        blocks = np.concatenate([b[AIR][:, :, FORCE] for b in data.residual])
         chosen = evenly_spaced(range(len(blocks)), MOST_BLOCKS)
         self.over_floor, self.floor = _over_floor(data, blocks[chosen])
         two_sided_power = np.concatenate(powers)[chosen]
@@ -151,7 +153,10 @@ def _judged() -> np.ndarray:
 
 
 class _OverFloor(NamedTuple):
-    """Power (blocks, bins) of the accelerometer over its floor, mean of three axes, and that floor (bins,), PSD."""
+    """Power of the accelerometer over its floor, and that floor.
+
+    over (blocks, bins): ratio, mean of three axes; floor (bins,): PSD, (m/s^2)^2/Hz, harmonic mean of three axes.
+    """
 
     over: np.ndarray
     floor: np.ndarray
@@ -166,7 +171,10 @@ def _over_floor(data: Data, blocks: np.ndarray) -> _OverFloor:
 
 
 class BestStrength(NamedTuple):
-    """The nats, without OVERLAP_WEIGHT, that the likeliest lines gain over none, and the strength (power) of these."""
+    """Nats, without OVERLAP_WEIGHT, that the likeliest lines gain over none, and the strength of these.
+
+    strength: factor on the power of the lines' shape.
+    """
 
     gain: float
     strength: float
@@ -175,8 +183,8 @@ class BestStrength(NamedTuple):
 def best_strength(over: np.ndarray, shape: np.ndarray) -> BestStrength:
     """The likeliest strength of lines of a shape, to the nearest that is tried.
 
-    over (blocks, bins): power over the floor; shape (blocks, bins): that of lines of strength 1. The tails have the
-    scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
+    over (blocks, bins): power over the floor, a ratio; shape (blocks, bins): that of lines of strength 1. The tails
+    have the scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
     """
     strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
@@ -193,14 +201,14 @@ def best_strength(over: np.ndarray, shape: np.ndarray) -> BestStrength:
     return BestStrength(max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))]))
 
 
-def _with_flight_shares(data: Data, power: list[np.ndarray]) -> list[np.ndarray]:
-    """Lines of several flights, each with its share of the power; 1 on average."""
+def _scaled_by_flight(data: Data, power: list[np.ndarray]) -> list[np.ndarray]:
+    """Lines of several flights, each scaled by its own strength over the mean strength."""
     if len(power) < 2:
         return power
-    share = np.zeros(len(power))
-    for i, (lines_of_flight, gap) in enumerate(zip(power, data.base, strict=True)):
+    strength = np.zeros(len(power))
+    for i, (lines_of_flight, residual) in enumerate(zip(power, data.residual, strict=True)):
         if len(lines_of_flight):
-            over, floor = _over_floor(data, gap[AIR][:, :, FORCE])
-            share[i] = best_strength(over, lines_of_flight[:, _judged()] / floor).strength
-    mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
-    return [p * s / mean_share for p, s in zip(power, share, strict=True)]
+            over, floor = _over_floor(data, residual[AIR][:, :, FORCE])
+            strength[i] = best_strength(over, lines_of_flight[:, _judged()] / floor).strength
+    mean = strength[strength > 0.0].mean() if (strength > 0.0).any() else 1.0
+    return [p * s / mean for p, s in zip(power, strength, strict=True)]

@@ -21,12 +21,12 @@ from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
-CHANNELS = 9  #: that are regressed: force, torque, rate
-ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
-TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
-LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
+CHANNELS = 9  #: the first channels, which are regressed: force, torque, rate
+ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques whose loop is modelled; yaw torque is mostly gyro noise
+TURNS = (1.0, 1.0j)  #: factors on the spectrum of the commands: in phase with them, and a quarter turn off
+LOOP_HZ = BANDS_HZ[1:]  #: limits of the bands above the means, to which no law of the response applies
 LOOP_COLUMNS = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
-WIDEST = len(BASIS) + LOOP_COLUMNS
+WIDEST = len(BASIS) + LOOP_COLUMNS  #: most columns of a channel, without offsets
 NOTHING = 1e-9  #: variance that a coefficient or a power without scatter is given; chosen
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
@@ -34,7 +34,11 @@ OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate((
 
 @dataclass(frozen=True)
 class NamelessFloor:
-    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, CELLS)."""
+    """Scatter of nominal flights.
+
+    columns (CHANNELS, WIDEST): rms of the coefficients; power (2, CELLS): mean and rms of the natural logarithm of the
+    power over the expected one.
+    """
 
     columns: np.ndarray
     power: np.ndarray
@@ -49,45 +53,46 @@ def no_floor() -> NamelessFloor:
 class Regressors:
     """What the values of one channel of one flight are regressed on.
 
-    places (elements,): of the values among the problem's; columns (elements, free + offsets): of the regression;
-    offsets (offsets,): standard deviation of each offset, the last columns' coefficients.
+    channel: its index in `channels.CHANNELS`; indices (elements,): of the values among the problem's; columns
+    (elements, free + offsets): of the regression, the last ones of the offsets; offset_stds (offsets,): standard
+    deviations of the offsets' priors.
     """
 
     channel: int
-    places: np.ndarray
+    indices: np.ndarray
     columns: np.ndarray
-    offsets: np.ndarray
+    offset_stds: np.ndarray
 
     @property
     def free(self) -> int:
-        """Columns whose coefficient may be anything."""
-        return self.columns.shape[1] - len(self.offsets)
+        """How many columns are not of an offset."""
+        return self.columns.shape[1] - len(self.offset_stds)
 
     def precision(self, floor: NamelessFloor) -> np.ndarray:
-        """Inverse variances (free + offsets,) of the priors of coefficients in a nominal flight, and of the offsets."""
+        """Inverse variances (free + offsets,) of the priors: of coefficients as in nominal flights, and of offsets."""
         nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
-        return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
+        return np.concatenate([1.0 / nominal, 1.0 / self.offset_stds ** 2])
 
 
-def regressors_of(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
-    """The regressors of each channel of each flight of a part that has known values; made once."""
-    return problem.flat.workspace.cached("regressors", (), lambda: _regressors(data, part, problem))
+def regressors_of(data: Data, blocks: BlockSet, problem: Problem) -> list[Regressors]:
+    """The regressors of each channel of each flight that has valid values among some blocks; made once."""
+    return problem.flat.workspace.cached("regressors", (), lambda: _regressors(data, blocks, problem))
 
 
-def _regressors(data: Data, part: BlockSet, problem: Problem) -> list[Regressors]:
-    """See `regressors_of`."""
+def _regressors(data: Data, blocks: BlockSet, problem: Problem) -> list[Regressors]:
+    """The regressors of `regressors_of`, made anew."""
     out = []
     e, count = problem.elements, problem.flat.replay_count
     channel, flight, valid = (x[:count] for x in (e.channel, e.flight, e.valid))
     for c in range(CHANNELS):
-        table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
+        table, elements = _table(data, blocks, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
             here = valid[elements] & (flight[elements] == f)
-            places = elements[here]
-            offsets = [(x, o.spread) for o in problem.offsets if np.any(x := o.at(places))]
-            if len(places):
-                out.append(Regressors(c, places, np.column_stack([table[here], *(x for x, _ in offsets)]),
-                                      np.array([p for _, p in offsets])))
+            indices = elements[here]
+            offsets = [(x, o.prior_std) for o in problem.offsets if np.any(x := o.at(indices))]
+            if len(indices):
+                out.append(Regressors(c, indices, np.column_stack([table[here], *(x for x, _ in offsets)]),
+                                      np.array([std for _, std in offsets])))
     return out
 
 
@@ -98,7 +103,8 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
         out = []
         for flight, first in zip(data.flights, data.first, strict=True):
             signals = basis(flight, data.study.vehicle)
-            out.append([{r: short_time_spectra(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
+            out.append([{state: short_time_spectra(signals[:, :, axis], first[state], state) for state in first}
+                        for axis in range(3)])
         return out
 
     return data.workspace.cached("basis", (), make)
@@ -107,7 +113,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
 def _loop_columns(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 2, LOOP_COLUMNS) in the air of the torque that the model makes of the commands, by flight.
 
-    Each band's alone, weighted as what is left of the torque is; made once.
+    Each column has one band alone, weighted as the residual of the torque is; made once.
     """
     def make() -> list[np.ndarray]:
         """The spectra, by flight."""
@@ -125,24 +131,25 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
     return data.workspace.cached("loop", (), make)
 
 
-def _table(data: Data, part: BlockSet, problem: Problem, channel: int) -> np.ndarray:
+def _table(data: Data, blocks: BlockSet, problem: Problem, channel: int) -> np.ndarray:
     """The columns (elements, columns) at the elements of one channel, in their order."""
     spectra, rows = _columns(data), []
     axis = channel % 3
-    for i, r, chosen in part.pieces:
-        columns = spectra[i][axis][r][chosen]
+    for i, state, chosen in blocks.pieces:
+        columns = spectra[i][axis][state][chosen]
         if channel in ROLL_PITCH:
-            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP_COLUMNS))
+            at_rest = np.zeros((*columns.shape[:2], LOOP_COLUMNS))
+            loop = _loop_columns(data)[i][chosen, :, axis] if state == AIR else at_rest
             columns = np.concatenate([columns, loop], axis=2)
-        rows.append(columns[:, problem.flat.layout.keep[r][:, channel]].reshape(-1, columns.shape[2]))
+        rows.append(columns[:, problem.flat.layout.keep[state][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
 
 
 def allowed_columns(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
-    """Whether a column says something new beside a hypothesis, bool (WIDEST,).
+    """Whether a column may be used beside a hypothesis, bool (WIDEST,).
 
-    A random torque is in the commands that answer it: what is left follows these, as it should. And how a changed loop
-    turns the vehicle about its yaw axis upon a command is not modelled.
+    Not where the residual of a right hypothesis has the column too. The commands answer a random torque, so that its
+    residual follows them. And how a changed loop turns the vehicle about its yaw axis upon a command is not modelled.
     """
     out = np.ones(WIDEST, bool)
     out[len(BASIS):] = data.study.same_models

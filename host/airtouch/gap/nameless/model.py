@@ -1,10 +1,10 @@
-"""The nameless model: what the residual that a hypothesis leaves holds, without the name of an effect.
+"""The nameless model of the residual that a hypothesis leaves: a regression and free powers, without any effect.
 
-Its two parts are both fitted to one half of the data and judged on the other. The first is a `regression` of every
-force, torque and rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity,
-tilt, height over what is below, time. The second is a free power in every view, channel and band (`powers`). Only
+Both are fitted to one half of the data and judged on the other. The first is a `regression` of every force, torque and
+rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity, tilt, height over
+what is below, time. The second is a free power in every view, channel and band (`powers`). Only
 columns and bands that gain more than chance among so many does are used. What nominal flights have of a column or a
-band is no evidence: as far as they scatter, the coefficient is taken away at no gain.
+band is no evidence: each flight has a coefficient and a power of its own with a prior as wide as they scatter.
 """
 
 from collections.abc import Sequence
@@ -16,43 +16,46 @@ from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet, whole_of
 from airtouch.gap.nameless.basis import BASIS
 from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, allowed_columns, no_floor
 from airtouch.gap.nameless.powers import power_floor, power_gain
-from airtouch.gap.nameless.regression import PartResiduals, coefficients, column_floor, linear_gain
+from airtouch.gap.nameless.regression import BlockResiduals, coefficients, column_floor, linear_gain
+from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.signatures.term import Term
 
-LIFT, OF_HEIGHT = 2, ("near", "low", "height")  #: channel of the force along the thrust; columns of the height
+LIFT = COLUMN["force_z"]  #: channel of the force along the thrust
+OF_HEIGHT = ("near", "low", "height")  #: columns of the height
 
 
-def held_out_gains(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
-    """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
+def held_out_gains(data: Data, halves: Sequence[BlockSet], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
+    """Held-out nats that columns, and powers on top of them, add to a hypothesis.
 
-    terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
-    flights alone: a recorded one had calm air; and not in the band of the means, of which offsets take what they may.
+    halves: the blocks of the two; terms: the hypothesis as fitted to each of them. Less power than nominal flights have
+    counts in simulated flights alone, as a recorded flight may have calmer air, and not in the band of the means, whose
+    power the offsets may take.
     """
     floor = data.study.nameless_floor or no_floor()
     linear = power = 0.0
     for train, test in TWO_FOLDS:
-        trained, held_out = (PartResiduals(data, parts[half], terms[train]) for half in (train, test))
+        trained, held_out = (BlockResiduals(data, halves[half], terms[train]) for half in (train, test))
         fitted = np.array([coefficients(trained, channel, floor, allowed_columns(data, terms[train], channel))
                            for channel in range(CHANNELS)])
         for channel in range(CHANNELS):
             linear += linear_gain(held_out, channel, fitted[channel], floor)
-        powers = [half.powers(half.residuals_under(fitted, floor)) for half in (trained, held_out)]
+        powers = [half.powers(half.whole_residual_under(fitted, floor)) for half in (trained, held_out)]
         power += power_gain(powers[0], powers[1], floor, data.study.simulated)
     return linear, power
 
 
-def height_gain(data: Data, parts: Sequence[BlockSet]) -> float:
-    """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
+def height_gain(data: Data, halves: Sequence[BlockSet]) -> float:
+    """Held-out nats that a force along the thrust gains which follows the height over what is below."""
     floor = data.study.nameless_floor or no_floor()
-    halves = [PartResiduals(data, part, ()) for part in parts]
+    residuals = [BlockResiduals(data, half, ()) for half in halves]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
-    return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
+    return sum(linear_gain(residuals[test], LIFT, coefficients(residuals[train], LIFT, floor, among), floor)
                for train, test in TWO_FOLDS)
 
 
 def nameless_floor(data: Data) -> NamelessFloor:
-    """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
-    flights = [PartResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
+    """Scatter of coefficients and powers of nominal flights beyond that of chance; none with fewer than two."""
+    flights = [BlockResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     if len(flights) < 2:
         return no_floor()
     floor = NamelessFloor(column_floor(flights), no_floor().power)

@@ -10,7 +10,7 @@ forward          effects added one by one, each beside those before it
 leave_one_out    what each of several effects adds to the others
 over_prediction  where the effects named predict what the flights do not show
 rounds           one round: every candidate beside the same base, screened, then fitted
-screening        every variant judged at a small part of what its fit would cost
+screening        every variant judged at a fraction of what its fit would cost
 thresholds       what a further effect must gain
 evidence         how the scatter of nominal flights limits the evidence for an effect
 judging          one hypothesis fitted on one half of the flights and judged on the other

@@ -54,8 +54,8 @@ class Extension(NamedTuple):
 
 
 @dataclass(frozen=True)
-class State:
-    """Where a forward selection stands.
+class PartialSelection:
+    """What a forward selection has added so far, and what it may add next.
 
     steps: the hypotheses so far, each with the effects of those before it; extensions: candidates judged beside the
     last step, by name; single_effects: the best variant of every candidate, as judged before an effect was named;
@@ -83,36 +83,36 @@ class State:
         return len(self.steps) - len(self.names)
 
 
-def forward(search: Search, passing: Candidate | None) -> State:
-    """The state in which a forward selection ends.
+def forward(search: Search, passing: Candidate | None) -> PartialSelection:
+    """The forward selection with all steps that held-out data ask for.
 
     passing: a passing effect, which is the first step; None for none.
     """
-    state = _begun(search, passing)
-    while len(state.names) < MOST_EFFECTS:
+    partial = _begun(search, passing)
+    while len(partial.names) < MOST_EFFECTS:
         least = search.trial.policy.least_evidence
-        best = _best_of(_worth_adding(state, least), state.gain, least)
+        best = _best_of(_worth_adding(partial, least), partial.gain, least)
         if best is None:
             break
-        state = _added(search, state, best)
-    return state
+        partial = _added(search, partial, best)
+    return partial
 
 
-def _begun(search: Search, passing: Candidate | None) -> State:
-    """The state before the first effect is added, with a passing effect as a step already."""
+def _begun(search: Search, passing: Candidate | None) -> PartialSelection:
+    """The selection before the first effect is added, with a passing effect as a step already."""
     if passing is None:
         extensions = {n: Extension(c, search.least_nats[n]) for n, c in search.single_effects.items()}
-        return State((), extensions, search.single_effects, search.least_nats)
+        return PartialSelection((), extensions, search.single_effects, search.least_nats)
     single_effects = {**search.single_effects, passing.name: passing}
     steps = (Step.of(passing),)
     extensions = _extensions(search, steps, single_effects, {n: c.gain for n, c in single_effects.items()})
-    return State(steps, extensions, single_effects, {**search.least_nats, passing.name: PASSING_GAIN})
+    return PartialSelection(steps, extensions, single_effects, {**search.least_nats, passing.name: PASSING_GAIN})
 
 
-def _worth_adding(state: State, least_evidence: float) -> list[Candidate]:
+def _worth_adding(partial: PartialSelection, least_evidence: float) -> list[Candidate]:
     """Candidates that gain enough beside the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = [e.candidate for e in state.extensions.values() if e.candidate.gain - state.gain >= e.required_gain]
-    if state.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
+    enough = [e.candidate for e in partial.extensions.values() if e.candidate.gain - partial.gain >= e.required_gain]
+    if partial.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
         return [c for c in enough if c.evidence >= least_evidence]
     return enough
 
@@ -139,20 +139,20 @@ def _best_of(candidates: Sequence[Candidate], before: float, least_evidence: flo
     return max(as_good, key=merit, default=best)
 
 
-def _added(search: Search, state: State, best: Candidate) -> State:
-    """The state with a further step: named, or a deviation where its evidence or its gain is too small for a name."""
-    beside_last = {n: e.candidate for n, e in state.extensions.items()}
-    single_effects = state.single_effects
-    if not state.names:  # what nominal flights have as well stands beside every candidate
-        added = {s.name for s in state.steps}
+def _added(search: Search, partial: PartialSelection, best: Candidate) -> PartialSelection:
+    """The selection with a further step: named, or a deviation where its evidence or gain is too small for a name."""
+    beside_last = {n: e.candidate for n, e in partial.extensions.items()}
+    single_effects = partial.single_effects
+    if not partial.names:  # what nominal flights have as well stands beside every candidate
+        added = {s.name for s in partial.steps}
         single_effects = {**single_effects, **{n: c for n, c in beside_last.items() if n not in added}}
-    left_by_another = bool(state.names) and is_random_misfit(search.trial, state.steps[-1], best)
+    left_by_another = bool(partial.names) and is_random_misfit(search.trial, partial.steps[-1], best)
     enough = best.evidence >= search.trial.policy.least_evidence
-    steps = (*state.steps, Step.of(best, is_named=enough and not left_by_another))
-    after = replace(state, steps=steps, single_effects=single_effects)
+    steps = (*partial.steps, Step.of(best, is_named=enough and not left_by_another))
+    after = replace(partial, steps=steps, single_effects=single_effects)
     if len(after.names) >= MOST_EFFECTS:  # nothing is added to these
         return after
-    further_gains = {n: c.gain - state.gain for n, c in beside_last.items()}
+    further_gains = {n: c.gain - partial.gain for n, c in beside_last.items()}
     return replace(after, extensions=_extensions(search, steps, beside_last, further_gains))
 
 

@@ -16,7 +16,7 @@ from airtouch.gap.signatures.term import Term
 
 
 def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
-    """Share of the gap that the effects named must close, to be named; None where they need not.
+    """Fraction of the gap that effects must close to be named; None where they need not close any.
 
     gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
     must close LEAST_CLOSED, and so must a passing one if the gap is over STANDS_OUT. Over STANDS_OUT any
@@ -37,7 +37,7 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
     """Whether the effects named take away less of the gap than they must, or nothing.
 
-    gap: as for `least_closed`; closed: share of it that they take away.
+    gap: as for `least_closed`; closed: fraction of it that they take away.
     """
     least = least_closed(data, selection, gap)
     return least is not None and (closed < least or closed <= 0.0)
@@ -46,7 +46,7 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
 def with_none_named(selection: Selection, closed: float) -> Selection:
     """The selection with no effect named, as those that were named close too little of the gap.
 
-    closed: share of the gap that they close. Beside none the nameless model gains what it gains over none.
+    closed: fraction of the gap that they close. Beside none the nameless model gains what it gains over none.
     """
     nameless = replace(selection.nameless, over_last_step=selection.nameless.over_none)
     first = selection.named_steps[0].name
@@ -81,7 +81,7 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
 def loop_closes_too_little(closed: float, closed_by_others: float) -> bool:
     """Whether effects of the control loop close less than LEAST_CLOSED beyond what those beside them close alone.
 
-    closed: share of the gap that all take away; closed_by_others: that the others take away, judged without them.
+    closed: fraction of the gap that all take away; closed_by_others: that the others take away, judged without them.
     """
     return closed - closed_by_others < LEAST_CLOSED
 

@@ -28,7 +28,7 @@ from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term, Terms
 
-GROUP = 3  #: neighbouring blocks that stay in one half, which is 5 s; chosen
+GROUP = 3  #: neighbouring blocks that stay in one half, in the air 5 s together; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
 NEAR_BOUND = 0.999  #: share of a bound from which a parameter is at that bound; chosen: fits end just short of one
 
@@ -43,7 +43,7 @@ class PricedVariant(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """What hypotheses are judged on.
+    """The flights that hypotheses are judged on, and the likelihood of none.
 
     halves: the blocks of the flights, in two; policy: what they must show; none_certain, none_uncertain: log likelihood
     of no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
@@ -58,7 +58,7 @@ class Trial:
 
 
 def trial_of(data: Data) -> Trial:
-    """Flights made ready to be judged."""
+    """The trial of some flights: halved, with the policy of their study."""
     of_data = halves(data)
     none_certain, none_uncertain = ([judge(data, half, (), uncertain) for half in of_data]
                                     for uncertain in (False, True))
@@ -81,7 +81,7 @@ def halves(data: Data) -> tuple[BlockSet, BlockSet]:
 
 
 def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
-    """Which scaled parameters (k,) lie as far from neutral as they may: the model stretches to fit something else."""
+    """Whether each scaled parameter (k,) lies at its bound, as where the model stretches to fit another effect."""
     low, high = (term.among_all(b) for b in term.bounds())
     return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
@@ -133,10 +133,10 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
     The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
     fewer effects.
     """
-    start, part = _start(base, terms, half), trial.halves[half]
+    start, blocks = _start(base, terms, half), trial.halves[half]
     key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
     return trial.data.workspace.cached(
-        "fit", key, lambda: _refined(trial.data, part, fit(trial.data, part, terms, start, brief=brief)))
+        "fit", key, lambda: _refined(trial.data, blocks, fit(trial.data, blocks, terms, start, brief=brief)))
 
 
 def price_of(terms: Sequence[Term]) -> float:
@@ -180,7 +180,7 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms])
         return Strength(mean, np.zeros((len(mean), len(mean))), np.zeros(len(mean)))
     covariance = np.zeros((k, k))
     for fit_of_half, own in zip(fits, in_each, strict=True):
-        first = fit_of_half.place(own).start
+        first = fit_of_half.slice_of(own).start
         covariance += fit_of_half.covariance[first:first + k, first:first + k] / len(fits) ** 2
     return Strength(mean, covariance_among_all(term, covariance), term.among_all(0.5 * (scaled[0] - scaled[-1])))
 
@@ -190,19 +190,19 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
 
     It is infinite for the others.
     """
-    place = term.among_all(np.arange(len(term.free)), -1).astype(int)
-    own = np.flatnonzero(place >= 0)
-    out = np.diag(np.full(len(place), np.inf))
-    out[np.ix_(own, own)] = covariance[np.ix_(place[own], place[own])]
+    index = term.among_all(np.arange(len(term.free)), -1).astype(int)
+    own = np.flatnonzero(index >= 0)
+    out = np.diag(np.full(len(index), np.inf))
+    out[np.ix_(own, own)] = covariance[np.ix_(index[own], index[own])]
     return out
 
 
-def _refined(data: Data, part: BlockSet, fitted: FittedTerms) -> FittedTerms:
+def _refined(data: Data, blocks: BlockSet, fitted: FittedTerms) -> FittedTerms:
     """A fit with those parameters free as well that only a fit close to the truth can find (`Term.refined`)."""
     terms = [t.refined() for t in fitted.terms]
     if all(a.free == b.free for a, b in zip(terms, fitted.terms, strict=True)):
         return fitted
-    return fit(data, part, terms, mean_parameters(terms))
+    return fit(data, blocks, terms, mean_parameters(terms))
 
 
 def _start(base: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:

@@ -30,39 +30,39 @@ def with_leave_one_out_gains(trial: Trial, steps: Sequence[Step]) -> list[Step]:
         searched_for = step.passing_key not in (None, KNOWN_OVERHEAD)
         return step.is_named and (several_named or (searched_for and len(steps) > 1))
 
-    return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, place))
-            if stands_beside_others(s) else s for place, s in enumerate(steps)]
+    return [replace(s, leave_one_out_gain=steps[-1].gain - _gain_without(trial, steps, index))
+            if stands_beside_others(s) else s for index, s in enumerate(steps)]
 
 
-def _gain_without(trial: Trial, steps: Sequence[Step], place: int) -> float:
-    """Held-out nats of the last step's hypothesis without the effect of the step at a place, the others fitted anew."""
-    last, dropped = steps[-1], _new_slots(steps, place)
+def _gain_without(trial: Trial, steps: Sequence[Step], index: int) -> float:
+    """Held-out nats of the last step's hypothesis without the effect of one step, the others fitted anew."""
+    last, dropped = steps[-1], _new_slots(steps, index)
     others = _without(last.terms, dropped)
     gain = clock_gains(trial.data, others)
-    cost_of_dropped = steps[place].charges.choice_cost - (steps[place - 1].charges.choice_cost if place else 0.0)
+    cost_of_dropped = steps[index].charges.choice_cost - (steps[index - 1].charges.choice_cost if index else 0.0)
     cost_of_others = last.charges.choice_cost - cost_of_dropped
     if all(t.shows_in == CLOCK for t in others):
         return gain - cost_of_others
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
     gain += sum(gain_of(trial, test, refits[train].terms) for train, test in TWO_FOLDS)
-    gain += _certainty_refund(trial, steps, place)
+    gain += _certainty_refund(trial, steps, index)
     return gain - price_of(refits[-1].terms) - cost_of_others
 
 
-def _certainty_refund(trial: Trial, steps: Sequence[Step], place: int) -> float:
-    """`Charges.certainty_refund` of the last step's hypothesis without the effect of the step at a place.
+def _certainty_refund(trial: Trial, steps: Sequence[Step], index: int) -> float:
+    """`Charges.certainty_refund` of the last step's hypothesis without the effect of the step at an index.
 
     It is 0 where no other effect stands before the first random one, or none is random: nothing lost certainty. It is
     that of the last step where the dropped effect came after the first random one, which it did not change. Else the
     effects before the first random one are fitted anew by themselves, without the dropped one, for what they lose.
     """
-    first_random = next((i for i in range(len(steps)) if i != place and random_of(new_terms(steps, i))), None)
+    first_random = next((i for i in range(len(steps)) if i != index and random_of(new_terms(steps, i))), None)
     if first_random is None:
         return 0.0
-    earlier = [i for i in range(first_random) if i != place]
+    earlier = [i for i in range(first_random) if i != index]
     if not earlier:
         return 0.0
-    if place > first_random:
+    if index > first_random:
         return steps[-1].charges.certainty_refund
     later = frozenset().union(*(_new_slots(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
@@ -74,9 +74,9 @@ def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:
     return fit(trial.data, trial.halves[half], terms, mean_parameters(terms))
 
 
-def _new_slots(steps: Sequence[Step], place: int) -> frozenset[Hashable]:
-    """Slots of the terms that the step at a place has added."""
-    return frozenset(t.slot for t in new_terms(steps, place))
+def _new_slots(steps: Sequence[Step], index: int) -> frozenset[Hashable]:
+    """Slots of the terms that the step at an index has added."""
+    return frozenset(t.slot for t in new_terms(steps, index))
 
 
 def _without(terms: Sequence[Term], dropped: frozenset[Hashable]) -> list[Term]:

@@ -49,7 +49,7 @@ ABOUT_AS_GOOD = 3.0
 PROMISING = 0.5 * FIRST_GAIN
 #: hypotheses judged to first order, the best of them, among which those that gain PROMISING are fitted in full; others
 #: are fitted beside these: random effects that promise something, what only a fit can judge, and names that a round is
-#: told to fit (`rounds`). Chosen for time, as PROMISING
+#: asked to fit (`rounds`). Chosen for time, as PROMISING
 BEST_SCREENED = 5
 #: effects that are named of one set of flights; chosen 2026-11-21. A fourth would cost one more round of fits
 MOST_EFFECTS = 3

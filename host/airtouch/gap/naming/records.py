@@ -19,8 +19,8 @@ class Strength:
     """Scaled parameters of one term, as both halves of the flights have them.
 
     mean (k,): of both halves, 0 for parameters that the variant does not free; covariance (k, k): of estimation, 0 but
-    for mean effects, infinite for parameters that are not free, empty if not requested; half_difference (k,): half the
-    difference of the halves. k: all parameters that the effect may have free.
+    for mean effects, infinite for parameters that are not free, empty where none was estimated; half_difference (k,):
+    half the difference of the halves. k: the number of parameters that the effect may have free.
     """
 
     mean: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -181,10 +181,10 @@ class Selection:
         return float(self.inference.evidence[candidate.name] if self.inference is not None else candidate.gain)
 
 
-def new_terms(steps: Sequence[Step], place: int) -> list[Term]:
-    """The terms that the step at a place has added to those before it: an effect, its random part, its companion."""
-    before = {t.slot for t in steps[place - 1].terms} if place else set()
-    return [t for t in steps[place].terms if t.slot not in before]
+def new_terms(steps: Sequence[Step], index: int) -> list[Term]:
+    """The terms that the step at an index has added to those before it: an effect, its random part, its companion."""
+    before = {t.slot for t in steps[index - 1].terms} if index else set()
+    return [t for t in steps[index].terms if t.slot not in before]
 
 
 def _in_slots(terms: Terms, slots: Container[Hashable]) -> Terms:

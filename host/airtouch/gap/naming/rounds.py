@@ -91,8 +91,8 @@ def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container
     fit that gain PROMISING over the gain of the base, nats; promising: names that are worth one at any gain.
     """
     worth_a_fit, others = [], []
-    for place, candidate in enumerate(screened):
-        gains_enough = place < BEST_SCREENED and candidate.gain - gain > PROMISING
+    for rank, candidate in enumerate(screened):
+        gains_enough = rank < BEST_SCREENED and candidate.gain - gain > PROMISING
         (worth_a_fit if gains_enough or candidate.name in promising else others).append(candidate)
     return worth_a_fit, others
 

@@ -14,7 +14,7 @@ from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
-from airtouch.gap.naming.forward import Search, State, forward
+from airtouch.gap.naming.forward import PartialSelection, Search, forward
 from airtouch.gap.naming.judging import Trial, trial_of
 from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.over_prediction import over_prediction_of
@@ -75,10 +75,10 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     passing = passing_effect(search, without)
     if not replay_may_name(passing, inference):
         return answer
-    state = _searched(search, passing)
-    if next(iter(state.names), "") not in (OVERHEAD, inference.likeliest):
+    partial = _searched(search, passing)
+    if next(iter(partial.names), "") not in (OVERHEAD, inference.likeliest):
         return answer
-    return _by_replay(search, state)
+    return _by_replay(search, partial)
 
 
 def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
@@ -96,28 +96,28 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     return inference.evidence.get(OVERHEAD, -np.inf) > WAKE_SHARE * most
 
 
-def _searched(search: Search, passing: Candidate | None) -> State:
+def _searched(search: Search, passing: Candidate | None) -> PartialSelection:
     """Where a forward search ends, its steps with their leave-one-out gains.
 
     passing: the passing effect, its first step; the search is done again without it where beside the other effects it
     is no more than nominal flights have.
     """
-    trial, state = search.trial, forward(search, passing)
-    steps = with_leave_one_out_gains(trial, state.steps)
+    trial, partial = search.trial, forward(search, passing)
+    steps = with_leave_one_out_gains(trial, partial.steps)
     if passing is not None and as_in_nominal_flights(trial.data, passing, steps):
-        state = forward(search, None)
-        steps = with_leave_one_out_gains(trial, state.steps)
-    return replace(state, steps=tuple(steps))
+        partial = forward(search, None)
+        steps = with_leave_one_out_gains(trial, partial.steps)
+    return replace(partial, steps=tuple(steps))
 
 
-def _by_replay(search: Search, state: State) -> Selection:
+def _by_replay(search: Search, partial: PartialSelection) -> Selection:
     """The selection that a search ended in, with what it leaves."""
-    trial, policy, steps = search.trial, search.trial.policy, state.steps
+    trial, policy, steps = search.trial, search.trial.policy, partial.steps
     last = steps[-1].terms if steps else ()
     over_none = nameless_nats(trial, None)
     over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
     selection = Selection(
-        single_effects=state.single_effects, steps=steps, halves=trial.halves, least_nats=state.least_nats,
+        single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
     if not policy.judges_over_prediction:

@@ -1,6 +1,6 @@
 """What a further effect must gain beside those before it.
 
-No model of an effect is exact. What one leaves of the gap, another one explains in part, though it does not act.
+No model of an effect is exact. Some of the residual that one leaves another one explains, though it does not act.
 """
 
 from collections.abc import Sequence

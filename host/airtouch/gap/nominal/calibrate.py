@@ -154,7 +154,7 @@ def _quantities(fitted: FittedTerms) -> dict[str, Quantity]:
     """The calibrated parameters with unit and interval, by effect, rotor and parameter: `weak_motor 3 thrust_loss`."""
     out = {}
     for term in fitted.terms:
-        part = fitted.place(term)
+        part = fitted.slice_of(term)
         rotor = "" if term.identity[1] is None else f" {term.identity[1]:.0f}"
         quantities = term.quantities(fitted.scaled[part], fitted.covariance[part, part])
         out |= {f"{term.name}{rotor} {p}": q for p, q in quantities.items() if p in term.free}

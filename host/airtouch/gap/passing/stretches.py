@@ -9,7 +9,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit
-from airtouch.gap.evidence.judge import judge, left_over
+from airtouch.gap.evidence.judge import judge, judged_blocks
 from airtouch.gap.evidence.layout import AirBlocks
 from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.flights.flight import PERIOD_S
@@ -100,9 +100,9 @@ def _best_stretch(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[in
 
 def each_block(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
-    remainder = left_over(data, part, terms)
-    flat = remainder.problem.flat
-    block, levels = flat.air.block_of_value, remainder.log_likelihoods()[:flat.replay_count]
+    judged = judged_blocks(data, part, terms)
+    flat = judged.problem.flat
+    block, levels = flat.air.block_of_value, judged.log_likelihoods()[:flat.replay_count]
     in_air = block >= 0
     return np.bincount(block[in_air], levels[in_air])
 

@@ -144,8 +144,8 @@ class Term:
 Terms = tuple[Term, ...]  #: a hypothesis: effects that act together, each with its random part and its companion
 
 
-def mean_places(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
-    """The mean effects among terms, each with the place of its free parameters among those of all of them."""
+def mean_slices(terms: Iterable[Term]) -> list[tuple[Term, slice]]:
+    """The mean effects among terms, each with the slice of the free parameters of all that is its own."""
     mean = [t for t in terms if t.shows_in == MEAN]
     ends = itertools.accumulate(len(t.free) for t in mean)
     return [(t, slice(end - len(t.free), end)) for t, end in zip(mean, ends, strict=True)]

@@ -133,7 +133,7 @@ def _random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> dict[s
     for state in (REST, AIR):
         density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
         out[state] = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
-                          for p in (random_effects.power(data, t)[0][state] for t in terms))
+                          for p in (random_effects.extra_power(data, t)[0][state] for t in terms))
     return out
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.judge import left_over
+from airtouch.gap.evidence.judge import judged_blocks
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.screening.first_order import judge_means, judge_random
 from airtouch.gap.signals.channels import COLUMN, COUNT
@@ -25,17 +25,17 @@ def test_gain_of_a_push_is_what_its_offsets_cost(count):
     offset = np.where(np.arange(COUNT) == COLUMN["force_z"], SPREAD, 0.0)
     study = replace(FLOOR, floor=replace(FLOOR.floor, offset=offset))
     data = Data(study, [hover(40 + k, (0.0, 0.0, -DOWN), name=f"flight {k}") for k in range(count)])
-    remainders = [left_over(data, part, ()) for part in trial_of(data).halves]
-    judged = judge_means(data, remainders, terms("mass")[:1])
+    halves = [judged_blocks(data, part, ()) for part in trial_of(data).halves]
+    judged = judge_means(data, halves, terms("mass")[:1])
     assert judged.gain == pytest.approx(max(count, 2) * 0.5 * (DOWN / SPREAD) ** 2, rel=0.1)
 
 
 def test_each_half_is_fitted_by_its_own_push():
     """By flight in turns pushed down by 0.2 and 0.4 m/s^2: a bias of the accelerometer is as large, by definition."""
     data = Data(FLOOR, [hover(40 + k, (0.0, 0.0, -(0.4 if k % 2 else 0.2)), length_s=10.0) for k in range(4)])
-    remainders = [left_over(data, half, ()) for half in trial_of(data).halves]
+    halves = [judged_blocks(data, half, ()) for half in trial_of(data).halves]
     (bias,) = terms("imu_bias")[:1]
-    judged = judge_means(data, remainders, [bias])
+    judged = judge_means(data, halves, [bias])
     acc_z = bias.free.index("acc_z")
     of_halves = [x[acc_z] * bias.step("acc_z") for x in judged.fitted]
     assert of_halves == pytest.approx([-0.2, -0.4], rel=0.03)
@@ -46,7 +46,7 @@ def test_noise_gains_as_much_as_its_fit(louder):
     """Beside no effect nothing is approximate: the held-out gain by its definition."""
     data = Data(FLOOR, [hover(7, louder=louder)])
     (noise,) = terms("imu_noise")
-    gain, strength = judge_random([left_over(data, half, ()) for half in trial_of(data).halves], noise)
+    gain, strength = judge_random([judged_blocks(data, half, ()) for half in trial_of(data).halves], noise)
     assert gain == pytest.approx(own_gain(data, [noise]), rel=0.02, abs=0.5)
     # twice the declared power is the floor, and the declared one itself is no part of what is added
     factor = noise.at(strength)["factor"]

@@ -1,4 +1,4 @@
-"""Screening: every variant of every candidate beside a base, at a small part of what its fit would cost."""
+"""Screening: every variant of every candidate beside a base, at a fraction of what its fit would cost."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.judge import LeftOver, left_over
+from airtouch.gap.evidence.judge import JudgedBlocks, judged_blocks
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.records import Candidate, Charges, Strength
@@ -28,11 +28,11 @@ class ScreenedRandom(NamedTuple):
 
 @dataclass(frozen=True)
 class RoundStart:
-    """What a round begins from: its base, None for no effect, and what that leaves of each half."""
+    """What a round begins from: its base, None for no effect, and each half as judged under the fit to the other."""
 
     trial: Trial
     base: Candidate | None
-    remainders: Sequence[LeftOver]
+    halves: Sequence[JudgedBlocks]
 
     @property
     def gain(self) -> float:
@@ -64,10 +64,10 @@ class Screened:
 
 
 def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
-    """What a round begins from, each half as the fit on the other half leaves it."""
+    """What a round begins from, each half judged under the fit to the other half."""
     fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
-    remainders = [left_over(trial.data, part, fitted[1 - half]) for half, part in enumerate(trial.halves)]
-    return RoundStart(trial, base, remainders)
+    halves = [judged_blocks(trial.data, blocks, fitted[1 - half]) for half, blocks in enumerate(trial.halves)]
+    return RoundStart(trial, base, halves)
 
 
 def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
@@ -119,7 +119,7 @@ def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | No
 def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
     """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
-    judged = judge_means(start.trial.data, start.remainders, terms, start.terms)
+    judged = judge_means(start.trial.data, start.halves, terms, start.terms)
     gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
     of_halves = np.array(judged.fitted)[:, :k]
     strength = Strength(own.among_all(of_halves.mean(axis=0)),
@@ -200,7 +200,7 @@ def _screened_random(start: RoundStart, variants: Sequence[PricedVariant]) -> li
         if len(variant.terms) > 1 and first.shows_in != MEAN:
             continue
         if random.key not in judged:
-            judged[random.key] = judge_random(start.remainders, random)
+            judged[random.key] = judge_random(start.halves, random)
         gain, strength = judged[random.key]
         screened.append(ScreenedRandom(gain - variant.choice_cost, strength, variant))
     return screened
