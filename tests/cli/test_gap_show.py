@@ -14,3 +14,12 @@ def test_terminal_prints_sentences_notes_and_advice(capsys, monkeypatch):
     for part in (*sentences(result), "another fits better", "Weigh the <vehicle>.",
                  "airtouch collect --mission hover"):
         assert part in out, part
+
+
+def test_a_shrink_that_was_not_measured_is_no_nought(capsys, monkeypatch):
+    """Of a mass it was measured, of `none` and `unknown` it was not."""
+    monkeypatch.setenv("COLUMNS", "400")
+    show.diagnosis(scores.console(), made_diagnosis.diagnosis())
+    rows = [line.replace("│", " ").split() for line in capsys.readouterr().out.splitlines()]
+    assert {r[0]: r[2] for r in rows if r[:1] and r[0] in ("mass", "none", "unknown")} \
+        == {"mass": "0.00", "none": "-", "unknown": "-"}

@@ -45,8 +45,8 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
 
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without, *_: of(
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
-    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(shrink=SimpleNamespace(
-        before=1.4, share=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
+    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(closure=SimpleNamespace(
+        before=1.4, shrink=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
     loop = SimpleNamespace(changes_loop=lambda active: True)
     data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
     selection, _ = diagnosis.selection_and_gap(data, ())
@@ -60,8 +60,8 @@ def test_a_wake_is_no_candidate_without_nominal_flights(monkeypatch, nominal, a_
     tried = []
     nothing = PartOfSelection([], SimpleNamespace(terms=()), {}, {})
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, *_: tried.append(set(candidates)) or nothing)
-    monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(shrink=SimpleNamespace(
-        before=1.0, share=Quantity(0.0))))
+    monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(closure=SimpleNamespace(
+        before=1.0, shrink=Quantity(0.0))))
     study = SimpleNamespace(simulated=False, loop=None, nominal_count=nominal)
     diagnosis.selection_and_gap(SimpleNamespace(study=study), ("mass",))
     (candidates,) = tried

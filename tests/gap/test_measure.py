@@ -150,7 +150,7 @@ def test_a_measurement_in_two_sentences():
                              "Overall it is 2.3 times the floor.")
     calibrated = replace(gap, where=(), gap={**gap.gap, "calibrated": 1.2})
     assert calibrated.sentences == (
-        "No gap stands out of the floor.",
+        "No gap stands out from the floor.",
         "Overall it is 2.3 times the floor, 1.2 times with the vehicle calibrated on the baseline flights.")
 
 

@@ -57,7 +57,7 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     force = diagnosis.effects[0].parameters["force"]
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
     assert diagnosis.shrink.value > 0.8
-    assert abs(diagnosis.control.shrink.share.value) < 0.2
+    assert abs(diagnosis.control.closure.shrink.value) < 0.2
     (switch_on,) = [step.command for step in diagnosis.next if NAME in step.text]
     assert f"{NAME}.py --effect {NAME}:force=" in switch_on  # without its file the command would be refused
     same_study, _ = diagnosis.calibrated

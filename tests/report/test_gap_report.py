@@ -15,7 +15,7 @@ from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import NamedEffect, OpenCell, Quantity, Rejected, Shrink
+from airtouch.gap.result import Closure, NamedEffect, OpenCell, Quantity, Rejected
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -74,13 +74,14 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_fligh
 
 
 def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
-    """Sentence, JSON and page have one share and one before and after; the calibrated arm is not told again."""
+    """Sentence, JSON and page have one shrink and one before and after; the calibrated arm is left out."""
     result = of_flights(pushed_flights)
-    result = replace(result, arms={"declared": Shrink(5.0, 2.0, Quantity(0.7)),
-                                   "calibrated": Shrink(4.0, 1.3, result.shrink)})
+    result = replace(result, arms={"declared": Closure(5.0, 2.0, Quantity(0.7)),
+                                   "calibrated": Closure(4.0, 1.3, result.shrink)})
     fields = result.plain()
     assert fields["shrink"] == fields["ranking"][0]["shrink"] and fields["gap"]["before"] == 4.0
     assert "from 4 to 1.3 times the floor" in sentences(result)[2]
+    assert [r["shrink"] for r in gap_tables.ranking_rows(result)] == ["0.90", "0.00", "-", "-"], "- was not measured"
     rows = gap_tables.how_far_rows(result)
     assert [r["name"] for r in rows] == ["imu_bias", "wrong effect: wind", "imu_bias, vehicle as declared"]
     # the row that starts from another gap says why
@@ -112,7 +113,7 @@ def test_pages_of_other_verdicts(pushed_flights, tmp_path, verdict, words_there)
 
 def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects(tmp_path):
     open_cell = OpenCell("force_y", (0.0, 0.5), "hover", "a/log.csv", from_s=34.0, to_s=42.0, over_floor=6.1,
-                         follows=("height",), nearest=(Rejected("wind", "gains 3 nats, 12 are needed"),))
+                         follows=("height",), nearest=(Rejected("wind", "gains 3 nats, but 12 are needed"),))
     result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(open_cell,))
     steps = advice.steps(replace(result, indistinguishable=()), [], VEHICLE)
     path = tmp_path / "gap.html"
@@ -120,7 +121,7 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
     text, _ = checked(path)
     assert ("sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; "
             "follows height") in text
-    assert "wind: gains 3 nats, 12 are needed" in text
+    assert "wind: gains 3 nats, but 12 are needed" in text
     assert 'href="#add-an-effect"' in path.read_text() and "EFFECT = Effect(" in text  # the link leads to a whole file
 
 
@@ -143,7 +144,7 @@ def test_the_report_computes_nothing():
                    "answer.sentences", "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)
-        assert not re.search(r"\b(residual|calibrate|ready|shrink_of|gap_map)\(", source)
+        assert not re.search(r"\b(residual|calibrate|ready|closure_of|gap_map)\(", source)
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.features.feature_space import Standard
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import LearnedModel
-from airtouch.gap.relations.library import Library, NominalDistance
+from airtouch.gap.relations.library import Coordinates, Library, NominalDistance
 
 Q = 100  #: coordinates
 KNOTS = np.log([0.5, 5.0, 50.0])
@@ -19,8 +19,8 @@ def library():
     classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
                                 np.zeros(0)) for i, n in enumerate(NAMES))
     model = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
-    return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), model,
-                   NominalDistance(float(Q), np.sqrt(2.0 * Q)), pair_scatter=0.0)
+    coordinates = Coordinates(Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q))
+    return Library("none", "none", coordinates, model, NominalDistance(float(Q), np.sqrt(2.0 * Q)))
 
 
 def each_calibrated(of, **shares):

@@ -10,6 +10,7 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import (
     BASELINE,
     Cell,
+    Closure,
     Control,
     Diagnosis,
     GapMap,
@@ -17,7 +18,6 @@ from airtouch.gap.result import (
     NextStep,
     Quantity,
     RankedCandidate,
-    Shrink,
 )
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
@@ -38,7 +38,7 @@ def cell(channel, phase, gap, floor=0.1, after=None, blocks=10, **more):
 
 
 def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **more):
-    rejected = [RankedCandidate(n, p, Quantity(0.0), "another fits better")
+    rejected = [RankedCandidate(n, p, Quantity(0.0), "another fits better", measured=n == "mass")
                 for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
     answer = effects[0].name if effects else verdict
     ranking = [RankedCandidate(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rejected if r.name != answer)]
@@ -46,8 +46,8 @@ def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **mor
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), (("mass", "thrust_coefficient"),), tuple(cells),
         {"before": 4.0, "after": 1.3, "floor": 1.0}, Quantity(0.9, 0.8, 0.95) if effects else None,
-        Control("wind", Shrink(4.0, 3.9, Quantity(0.03, -0.05, 0.1))),
-        {"declared": Shrink(4.0, 1.4, Quantity(0.87))}, ("a note",),
+        Control("wind", Closure(4.0, 3.9, Quantity(0.03, -0.05, 0.1))),
+        {"declared": Closure(4.0, 1.4, Quantity(0.87))}, ("a note",),
         ("no velocity",), ("one.csv", "two.csv"),
         map=whole, headline=headline or summary.headline(cells, bool(effects)),
         next=(NextStep("Weigh the <vehicle>.", "airtouch collect --mission hover"),), vehicle=VEHICLE.name, **more)

@@ -50,7 +50,7 @@ def answer_of(diagnosis: Diagnosis, truth: str) -> Answer:
     """The answer in a diagnosis."""
     return Answer(truth, tuple(r.name for r in diagnosis.ranking[:3]),
                   None if diagnosis.shrink is None else diagnosis.shrink.value,
-                  None if diagnosis.control is None else diagnosis.control.shrink.share.value)
+                  None if diagnosis.control is None else diagnosis.control.closure.shrink.value)
 
 
 def summary(answers: Sequence[Answer]) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import steps as next_steps
-from airtouch.gap.answer.controls import control, shrink_by_vehicle
+from airtouch.gap.answer.controls import closure_by_vehicle, control
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
@@ -123,15 +123,15 @@ def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterab
 
 def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     """The diagnosis as far as the flights judged give it: verdict, effects, ranking, how far, control."""
-    verdict, before = verdict_of(data, selection, gap), gap.shrink.before
+    verdict, before = verdict_of(data, selection, gap), gap.closure.before
     is_effect = verdict == "effect"
     effects = named_effects(data, selection) if is_effect else []
     ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=() if verdict == "none" else alike_of(selection),
-        where=(), gap={"before": before, "after": gap.shrink.after if is_effect else before, "floor": 1.0},
-        shrink=gap.shrink.share if is_effect else None, control=control(data, selection, gap) if is_effect else None)
+        where=(), gap={"before": before, "after": gap.closure.after if is_effect else before, "floor": 1.0},
+        shrink=gap.closure.shrink if is_effect else None, control=control(data, selection, gap) if is_effect else None)
 
 
 def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
@@ -146,7 +146,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=shrink_by_vehicle(comparison.declared, judged, selection, result) if is_effect else {},
+        arms=closure_by_vehicle(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -209,12 +209,12 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
         gap_of_rest = gap_of(data, rest.halves, rest.named_hypothesis)
-        if gap_closure.loop_closes_too_little(gap.shrink.share.value, gap_of_rest.shrink.share.value):
+        if gap_closure.loop_closes_too_little(gap.closure.shrink.value, gap_of_rest.closure.shrink.value):
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
                                 least_nats=selection.least_nats)
             gap = gap_of_rest
-    closed = gap.shrink.share.value
-    if gap_closure.closes_too_little(data, selection, gap.shrink.before, closed):
+    closed = gap.closure.shrink.value
+    if gap_closure.closes_too_little(data, selection, gap.closure.before, closed):
         selection = gap_closure.with_none_named(selection, closed)
         gap = gap_of(data, selection.halves, None)
     return selection, gap

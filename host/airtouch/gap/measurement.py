@@ -58,7 +58,7 @@ class Measurement:
     def sentences(self) -> tuple[str, str]:
         """Where most of the gap lies, and how large all of it is."""
         where = f"Most of the gap lies {in_words(self.headline)}." if self.headline else \
-            "No gap stands out of the floor."
+            "No gap stands out from the floor."
         calibrated = f", {self.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights." \
             if "calibrated" in self.gap else "."
         return where, f"Overall it is {self.gap['before']:.2g} times the floor{calibrated}"

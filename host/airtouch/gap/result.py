@@ -27,16 +27,19 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Shrink:
-    """Gap before and after in units of the floor, and the share of it that went; of a jitter without an interval."""
+class Closure:
+    """Gap before and after effects are in the model, in units of the floor.
+
+    shrink: fraction of the gap above the floor that they close; of a jitter without an interval.
+    """
 
     before: float
     after: float
-    share: Quantity
+    shrink: Quantity
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready."""
-        return {"before": self.before, "after": self.after, "shrink": self.share.plain()}
+        return {"before": self.before, "after": self.after, "shrink": self.shrink.plain()}
 
 
 class OverallGap(TypedDict, total=False):
@@ -52,19 +55,19 @@ class OverallGap(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Control:
-    """The shrink by an effect that is deliberately a wrong one."""
+    """How far an effect that is deliberately a wrong one closes the gap."""
 
     name: str
-    shrink: Shrink
+    closure: Closure
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready."""
-        return {"name": self.name, **self.shrink.plain()}
+        return {"name": self.name, **self.closure.plain()}
 
 
 @dataclass(frozen=True)
 class HowFar:
-    """How far the gap closes with one model: before and after in units of the floor, and the share of it that goes.
+    """How far the gap closes with one model; fields as those of `Closure`, None where no effect is named.
 
     own_start: whether the vehicle is not the calibrated one, so that model, floor and the gap before are others.
     """
@@ -72,7 +75,7 @@ class HowFar:
     model: str
     before: float
     after: float
-    share: Quantity | None
+    shrink: Quantity | None
     floor: float | None = None
     own_start: bool = False
 
@@ -93,8 +96,8 @@ class NamedEffect:
 class RankedCandidate:
     """A candidate of the ranking.
 
-    shrink: share of the gap that it takes away on held-out data; why: the reason why it is not the answer; nats: log
-    likelihood that held-out data gain by it alone.
+    shrink: fraction of the gap that it closes on held-out data; why: the reason why it is not the answer; nats: log
+    likelihood that held-out data gain by it alone; measured: False where its shrink was not measured and stands as 0.
     """
 
     name: str
@@ -102,11 +105,13 @@ class RankedCandidate:
     shrink: Quantity
     why: str = ""
     nats: float | None = None
+    measured: bool = True
 
     def plain(self) -> dict[str, Any]:
-        """JSON-ready, without a reason or nats that there are not."""
+        """JSON-ready, without a reason or nats that there are not; a shrink that was not measured says so."""
         more = ({"why": self.why} if self.why else {}) | ({} if self.nats is None else {"nats": self.nats})
-        return {"name": self.name, "probability": self.probability, "shrink": self.shrink.plain(), **more}
+        shrink = self.shrink.plain() | ({} if self.measured else {"measured": False})
+        return {"name": self.name, "probability": self.probability, "shrink": shrink, **more}
 
 
 @dataclass(frozen=True)
@@ -197,10 +202,10 @@ class NextStep:
 class Diagnosis:
     """The answer to where, which and how far.
 
-    verdict: "effect", "none" or "unknown"; shrink: share of the gap that the named effects take away, None where none
-    is named; control: the same with a deliberately wrong effect, None where none was wrong; arms: shrink with the
-    vehicle as declared and as calibrated (`answer.controls.shrink_by_vehicle`). Terminal, report and JSON show this and
-    compute nothing of their own.
+    verdict: "effect", "none" or "unknown"; shrink: fraction of the gap that the named effects close, None where none is
+    named; control: how far a deliberately wrong effect closes it, None where none was wrong; arms: how far the named
+    effects do with the vehicle as declared and as calibrated (`answer.controls.closure_by_vehicle`). Terminal, report
+    and JSON show this and compute nothing of their own.
     """
 
     verdict: str
@@ -211,7 +216,7 @@ class Diagnosis:
     gap: OverallGap
     shrink: Quantity | None
     control: Control | None
-    arms: Mapping[str, Shrink] = field(default_factory=dict)
+    arms: Mapping[str, Closure] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     flights: tuple[str, ...] = ()
@@ -238,17 +243,17 @@ class Diagnosis:
     def how_far(self) -> tuple[HowFar, ...]:
         """How far the gap closes: with the named effects, with a wrong one, and without the vehicle's calibration.
 
-        An arm whose share is that of the answer is the answer, and not told again.
+        An arm whose shrink is that of the answer is the answer, and is left out.
         """
         named = ", ".join(e.name for e in self.effects)
         rows = []
         if self.gap:
             rows.append(HowFar(named, self.gap["before"], self.gap["after"], self.shrink, self.gap.get("floor")))
         if self.control is not None:
-            wrong = self.control.shrink
-            rows.append(HowFar(f"wrong effect: {self.control.name}", wrong.before, wrong.after, wrong.share))
-        rows += [HowFar(f"{named}, vehicle as {name}", arm.before, arm.after, arm.share, own_start=True)
-                 for name, arm in self.arms.items() if arm.share != self.shrink]
+            wrong = self.control.closure
+            rows.append(HowFar(f"wrong effect: {self.control.name}", wrong.before, wrong.after, wrong.shrink))
+        rows += [HowFar(f"{named}, vehicle as {name}", arm.before, arm.after, arm.shrink, own_start=True)
+                 for name, arm in self.arms.items() if arm.shrink != self.shrink]
         return tuple(rows)
 
     @property

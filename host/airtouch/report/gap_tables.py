@@ -1,6 +1,6 @@
 """Rows of the gap report's tables, ready for the page: texts, colours, what is folded and what is marked.
 
-What stands out of its floor, what stays, and the order of phases `gap.where.summary` decides; here its answers are
+What stands out from its floor, what stays, and the order of phases `gap.where.summary` decides; here its answers are
 asked for and written out.
 """
 
@@ -23,13 +23,14 @@ class Shade(NamedTuple):
     ink: str
 
 
-#: shades of cells that stand out of their floor, the largest ratio first; chosen
+#: shades of cells that stand out from their floor, the largest ratio first; chosen
 SHADES = (Shade(20.0, "#7f1d1d", "#ffffff"), Shade(10.0, "#b3261e", "#ffffff"), Shade(5.0, "#dd6b4d", "#ffffff"),
           Shade(2.5, "#f2a27f", "#1f2328"), Shade(1.5, "#f9cdb5", "#1f2328"), Shade(0.0, "#fde9df", "#1f2328"))
 AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
 #: (background colour, text colour, text) of each shade
 LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
           *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
+SHRINK_FORM = "{:.2f}"  #: format of a shrink
 MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
 
 
@@ -124,7 +125,8 @@ def _interval(q: Quantity, form: str) -> str:
 def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Rows of the leading candidates, and of `none` and `unknown` at any rank."""
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
-             "shrink": f"{r.shrink.value:.2f}", "why": r.why, "interval": _interval(r.shrink, "{:.2f}")}
+             "shrink": SHRINK_FORM.format(r.shrink.value) if r.measured else "-", "why": r.why,
+             "interval": _interval(r.shrink, SHRINK_FORM)}
             for r in leading(diagnosis.ranking)]
 
 
@@ -137,7 +139,7 @@ OTHER_START = ("without the calibration on the baseline flights, so model, floor
 def how_far_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Rows of how far the gap closes: the model, its figures, and why it starts from another gap, or ""."""
     return [{"name": arm.model, "why": OTHER_START if arm.own_start else "",
-             "cells": [_number(arm.before), _number(arm.after), _number(arm.floor), _share(arm.share)]}
+             "cells": [_number(arm.before), _number(arm.after), _number(arm.floor), _shrink(arm.shrink)]}
             for arm in diagnosis.how_far]
 
 
@@ -146,9 +148,9 @@ def _number(value: float | None) -> WithInterval:
     return WithInterval("-" if value is None else f"{value:.3g}")
 
 
-def _share(share: Quantity | None) -> WithInterval:
-    """A share with its interval; "-" for None."""
-    return WithInterval("-") if share is None else with_interval(share, "{:.2f}")
+def _shrink(shrink: Quantity | None) -> WithInterval:
+    """A shrink with its interval; "-" for None."""
+    return WithInterval("-") if shrink is None else with_interval(shrink, SHRINK_FORM)
 
 
 def with_interval(q: Quantity, form: str) -> WithInterval:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.controls import control, shrink_by_vehicle
+from airtouch.gap.answer.controls import closure_by_vehicle, control
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.signatures.signature import WRONG
 from hovers import DOWN, FLOOR, hover, select_from
@@ -22,8 +22,8 @@ def pushed():
 def test_a_wrong_effect_closes_nothing(pushed):
     data, selection, gap = pushed
     wrong = control(data, selection, gap)
-    assert wrong.name == WRONG[0] and wrong.shrink.before == gap.shrink.before
-    assert abs(wrong.shrink.share.value) < 0.05 < 0.8 < gap.shrink.share.value
+    assert wrong.name == WRONG[0] and wrong.closure.before == gap.closure.before
+    assert abs(wrong.closure.shrink.value) < 0.05 < 0.8 < gap.closure.shrink.value
 
 
 def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch):
@@ -37,11 +37,11 @@ def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch)
 def test_the_gap_is_also_closed_with_the_vehicle_as_declared(pushed):
     """With the same study it closes as much; with none the answer's own is the only one."""
     data, selection, gap = pushed
-    answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
-    assert shrink_by_vehicle(None, data.flights, selection, answer) == {"declared": gap.shrink}
-    both = shrink_by_vehicle(FLOOR, data.flights, selection, answer)
-    assert both["calibrated"] == gap.shrink
-    assert both["declared"].share.value == pytest.approx(gap.shrink.share.value, abs=0.02)
+    answer = SimpleNamespace(gap={"before": gap.closure.before, "after": gap.closure.after}, shrink=gap.closure.shrink)
+    assert closure_by_vehicle(None, data.flights, selection, answer) == {"declared": gap.closure}
+    both = closure_by_vehicle(FLOOR, data.flights, selection, answer)
+    assert both["calibrated"] == gap.closure
+    assert both["declared"].shrink.value == pytest.approx(gap.closure.shrink.value, abs=0.02)
 
 
 def test_a_jitter_is_measured_in_the_logged_times_with_either_vehicle():
@@ -49,8 +49,8 @@ def test_a_jitter_is_measured_in_the_logged_times_with_either_vehicle():
     late = 0.004 * np.random.default_rng(4).normal(size=3000)
     selection, data = select_from([replace(hover(2), clock_s=late)], ("time_jitter", "mass"))
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
-    assert [s.name for s in selection.named_steps] == ["time_jitter"] and gap.shrink.before > 2.0
-    answer = SimpleNamespace(gap={"before": gap.shrink.before, "after": gap.shrink.after}, shrink=gap.shrink.share)
-    both = shrink_by_vehicle(FLOOR, data.flights, selection, answer)
-    assert both["declared"] == both["calibrated"] == gap.shrink
+    assert [s.name for s in selection.named_steps] == ["time_jitter"] and gap.closure.before > 2.0
+    answer = SimpleNamespace(gap={"before": gap.closure.before, "after": gap.closure.after}, shrink=gap.closure.shrink)
+    both = closure_by_vehicle(FLOOR, data.flights, selection, answer)
+    assert both["declared"] == both["calibrated"] == gap.closure
     assert control(data, selection, gap) is None

@@ -63,7 +63,7 @@ def true_over_fitted_variance():
 
 
 def coverage(ratio, added):
-    """Share of 90 % intervals that hold the truth, whose variance is 1 + added (n,), and the error's is `ratio`."""
+    """Fraction of 90 % intervals that hold the truth, whose variance is 1 + added (n,), and the error's is `ratio`."""
     return np.mean(2.0 * norm.cdf(norm.ppf(0.95) * np.sqrt((1.0 + added) / ratio)) - 1.0)
 
 

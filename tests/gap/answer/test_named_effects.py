@@ -17,9 +17,9 @@ def unsteady(strength, part_strength, turbulence):
     """A ground effect of a strength (0.1 either way), with a random part that was fitted at a strength of its own."""
     effect = NamedEffect("ground_effect", {"strength": Quantity(strength, strength - 0.1, strength + 0.1),
                                            "turbulence": Quantity(0.0), "fade": Quantity(0.06)})
-    part = random_part_of("ground_effect")
-    part = replace(part, values={**part.values, "strength": part_strength, "turbulence": turbulence})
-    return with_random_part(effect, part).parameters
+    term = random_part_of("ground_effect")
+    term = replace(term, values={**term.values, "strength": part_strength, "turbulence": turbulence})
+    return with_random_part(effect, term).parameters
 
 
 @pytest.mark.parametrize(("strength", "part_strength"), [(2.0, 1.0), (0.5, 1.0), (0.8, 2.0)])

@@ -9,7 +9,7 @@ from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import random_part_of
 
 
-def test_a_parameter_at_the_end_of_its_range_is_told():
+def test_a_parameter_at_the_end_of_its_range_has_a_note():
     """Slow motors have a factor of at most 5; a wake's turbulence of 0 is none, and no end."""
     def named(name, **values):
         return NamedEffect(name, {k: Quantity(v) for k, v in values.items()})
@@ -20,7 +20,7 @@ def test_a_parameter_at_the_end_of_its_range_is_told():
     assert not at_end_of_range([named("downwash", strength=1.0, turbulence=0.0), named("motor_lag", factor=1.0)])
 
 
-def test_a_wake_that_shakes_more_than_a_simulator_can_be_given_is_told():
+def test_a_wake_that_shakes_more_than_a_simulator_can_be_given_has_a_note():
     """The strength of a mean too weak for its random part is raised until the turbulence is within its range."""
     def wake(turbulence):
         effect = NamedEffect("downwash", {k: Quantity(v) for k, v in {"strength": 1e-4, "turbulence": 0.0}.items()})

@@ -55,7 +55,7 @@ def test_the_gap_after_is_without_what_the_effects_make():
     ((0.0, 0.5), 1.0, 2.0), ((0.0, 0.5), 4.0, 2.0), ((0.5, 2.0), 1.0, 2.0), ((0.5, 2.0), 4.0, 2.0),
     ((2.0, 6.0), 4.0, 6.0), ((2.0, 6.0), 9.0, 6.0), ((6.0, 12.0), 4.0, 12.0), ((25.0, 50.0), 40.0, 50.0),
     ((2.0, 6.0), 2.0, 6.0), ((6.0, 12.0), 6.0, 12.0), ((0.0, 0.5), 0.5, 2.0)])  # at a crossover inside
-def test_signal_holds_what_is_below_the_frequency_that_is_told(band_hz, push_hz, highest_hz):
+def test_signal_holds_what_is_below_the_frequency_that_it_states(band_hz, push_hz, highest_hz):
     """A push beside a constant one, away from the ends, where the filter lacks one side.
 
     It is drawn up to the end of the cell's band, and up to 2 Hz at least.

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.ranking import AT_FLOOR, TOLD_APART, alike_of, ranking_of, verdict_of
+from airtouch.gap.answer.ranking import AT_FLOOR, LEAST_DIFFERENCE, alike_of, ranking_of, verdict_of
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
 from airtouch.gap.relations.inference import Inference
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
 
@@ -34,7 +34,7 @@ def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0
 
 
 def gap(before):
-    return SimpleNamespace(shrink=SimpleNamespace(before=before, share=Quantity(0.8)))
+    return SimpleNamespace(closure=SimpleNamespace(before=before, shrink=Quantity(0.8)))
 
 
 OVER = AT_FLOOR + 0.5
@@ -81,6 +81,15 @@ def test_ranking_begins_with_the_answer_and_sums_to_one(of, verdict, answer):
     assert probabilities == sorted(probabilities, reverse=True)
     assert [bool(r.why) for r in ranking] == [False] + [True] * (len(ranking) - 1)
     assert ranking[0].shrink.value == (0.8 if verdict == "effect" else 0.0), "of one effect named: that of the answer"
+    assert [r.measured for r in ranking] == [verdict == "effect"] + [False] * (len(ranking) - 1)
+
+
+def test_a_shrink_that_was_not_measured_is_a_number_in_the_json_and_says_so():
+    """A shrink of 0 that was measured says nothing more."""
+    measured, not_measured = RankedCandidate("mass", 0.1, Quantity(0.0)), RankedCandidate("none", 0.1, Quantity(0.0),
+                                                                                          measured=False)
+    assert measured.plain()["shrink"] == {"value": 0.0, "unit": "1"}
+    assert not_measured.plain()["shrink"] == {"value": 0.0, "unit": "1", "measured": False}
 
 
 def gaining(**gains):
@@ -91,7 +100,7 @@ def gaining(**gains):
 @pytest.mark.parametrize("named", [("mass",), ("mass", "wind"), ("wind", "mass")])
 def test_effects_are_alike_by_what_each_gains_alone(named):
     """Of two that are named the first is weighed by its own gain, not by that of both."""
-    near = gaining(gust=200.0 - 0.9 * TOLD_APART, mass=200.0, wind=200.0 - 1.1 * TOLD_APART)
+    near = gaining(gust=200.0 - 0.9 * LEAST_DIFFERENCE, mass=200.0, wind=200.0 - 1.1 * LEAST_DIFFERENCE)
     steps = tuple(replace(s, leave_one_out_gain=near[s.name].gain) for s in selection(named).steps)
     assert alike_of(replace(selection(named), single_effects=near, steps=steps)) == (("gust", "mass"),)
 

@@ -58,21 +58,21 @@ def test_at_the_floor_that_is_the_reason_of_a_named_effect():
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    ("inertia", "held-out data gain 2.0 nats by it, 8 are needed"),
-    ("wind", "as strong as it often seems to be in nominal flights: 40 nats, of which 3.0 beyond that scatter, 8 are "
+    ("inertia", "held-out data gain 2.0 nats by it, but 8 are needed"),
+    ("wind", "as strong as it often seems to be in nominal flights: of 40 nats 3.0 are beyond that scatter, but 8 are "
              "needed"),
-    ("gust", "gains 20 nats, mass 200"),
+    ("gust", "gains 20 nats, while mass gains 200"),
     ("none", "mass gains 200 nats over it"),
-    ("unknown", "a model without names gains 4 nats beside mass, up to 20 may be left")])
+    ("unknown", "a model without names gains 4 nats beside mass, and up to 20 may be left")])
 def test_reason_by_the_replay(name, words):
     assert why_not(selection(), name, "effect") == words
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    ("inertia", f"the relations of the signals gain 2.0 nats by it, {LEAST_EVIDENCE:.0f} are needed"),
-    ("wind", "the relations of the signals gain 40 nats by it, 200 by mass"),
+    ("inertia", f"the relations of the signals gain 2.0 nats by it, but {LEAST_EVIDENCE:.0f} are needed"),
+    ("wind", "the relations of the signals gain 40 nats by it, but 200 by mass"),
     ("none", "mass gains 200 nats over it"),
-    ("unknown", "a model without names gains 4 nats beside mass, up to 30 may be left")])
+    ("unknown", "a model without names gains 4 nats beside mass, and up to 30 may be left")])
 def test_by_the_relations_of_the_signals(name, words):
     assert why_not(selection(inference=True), name, "effect") == words
 
@@ -80,13 +80,13 @@ def test_by_the_relations_of_the_signals(name, words):
 def test_reason_of_a_distance():
     far = selection(inference=True, of_distance=True, beside=70.0)
     assert why_not(far, "mass", "unknown") == ("the flight lies 70 nats farther from it than nominal flights from "
-                                               "none, up to 30 may be chance")
+                                               "none, but only up to 30 may be chance")
     near = selection(inference=True, of_distance=True)
     assert why_not(near, "unknown", "effect") == ("the flight lies 4 nats farther from mass than nominal flights from "
-                                                  "none, up to 30 may be chance")
+                                                  "none, and up to 30 may be chance")
     nothing = selection((), inference=True, of_distance=True)
     assert why_not(nothing, "unknown", "none") == ("the flight lies 4 nats farther from the model than nominal "
-                                                   "flights do, up to 30 may be chance")
+                                                   "flights do, and up to 30 may be chance")
 
 
 def test_reason_of_a_second_named_effect():
@@ -101,8 +101,8 @@ def test_reason_of_a_second_named_effect():
 def test_reasons_where_nothing_is_named():
     nothing = selection((), beside=40.0)
     assert not is_explained(nothing)
-    assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, up to 18 may be left"
-    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, a model without names gains 150"
+    assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, but only up to 18 may be left"
+    assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, while a model without names gains 150"
     back = replace(nothing, taken_back=TakenBack("mass", -0.2))
     assert shortfall(back, judged("mass", 990.0)) == "closes 0% of the gap, too little to be its cause"
     related = selection((), inference=True, beside=40.0)
@@ -114,10 +114,12 @@ def test_reasons_where_nothing_is_named():
 def test_reason_of_the_best_effect_where_the_answer_is_unknown():
     """The best effect where the answer is `unknown`: by what is left beside it, or by what it says and is not there."""
     open_gap = selection(beside=70.0)
-    assert why_not(open_gap, "mass", "unknown") == "a model without names gains 70 nats beside it, up to 20 may be left"
+    assert why_not(open_gap, "mass", "unknown") == ("a model without names gains 70 nats beside it, but "
+                                                     "only up to 20 may be left")
     over_predicting = selection(lost=(60.0, cell_numbers(REST_VIEW, 1, COLUMN["torque_z"])))
-    assert why_not(over_predicting, "mass", "unknown") == ("it loses 60 nats where it says more than the flights show, "
-                                                        "most in torque_z at 0.6 to 2 Hz at rest; 18 may be chance")
+    assert why_not(over_predicting, "mass", "unknown") == (
+        "it loses 60 nats where it says more than the flights show, most in torque_z at 0.6 to 2 Hz at rest, "
+        "but only up to 18 may be chance")
 
 
 def test_the_three_that_gain_most_are_nearest():

@@ -28,7 +28,7 @@ def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
 
 def test_no_cause_is_given_without_a_headline_cell():
     where, which, _ = sentences(diagnosis([cell("force_z", "hover", 0.05)]))
-    assert where == "In no cell of the map does the gap stand out of its floor."
+    assert where == "In no cell of the map does the gap stand out from its floor."
     assert which.startswith("The effect named, from all cells together, is imu bias")
 
 
@@ -61,7 +61,7 @@ def test_none_says_how_large_the_gap_is(before, size):
     assert sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {size}"
 
 
-def test_an_effect_beside_the_first_is_told_as_one_though_the_headline_is_its_own():
+def test_an_effect_beside_the_first_is_named_as_one_though_the_headline_is_its_own():
     cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
     effects = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
     _, which, _ = sentences(diagnosis(cells, effects=effects))

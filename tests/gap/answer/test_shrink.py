@@ -1,4 +1,4 @@
-"""How far a gap closes: in which cells it is measured, its share and interval by closed forms, and that of a jitter."""
+"""How far a gap closes: its cells, its shrink and interval by closed forms, and that of a jitter."""
 
 from types import SimpleNamespace
 
@@ -9,11 +9,11 @@ from airtouch.gap.answer.shrink import (
     FEWEST_VALUES,
     MARGIN,
     Gap,
+    closure_of,
+    closure_of_jitter,
+    fraction_closed,
     gap_of,
     nearer,
-    share_closed,
-    shrink_of,
-    shrink_of_jitter,
 )
 from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, VIEW_STRIDE, cell_numbers
 from airtouch.gap.evidence.data import Data
@@ -31,12 +31,12 @@ from hovers import FLOOR, hover
 LIFT = COLUMN["force_z"]
 
 
-@pytest.mark.parametrize(("before", "after", "share"), [
+@pytest.mark.parametrize(("before", "after", "fraction"), [
     (3.0, 1.0, 1.0), (3.0, 2.0, 0.5), (3.0, 3.0, 0.0), (3.0, 4.0, -0.5), (3.0, 9.0, -1.0), (3.0, 0.5, 1.0),
     (1.01, 1.0, 0.0), (1.0, 1.0, 0.0), (0.9, 1.0, 0.0), (1.03, 1.0, 1.0)])
-def test_the_share_is_that_of_the_rms_over_the_floor(before, after, share):
+def test_the_fraction_closed_is_that_of_the_rms_over_the_floor(before, after, fraction):
     """Rms values of 3 and 2 floors: half of what is over the floor is gone."""
-    assert share_closed(before ** 2, after ** 2) == pytest.approx(share)
+    assert fraction_closed(before ** 2, after ** 2) == pytest.approx(fraction)
 
 
 def jittered(rms_of_eighths, floor_s=0.0):
@@ -47,47 +47,47 @@ def jittered(rms_of_eighths, floor_s=0.0):
 
 
 def test_a_jitter_that_both_halves_share_closes_wholly():
-    shrink = shrink_of_jitter(jittered([0.004] * 8, floor_s=0.001))
-    assert (shrink.before, shrink.after, shrink.share.value) == pytest.approx((4.0, 1.0, 1.0))
+    closure = closure_of_jitter(jittered([0.004] * 8, floor_s=0.001))
+    assert (closure.before, closure.after, closure.shrink.value) == pytest.approx((4.0, 1.0, 1.0))
 
 
 def test_what_the_halves_differ_by_stays():
     """Every other eighth is a half: 2 and 6 ms rms."""
-    shrink = shrink_of_jitter(jittered([0.002, 0.006] * 4, floor_s=0.001))
-    assert (shrink.before, shrink.after) == pytest.approx((4.0, 5.0))
-    assert shrink.share.value == pytest.approx(-1.0 / 3.0)
-    both = shrink_of_jitter(jittered([0.002, 0.002, 0.006, 0.006] * 2, floor_s=0.001))
+    closure = closure_of_jitter(jittered([0.002, 0.006] * 4, floor_s=0.001))
+    assert (closure.before, closure.after) == pytest.approx((4.0, 5.0))
+    assert closure.shrink.value == pytest.approx(-1.0 / 3.0)
+    both = closure_of_jitter(jittered([0.002, 0.002, 0.006, 0.006] * 2, floor_s=0.001))
     assert both.after == pytest.approx(1.0)
 
 
 def test_the_floor_of_a_jitter_is_never_that_of_perfect_times():
-    assert shrink_of_jitter(jittered([0.002] * 8)).before == pytest.approx(0.002 / LEAST_JITTER_S)
+    assert closure_of_jitter(jittered([0.002] * 8)).before == pytest.approx(0.002 / LEAST_JITTER_S)
 
 
-def counts_of(data, part):
-    """Number of values (CELLS,) in each cell of a part."""
-    problem = problem_of(data, part)
+def counts_of(data, half):
+    """Number of values (CELLS,) in each cell of a half."""
+    problem = problem_of(data, half)
     return np.bincount(problem.flat.cells, problem.elements.valid, CELLS)
 
 
 def test_cells_stand_out_that_have_enough_values():
     """Sixteen times the power of the floor in every force and torque of a short flight."""
     data = Data(FLOOR, [hover(7, louder=4.0, length_s=10.0)])
-    parts = halves(data)
-    gap = gap_of(data, parts, None)
+    both_halves = halves(data)
+    gap = gap_of(data, both_halves, None)
     channel = np.arange(CELLS) % VIEW_STRIDE % len(COLUMN)
-    for shown_by, cells in zip(parts[::-1], gap.cells, strict=True):
+    for shown_by, cells in zip(both_halves[::-1], gap.cells, strict=True):
         counts = np.where(channel < TORQUE.stop, counts_of(data, shown_by), 0)
         assert (counts[counts > 0] < FEWEST_VALUES).any()
         np.testing.assert_array_equal(cells, counts >= FEWEST_VALUES)
-    assert gap.shrink.before == pytest.approx(4.0, rel=0.1) and gap.shrink.share.value == 0.0
+    assert gap.closure.before == pytest.approx(4.0, rel=0.1) and gap.closure.shrink.value == 0.0
 
 
 @pytest.mark.parametrize("power", [1.0, 1.0 + 0.75 * MARGIN])
 def test_no_cell_stands_out_by_chance_or_by_less_than_the_margin(power):
     data = Data(FLOOR, [hover(7 + k, louder=np.sqrt(power)) for k in range(4)])
     gap = gap_of(data, halves(data), None)
-    assert not np.any(gap.cells) and gap.shrink.before == gap.shrink.after == 1.0
+    assert not np.any(gap.cells) and gap.closure.before == gap.closure.after == 1.0
 
 
 def test_cells_count_in_which_the_effect_named_gains():
@@ -109,26 +109,26 @@ def test_a_gap_that_one_half_alone_shows_is_not_measured_there():
     data = Data(FLOOR, [hover(7 + k, louder=1.0 if k % 2 else 2.0) for k in range(4)])
     gap = gap_of(data, halves(data), None)
     assert not gap.cells[0].any() and gap.cells[1].any()
-    assert gap.shrink.before == pytest.approx(1.0, abs=0.02)
+    assert gap.closure.before == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_interval_is_that_of_the_power_of_white_noise():
     """An energy of 16 becomes 4, that of N real samples of white noise, which scatters by 4 sqrt(2 / N).
 
-    So the share (4 - sqrt(4)) / 3 scatters by sqrt(2 / N) / 3, and its 90 % interval is 2 * 1.645 of these wide.
+    So the shrink (4 - sqrt(4)) / 3 scatters by sqrt(2 / N) / 3, and its 90 % interval is 2 * 1.645 of these wide.
     """
     lift = np.zeros(CELLS, bool)
     lift[[cell_numbers(REPLAY_VIEW, band, LIFT) for band in range(1, len(BANDS_HZ) - 1)]] = True
     widths = []
     for seed in range(7, 13):
         data = Data(FLOOR, [hover(seed, louder=2.0)])
-        parts = halves(data)
-        n = int(sum(counts_of(data, part)[lift].sum() for part in parts))
+        both_halves = halves(data)
+        n = int(sum(counts_of(data, half)[lift].sum() for half in both_halves))
         energies_before = Gap((lift, lift), 0.0, np.full(n, 16.0), None)
-        shrink = shrink_of(data, parts, Candidate("nothing", (), 0.0), energies_before)
-        assert (shrink.before, shrink.after) == pytest.approx((4.0, 2.0), rel=0.05)
-        assert shrink.share.low < shrink.share.value < shrink.share.high
-        widths.append(shrink.share.high - shrink.share.low)
+        closure = closure_of(data, both_halves, Candidate("nothing", (), 0.0), energies_before)
+        assert (closure.before, closure.after) == pytest.approx((4.0, 2.0), rel=0.05)
+        assert closure.shrink.low < closure.shrink.value < closure.shrink.high
+        widths.append(closure.shrink.high - closure.shrink.low)
     assert np.mean(widths) == pytest.approx(2.0 * 1.645 * np.sqrt(2.0 / len(data.flights[0])) / 3.0, rel=0.2)
 
 
@@ -146,17 +146,17 @@ def test_less_than_the_floor_is_as_far_off_as_more(energy_over_floor, is_nearer)
     A constant has its power in the lowest bin, and half as much in the next, which together may be as far over.
     """
     data = Data(FLOOR, [hover(7, louder=0.01)])
-    parts, lift = halves(data), np.zeros(CELLS, bool)
+    both_halves, lift = halves(data), np.zeros(CELLS, bool)
     lift[cell_numbers(REPLAY_VIEW, 0, LIFT)] = True
     bins = np.flatnonzero(frequencies(AIR) < BANDS_HZ[1])
     floor = FLOOR.floor.power[AIR][bins, LIFT]
     energy_of_1 = (1.0 / 1.5) / frequencies(AIR)[1] / floor[0] * 1.5  # of 1 m/s^2, in both bins, over the floor
     bias = biased(np.sqrt(energy_over_floor * len(bins) / energy_of_1))
-    assert nearer(data, parts, bias, SimpleNamespace(cells=(lift, lift))) == is_nearer
+    assert nearer(data, both_halves, bias, SimpleNamespace(cells=(lift, lift))) == is_nearer
 
 
 def test_the_right_effect_is_nearer_and_none_is_not():
     data = Data(FLOOR, [hover(7, (0.0, 0.0, 0.5))])
-    parts, all_cells = halves(data), SimpleNamespace(cells=(np.ones(CELLS, bool),) * 2)
-    assert nearer(data, parts, biased(0.5), all_cells)
-    assert not nearer(data, parts, biased(-0.5), all_cells) and not nearer(data, parts, None, all_cells)
+    both_halves, all_cells = halves(data), SimpleNamespace(cells=(np.ones(CELLS, bool),) * 2)
+    assert nearer(data, both_halves, biased(0.5), all_cells)
+    assert not nearer(data, both_halves, biased(-0.5), all_cells) and not nearer(data, both_halves, None, all_cells)

@@ -9,14 +9,14 @@ from airtouch.gap.result import NamedEffect, OpenCell, Quantity, RankedCandidate
 from made_diagnosis import diagnosis
 
 
-def test_an_effect_is_told_with_its_parameters_and_when_it_acts():
+def test_an_effect_is_written_with_its_parameters_and_when_it_acts():
     push = NamedEffect("wind", {"x": Quantity(0.3, unit="m/s"), "y": Quantity(0.11, 0.09, 0.13)},
                        (("a/b.csv", 2.0, 5.04),))
     assert words.effect_in_words(push) == "wind: x 0.3 m/s, y 0.11 (0.09 to 0.13); acts from 2.0 to 5.0 s of b.csv"
     assert words.effect_in_words(replace(push, seconds=())) == "wind: x 0.3 m/s, y 0.11 (0.09 to 0.13)"
 
 
-def test_an_open_cell_is_told_with_its_seconds_and_what_it_follows():
+def test_an_open_cell_is_written_with_its_seconds_and_what_it_follows():
     cell = OpenCell("force_z", (0.5, 2.0), "cruise", "a/b.csv", from_s=12.0, to_s=18.4, over_floor=6.08,
                     follows=("height", "speed"))
     assert words.open_in_words(cell) \
@@ -30,7 +30,7 @@ def test_phases_with_the_same_worst_seconds_share_a_line():
     assert [line.split(":")[0] for line in lines] == ["lift, 0-0.5 Hz, cruise and landing", "lift, 0-0.5 Hz, hover"]
 
 
-def test_the_nearest_effects_are_told_where_the_ranking_gives_no_reason():
+def test_the_nearest_effects_are_listed_where_the_ranking_gives_no_reason():
     """Mass is in the ranking that is shown, with its reason; a long list hides wind behind ten others."""
     near = (Rejected("mass", "gains 3 nats"), Rejected("ground_effect", "gains 2 nats"))
     cell = OpenCell("force_z", (0.0, 0.5), "cruise", "a.csv", from_s=1.0, to_s=3.0, over_floor=6.0, nearest=near)

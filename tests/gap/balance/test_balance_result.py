@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
-from airtouch.gap.result import Quantity, Shrink
+from airtouch.gap.result import Closure, Quantity
 
 
 def test_the_hypotheses_of_a_name_count_together():
@@ -29,15 +29,15 @@ def test_a_weight_on_the_vehicle_and_off_centre_count_as_one(total, answer):
 
 
 def test_the_other_name_of_a_weight_is_counted_with_the_answer():
-    shrink = {n: Shrink(3.0, 1.0, Quantity(1.0)) for n in ("none", "mass", "com_offset")}
-    ranking = balance_result._ranking("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, shrink)
+    closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("none", "mass", "com_offset")}
+    ranking = balance_result._ranking("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, closures)
     assert [(r.name, round(r.probability, 6)) for r in ranking] == [("mass", 0.8), ("none", 0.2), ("com_offset", 0.0)]
     assert ranking[2].why.startswith("counted with mass") and ranking[1].why == "4 times less probable than mass"
 
 
 def test_a_weight_whose_probability_underflows_is_not_counted_with_another_effect():
-    shrink = {n: Shrink(3.0, 1.0, Quantity(1.0)) for n in ("slung_load", "mass")}
-    ranking = balance_result._ranking("slung_load", {"slung_load": 1.0, "mass": 0.0}, shrink)
+    closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("slung_load", "mass")}
+    ranking = balance_result._ranking("slung_load", {"slung_load": 1.0, "mass": 0.0}, closures)
     assert ranking[1].why.endswith("times less probable than slung_load")
 
 
@@ -48,7 +48,7 @@ def test_names_of_half_the_probability_fit_alike():
 
 
 def test_the_wrong_effect_of_the_control_is_improbable():
-    shrink = {n: Shrink(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
+    closures = {n: Closure(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
     total = {"com_offset": 0.2, "slung_load": 0.05, "mass": 0.7, "weak_motor": 0.05}
-    assert balance_result._control(total, "mass", shrink).name == "slung_load"
-    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", shrink) is None
+    assert balance_result._control(total, "mass", closures).name == "slung_load"
+    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", closures) is None

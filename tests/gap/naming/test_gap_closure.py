@@ -12,7 +12,7 @@ from airtouch.gap.naming.gap_closure import closes_too_little, least_closed, nam
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
-from airtouch.gap.result import Quantity, Shrink
+from airtouch.gap.result import Closure, Quantity
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import fly
 
@@ -74,13 +74,13 @@ def delayed(study):
 
 @pytest.mark.parametrize("closes", [True, False])
 def test_loop_effect_that_closes_too_little_is_not_named(delayed, monkeypatch, closes):
-    """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
+    """It is named with the fraction of the gap that it closes; with less than the loop model's error it is not."""
     recorded, data, selection = delayed
     requests = []
     monkeypatch.setattr(diagnose, "select", lambda *of, **_: requests.append(of[0]) or selection)  # it looks at no gap
     if not closes:
-        little = Shrink(1.4, 1.36, Quantity(0.1))
-        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), shrink=little))
+        little = Closure(1.4, 1.36, Quantity(0.1))
+        monkeypatch.setattr(diagnose, "gap_of", lambda *of: replace(gap_of(*of), closure=little))
     diagnosis = diagnose.diagnose_with_study(recorded, data.flights, data=data)
     assert requests == [data]
     assert [e.name for e in diagnosis.effects] == (["actuator_delay"] if closes else [])

@@ -39,7 +39,7 @@ def test_a_file_holds_what_was_saved(tmp_path):
     library.save(shipped, tmp_path / "one.npz")
     reloaded = library.read((tmp_path / "one.npz").read_bytes())
     assert [c.name for c in reloaded.model.classes] == [c.name for c in shipped.model.classes]
-    assert reloaded.projection == pytest.approx(shipped.projection)
+    assert reloaded.coordinates.projection == pytest.approx(shipped.coordinates.projection)
     assert reloaded.effects == shipped.effects
     assert reloaded.pair_scatter == shipped.pair_scatter
     for share in library.SHARES:
@@ -60,7 +60,7 @@ def test_a_file_with_a_number_too_few_is_refused(name):
 def test_the_file_is_of_todays_features_and_effects():
     """Else `python -m airtouch.gap.relations.build` makes a new one."""
     shipped = library.shipped()
-    assert len(shipped.standard.middle) == len(declared_features())
+    assert len(shipped.coordinates.standard.middle) == len(declared_features())
     assert {(c.name, c.shape) for c in shipped.model.classes} \
         == {(d.name, d.shape) for e in NAMES for d in drawings(e)}
 

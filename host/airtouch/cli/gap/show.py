@@ -52,7 +52,7 @@ def measurement(screen: Console, result: Measurement) -> None:
     if result.where:
         screen.print(cell_table(result.where, "Largest cells of the gap", screen.width))
     else:
-        screen.print("No cell of the gap stands out of its floor.")
+        screen.print("No cell of the gap stands out from its floor.")
     _, overall = result.sentences
     screen.print(overall)
     remarks(screen, "Rotor speeds in the air", [r.in_words() for r in result.rotors])
@@ -68,12 +68,12 @@ def diagnosis(screen: Console, result: Diagnosis) -> None:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
                   caption="shrink: part of the gap above the floor that goes away on data held out, "
-                          "with its 90 % interval")
+                          "with its 90 % interval; -: not measured")
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
     for r in words.leading(result.ranking):
-        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"), r.why)
+        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}") if r.measured else "-", r.why)
     screen.print(table)
     for group in result.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 from airtouch.gap.answer.ranking import alike_of
-from airtouch.gap.answer.shrink import Gap, gap_of, is_only_jitter, shrink_of, shrink_of_jitter
+from airtouch.gap.answer.shrink import Gap, closure_of, closure_of_jitter, gap_of, is_only_jitter
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.records import Candidate, Selection
-from airtouch.gap.result import Control, Diagnosis, Shrink
+from airtouch.gap.result import Closure, Control, Diagnosis
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import CLOCK, WRONG
 from airtouch.gap.study import Study
@@ -28,12 +28,12 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
     name = next((n for n in WRONG if n in variants and n not in right), None)
     if name is None:
         return None
-    fits = tuple(fit(data, part, variants[name][0]) for part in selection.halves)
-    return Control(name, shrink_of(data, selection.halves, Candidate(name, fits[0].terms, 0.0, fits), gap))
+    fits = tuple(fit(data, half, variants[name][0]) for half in selection.halves)
+    return Control(name, closure_of(data, selection.halves, Candidate(name, fits[0].terms, 0.0, fits), gap))
 
 
-def shrink_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
-                      ) -> dict[str, Shrink]:
+def closure_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
+                      ) -> dict[str, Closure]:
     """How far the effects named close the gap with each of two models of the vehicle; the JSON's `arms`.
 
     "declared": the vehicle as its file declares it, the effects fitted anew beside it; "calibrated": the vehicle as
@@ -43,15 +43,15 @@ def shrink_by_vehicle(declared: Study | None, judged: Sequence[Flight], selectio
     flights that the answer comes from; answer: names an effect.
     """
     assert answer.shrink is not None and selection.named_hypothesis is not None  # it names an effect
-    overall = Shrink(answer.gap["before"], answer.gap["after"], answer.shrink)
+    overall = Closure(answer.gap["before"], answer.gap["after"], answer.shrink)
     if declared is None:
         return {"declared": overall}
     data = Data(declared, judged)
     if is_only_jitter(selection.named_hypothesis):
-        return {"declared": shrink_of_jitter(data), "calibrated": overall}
-    parts = halves(data)
+        return {"declared": closure_of_jitter(data), "calibrated": overall}
+    both_halves = halves(data)
     terms = tuple(t for t in selection.named_hypothesis.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.named_hypothesis.fits[0].terms if selection.named_hypothesis.fits else ())
-    fits = tuple(fit(data, part, terms, start) for part in parts)
-    gap = gap_of(data, parts, Candidate(selection.named_hypothesis.name, terms, 0.0, fits))
-    return {"declared": gap.shrink, "calibrated": overall}
+    fits = tuple(fit(data, half, terms, start) for half in both_halves)
+    gap = gap_of(data, both_halves, Candidate(selection.named_hypothesis.name, terms, 0.0, fits))
+    return {"declared": gap.closure, "calibrated": overall}

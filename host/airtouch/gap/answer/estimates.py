@@ -89,8 +89,8 @@ def from_times(data: Data, term: Term) -> Estimate:
     """
     samples = sum(len(f) for f in data.flights)
     if term.signature.loss_runs is not None:
-        share, length = (term.values[p] for p in term.signature.loss_runs)
-        inverse = share * samples / (2.0 * length - 1.0)  # of the relative variance
+        lost_fraction, length = (term.values[p] for p in term.signature.loss_runs)
+        inverse = lost_fraction * samples / (2.0 * length - 1.0)  # of the relative variance
     else:
         independent, (jitter_s,) = samples / (CORRELATION_S / PERIOD_S), (term.values[p] for p in term.free)
         inverse = 2.0 * independent / (1.0 + (nominal_jitter_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2

@@ -12,10 +12,10 @@ from airtouch.simulation import signals as at
 
 #: least number of blocks that do not overlap for which a rank correlation is tested; chosen. A larger number names no
 #: signal in short flights
-FEWEST_RANKED = 8
-#: probability of a correlation by chance alone, all signals together (Bonferroni); chosen. A larger number names more
+FEWEST_BLOCKS = 8
+#: probability that any signal correlates so by chance alone (Bonferroni); chosen. A larger number names more
 #: signals that the gap does not follow
-CHANCE = 0.01
+SIGNIFICANCE_LEVEL = 0.01
 LEAST_RATIO = 1e-9  #: least ratio to the floor of which a logarithm is taken; far below any measured
 
 
@@ -29,7 +29,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
 
     power = np.concatenate([np.log(np.maximum(ratio, LEAST_RATIO)) for _, ratio in ratios])[::2]  # they overlap by half
     known = np.isfinite(power)
-    if known.sum() < FEWEST_RANKED:
+    if known.sum() < FEWEST_BLOCKS:
         return []
     means = [_block_means(study, flight) for flight, _ in ratios]
     names = list(dict.fromkeys(name for of_flight in means for name in of_flight))
@@ -41,7 +41,7 @@ def followed_signals(study: Study, ratios: Sequence[tuple[Flight, np.ndarray]]) 
         if np.ptp(values) == 0.0:
             continue
         rank = spearmanr(values, power[known])
-        if rank.pvalue < CHANCE / len(names):
+        if rank.pvalue < SIGNIFICANCE_LEVEL / len(names):
             correlations.append((abs(rank.statistic), name))
     return [name for _, name in sorted(correlations, reverse=True)]
 

@@ -37,8 +37,8 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     shown = [t for t in fitted.terms if t.slot in selection.named_slots]
     effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits), readings)
                for t in shown if not t.companion]
-    for part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
-        effects = [with_random_part(e, part) for e in effects]
+    for random_part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
+        effects = [with_random_part(e, random_part) for e in effects]
     effects += [_named(t, from_times(data, t), readings) for t in named.terms if t.shows_in == CLOCK]
     order = [s.name for s in selection.named_steps]
     return sorted(effects, key=lambda e: order.index(e.name))
@@ -57,31 +57,31 @@ def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: n
     """
     best, chosen = fit(data, all_blocks, terms, start), list(terms)
     for i, term in enumerate(terms):
-        level = judge(data, all_blocks, best.terms) + SHAPE_PRICE
+        needed = judge(data, all_blocks, best.terms) + SHAPE_PRICE
         for shaped in term.shaped():
             trial = fit(data, all_blocks, [*chosen[:i], shaped, *chosen[i + 1:]], start)
             gain = judge(data, all_blocks, trial.terms)
-            if gain > level:
-                best, level, chosen[i] = trial, gain, shaped
+            if gain > needed:
+                best, needed, chosen[i] = trial, gain, shaped
     return converged(data, all_blocks, best)
 
 
-def with_random_part(effect: NamedEffect, part: Term) -> NamedEffect:
+def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     """The effect with its random part as fitted, so that a simulator can switch it on unchanged.
 
-    The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
-    mean and random part: the part's parameters are divided by it. A mean too weak to carry them within their
-    bounds is raised to the least that does.
+    The random part was fitted at a strength of its own (1, that of the published curve), while the simulator has one
+    strength for mean and random part: the random part's parameters are divided by it. A mean too weak to carry them
+    within their bounds is raised to the least that does.
     """
-    if effect.name != part.name:
+    if effect.name != random_part.name:
         return effect
-    (amount,) = part.signature.free  # the strength
-    own, of_mean = part.values[amount], effect.parameters[amount]
-    limits = {p.name: p.high for p in part.effect.parameters}
-    strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), LEAST_DIVISOR)
+    (name,) = random_part.signature.free  # of the strength
+    fitted = {k: random_part.values[name] * random_part.values[k] for k in random_part.free}  # at strength 1
+    of_mean, bounds = effect.parameters[name], {p.name: p.high for p in random_part.effect.parameters}
+    strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_DIVISOR)
     raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
-    scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
-    return NamedEffect(effect.name, {**effect.parameters, amount: raised, **scaled}, effect.seconds)
+    scaled = {k: replace(effect.parameters[k], value=value / strength) for k, value in fitted.items()}
+    return NamedEffect(effect.name, {**effect.parameters, name: raised, **scaled}, effect.seconds)
 
 
 def _mean_of_halves(hypothesis: Candidate) -> np.ndarray | None:

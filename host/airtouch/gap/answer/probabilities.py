@@ -1,4 +1,21 @@
-"""The probability of each candidate, of `none` and of `unknown`."""
+"""The probability of each candidate, of `none` and of `unknown`.
+
+The weight of a candidate is e^(score / TEMPERATURE), where the score is in nats and that of `none` is 0.
+
+1. A candidate that lacks evidence has the score TEMPERATURE (evidence - needed - ln n), n being the number of
+   candidates: together they have odds of 1 at most against `none`.
+2. A candidate with the evidence that it needs has the score evidence - needed.
+3. A candidate that has this evidence beside the effect named first stands behind it by as much as it gains less, by
+   LEAST_LEAD at least, but its score is not below LEAST_SCORE.
+4. An answer other than `unknown` weighs at least as much as the heaviest candidate. The verdict knows more than
+   evidence: that the gap is at its floor, in which seconds a passing effect acts, which effects act together.
+5. The odds of `unknown` are the square of what speaks against the effects named over its limit: one half where as much
+   does as may. The others have what is left, in proportion to their weights.
+6. Beside another answer the probability of `unknown` is at most MOST_UNKNOWN times the answer's.
+
+Where the relations of signals decide, the weights are their probabilities (`Inference.probabilities`) in place of
+rules 1 to 3.
+"""
 
 import numpy as np
 
@@ -18,15 +35,9 @@ MOST_UNKNOWN = 0.9
 
 
 def probabilities(selection: Selection, answer: str) -> dict[str, float]:
-    """The probability of every single candidate, of `none` and of `unknown`: no other is larger than the answer's.
+    """The probability of every single candidate, of `none` and of `unknown`; no other is larger than the answer's.
 
     answer: the first effect named, else the verdict (`ranking.verdict_of`).
-
-    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square. What it
-    does not have is shared among the candidates and `none` by their weights, which come from evidence alone. The
-    verdict knows more than these weights: that the gap is at its floor, in which seconds a passing effect acts, which
-    effects act together. So an answer other than `unknown` weighs at least as much as the heaviest of the others, and
-    `unknown` stays below it (MOST_UNKNOWN).
     """
     names = [*selection.single_effects, "none"]
     weight = dict(zip(names, _weights(selection), strict=True))
@@ -51,12 +62,7 @@ def _weights(selection: Selection) -> np.ndarray:
 
 
 def _score(selection: Selection, name: str) -> float:
-    """Score of a single candidate, nats; that of `none` is 0.
-
-    A candidate with the evidence that it needs stands behind the effect named first by as much as it gains less, by
-    LEAST_LEAD at least, and not below LEAST_SCORE. The effect named first itself, a candidate without that evidence,
-    and every candidate where none is named have the score of their evidence (`_score_of_evidence`).
-    """
+    """Score of a single candidate, nats: rule 3, else rules 1 and 2."""
     single_effects, needed = selection.single_effects, selection.least_nats
     first = selection.named_steps[0].name if selection.named_steps else None
     if first is None or first not in single_effects or name == first or single_effects[name].evidence < needed[name]:
@@ -66,11 +72,10 @@ def _score(selection: Selection, name: str) -> float:
 
 
 def _score_of_evidence(selection: Selection, name: str) -> float:
-    """Score of a single candidate by its evidence over that needed, nats; that of `none` is 0.
+    """Score of a single candidate by its evidence alone, nats: rules 1 and 2.
 
-    Scores are divided by TEMPERATURE before they become weights, as the likelihoods of real flights are too sure of
-    themselves. Evidence that is missing is not trusted less for that, so it is multiplied by TEMPERATURE beforehand: of
-    n candidates each that lacks evidence has the odds e^(evidence - needed) / n against `none`.
+    TEMPERATURE divides scores because the likelihoods of real flights are too sure of themselves. Evidence that is
+    missing is no less certain for that, so rule 1 multiplies by TEMPERATURE beforehand.
     """
     over = selection.single_effects[name].evidence - selection.least_nats[name]
     return over if over >= 0.0 else TEMPERATURE * (over - np.log(len(selection.single_effects)))

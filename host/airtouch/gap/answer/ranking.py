@@ -2,7 +2,7 @@
 
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
-from airtouch.gap.answer.shrink import Gap, nearer, shrink_of
+from airtouch.gap.answer.shrink import Gap, closure_of, nearer
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
@@ -14,7 +14,7 @@ from airtouch.gap.signatures.signature import CLOCK
 AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none: by definition
 #: nats of held-out log likelihood by which two candidates differ that can be told apart; chosen: odds of 20. A larger
 #: number lists more pairs as alike that the flights do tell apart
-TOLD_APART = 3.0
+LEAST_DIFFERENCE = 3.0
 
 
 def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
@@ -27,7 +27,7 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
     4. "none": no effect is named.
     """
     replay_decides = selection.inference is None
-    if replay_decides and gap.shrink.before <= AT_FLOOR and not _acts_outside_the_gap(data, selection, gap):
+    if replay_decides and gap.closure.before <= AT_FLOOR and not _acts_outside_the_gap(data, selection, gap):
         return "none"
     if not is_explained(selection):
         return "unknown"
@@ -55,18 +55,20 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:
     """Every candidate with its probability and how far it closes the gap, best first.
 
-    answer: the first effect named, else the verdict.
+    answer: the first effect named, else the verdict. The shrink of a candidate that was not fitted in full, or gains
+    FIRST_GAIN at most, is not measured.
     """
     out = []
     for name, p in probabilities(selection, answer).items():
         single = selection.single_effects.get(name)
-        share = Quantity(0.0)
+        shrink = None
         if name == answer and verdict == "effect" and len(selection.named_steps) == 1:
-            share = gap.shrink.share
+            shrink = gap.closure.shrink
         elif single is not None and single.full and single.gain > FIRST_GAIN:
-            share = shrink_of(data, selection.halves, single, gap).share
+            shrink = closure_of(data, selection.halves, single, gap).shrink
         nats = None if single is None else selection.gained(single)
-        out.append(RankedCandidate(name, float(p), share, why_not(selection, name, verdict), nats))
+        out.append(RankedCandidate(name, float(p), shrink or Quantity(0.0), why_not(selection, name, verdict), nats,
+                                   measured=shrink is not None))
     order = {n: selection.gained(c) for n, c in selection.single_effects.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out
@@ -79,7 +81,7 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
     groups = []
     first = selection.single_effects[selection.named_steps[0].name]
     same = [n for n, c in selection.single_effects.items() if (c.full or selection.inference is not None)
-            and selection.gained(first) - selection.gained(c) < TOLD_APART]
+            and selection.gained(first) - selection.gained(c) < LEAST_DIFFERENCE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named_steps:

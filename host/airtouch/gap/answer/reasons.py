@@ -1,12 +1,13 @@
 """Why a candidate is not the answer, in a sentence: for the ranking, and for the effects that come nearest."""
 
+from airtouch.gap.answer.words import joined
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
 from airtouch.gap.naming.records import Candidate, Selection, Step
-from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
+from airtouch.gap.naming.unknown import against, is_explained, over_prediction_ratio, remainder_ratio
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
-AT_ITS_FLOOR = "the gap as a whole is at its floor"
+GAP_AT_FLOOR = "the gap as a whole is at its floor"
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
 
@@ -22,7 +23,7 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
     if step is not None and verdict == "effect":
         return _why_beside(selection, step)
     if verdict == "none" and name in {s.name for s in selection.named_steps}:
-        return AT_ITS_FLOOR
+        return GAP_AT_FLOOR
     if name == "unknown":
         return _why_not_unknown(selection)
     if name == "none":
@@ -45,16 +46,17 @@ def shortfall(selection: Selection, candidate: Candidate) -> str:
     if candidate.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)
     if candidate.gain < least:
-        return f"held-out data gain {candidate.gain:.1f} nats by it, {least:.0f} are needed"
+        return f"held-out data gain {candidate.gain:.1f} nats by it, but {least:.0f} are needed"
     if candidate.evidence < least:
-        return (f"as strong as it often seems to be in nominal flights: {candidate.gain:.0f} nats, of which "
-                f"{max(candidate.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+        return (f"as strong as it often seems to be in nominal flights: of {candidate.gain:.0f} nats "
+                f"{max(candidate.evidence, 0.0):.1f} are beyond that scatter, but {least:.0f} are needed")
     if candidate.name == selection.taken_back.name:
         return f"closes {max(selection.taken_back.closed, 0.0):.0%} of the gap, too little to be its cause"
     if selection.named_hypothesis:
-        return (f"gains {candidate.gain:.0f} nats, {' and '.join(s.name for s in selection.named_steps)} "
+        names = [s.name for s in selection.named_steps]
+        return (f"gains {candidate.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "
                 f"{selection.named_hypothesis.gain:.0f}")
-    return f"gains {candidate.gain:.0f} nats, a model without names gains {selection.nameless.over_none:.0f}"
+    return f"gains {candidate.gain:.0f} nats, while a model without names gains {selection.nameless.over_none:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -63,36 +65,38 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
     if name in named:
         return _against_in_words(selection)
     if gain < LEAST_EVIDENCE:
-        return f"the relations of the signals gain {gain:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
+        return f"the relations of the signals gain {gain:.1f} nats by it, but {LEAST_EVIDENCE:.0f} are needed"
     if not named:
         return f"the relations of the signals gain {gain:.1f} nats by it, and more by a model without names"
     first = named[0]
-    return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first]:.0f} by {first}"
+    return f"the relations of the signals gain {gain:.0f} nats by it, but {inference.evidence[first]:.0f} by {first}"
 
 
 def _against_in_words(selection: Selection) -> str:
-    """The evidence against the effects named, with its limit: one of them, as `it`, is the best and not enough."""
+    """The larger of the two things against the effects named, with its limit: `it`, one of them, is not enough."""
     lost, worst = selection.over_prediction
-    if worst is not None and over_prediction_ratio(selection) == against_over_limit(selection):
-        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}; "
-                f"{selection.policy.unknown.least:.0f} may be chance")
-    nats, limit = _nats_against(selection)
-    if against(selection).of_distance:
-        return (f"the flight lies {nats} nats farther from it than nominal flights from none, up to {limit} may be "
-                "chance")
-    return f"a model without names gains {nats} nats beside it, up to {limit} may be left"
+    if worst is not None and over_prediction_ratio(selection) >= remainder_ratio(selection):
+        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}, "
+                f"but only up to {selection.policy.unknown.least:.0f} may be chance")
+    return _remainder_in_words(selection, "it")
+
+
+def _remainder_in_words(selection: Selection, name: str) -> str:
+    """The nats that the effects named leave, 0 at least, with their limit. name: of the effects, "" where none is."""
+    remainder = against(selection)
+    nats = f"{max(remainder.nats, 0.0):.0f} nats"
+    most = f"{'but only' if remainder.is_too_much else 'and'} up to {remainder.limit:.0f}"
+    if remainder.of_distance:
+        place = f"from {name} than nominal flights from none" if name else "from the model than nominal flights do"
+        return f"the flight lies {nats} farther {place}, {most} may be chance"
+    beside = f" beside {name}" if name else ""
+    return f"a model without names gains {nats}{beside}, {most} may be left"
 
 
 def cell_in_words(cell: int) -> str:
     """A cell of the spectra as `force_z at 0 to 0.6 Hz at rest`: channel, band, and whether on the ground."""
     view, channel, (low, high) = place_of(cell)
     return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
-
-
-def _nats_against(selection: Selection) -> tuple[str, str]:
-    """The nats that speak against the effects named, 0 at least, and their limit, as they are shown."""
-    remainder = against(selection)
-    return f"{max(remainder.nats, 0.0):.0f}", f"{remainder.limit:.0f}"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:
@@ -108,29 +112,14 @@ def _why_beside(selection: Selection, step: Step) -> str:
 def _why_not_unknown(selection: Selection) -> str:
     """The reason why the answer is not that no known effect explains the gap."""
     if not is_explained(selection):
-        return AT_ITS_FLOOR
-    if not selection.named_steps:
-        return _beside_no_effect(selection)
-    names, (nats, limit) = " and ".join(s.name for s in selection.named_steps), _nats_against(selection)
-    if against(selection).of_distance:
-        return (f"the flight lies {nats} nats farther from {names} than nominal flights from none, up to {limit} may "
-                "be chance")
-    return f"a model without names gains {nats} nats beside {names}, up to {limit} may be left"
-
-
-def _beside_no_effect(selection: Selection) -> str:
-    """What speaks against there being no gap, with its limit, where no effect is named."""
-    nats, limit = _nats_against(selection)
-    if against(selection).of_distance:
-        return (f"the flight lies {nats} nats farther from the model than nominal flights do, up to {limit} may be "
-                "chance")
-    return f"a model without names gains {nats} nats, up to {limit} may be left"
+        return GAP_AT_FLOOR
+    return _remainder_in_words(selection, joined([s.name for s in selection.named_steps]))
 
 
 def _why_not_none(selection: Selection) -> str:
     """The reason why the answer is not that there is no gap."""
     if selection.named_hypothesis is None:
-        return _beside_no_effect(selection)
+        return _remainder_in_words(selection, "")
     first = selection.named_steps[0].name
     gain = selection.inference.evidence[first] if selection.inference else selection.named_hypothesis.gain
     return f"{first} gains {gain:.0f} nats over it"

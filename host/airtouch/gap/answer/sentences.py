@@ -18,33 +18,34 @@ def _where(diagnosis: Diagnosis) -> str:
     """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
     cell = diagnosis.headline
     if cell is None:
-        return "In no cell of the map does the gap stand out of its floor."
+        return "In no cell of the map does the gap stand out from its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
     most = summary.headline(cells) or cell  # the effects named may close another
-    share = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
-    return (f"{share} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
+    begin = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
+    return (f"{begin} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
             f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 
 
 def _which(diagnosis: Diagnosis) -> str:
     """The effects named with their probability; where none is, what comes nearest."""
-    chance = f"{diagnosis.ranking[0].probability:.0%}" if diagnosis.ranking else "not known"
+    probability = f"{diagnosis.ranking[0].probability:.0%}" if diagnosis.ranking else "not known"
     if diagnosis.verdict == "none":
-        return f"No unmodelled effect stands out (probability {chance})."
+        return f"No unmodelled effect stands out (probability {probability})."
     if diagnosis.verdict == "unknown":
         near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
-        return (f"No known effect explains it (probability {chance})"
+        return (f"No known effect explains it (probability {probability})"
                 + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
     cell = diagnosis.headline
     if cell is not None and cell.after is not None and not summary.closes(cell):
-        sentence = f"The effect named, {first} (probability {chance}), does not close this cell"
+        sentence = f"The effect named, {first} (probability {probability}), does not close this cell"
         return sentence + (f", nor does {joined(others)} beside it." if others else ".")
     begin = "Its cause" if cell is not None else "The effect named, from all cells together,"
-    return f"{begin} is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
+    return f"{begin} is {first} (probability {probability})" \
+        + (f", with {joined(others)} beside it." if others else ".")
 
 
 def _named(effect: NamedEffect) -> str:

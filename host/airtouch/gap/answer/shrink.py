@@ -2,9 +2,8 @@
 
 An **energy** is the power of one value of the spectra over its floor: 1 on average where nothing acts. The **gap** is
 the root of the mean energy over some cells (channel by band by view), so that its floor is 1. The cells are those in
-which the other half of the data shows a gap, or in which the effects named gain there. The **shrink** (`Shrink`, in the
-JSON `shrink`) is the gap before and after effects are in the model, and the fraction of it above the floor that they
-close.
+which the other half of the data shows a gap, or in which the effects named gain there. The **shrink** is the fraction
+of the gap above the floor that effects in the model close.
 
 Where the effects named leave less energy than 1, the flights were flown in calmer air than nominal ones. The missing
 energy, the **deficit**, is added to every energy before and after: the floor of these flights is lower, and what lies
@@ -22,7 +21,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN, LeftOver, cell_gains, left_over
 from airtouch.gap.evidence.problem import BlockSet
 from airtouch.gap.naming.records import Candidate
-from airtouch.gap.result import Quantity, Shrink
+from airtouch.gap.result import Closure, Quantity
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
@@ -41,7 +40,7 @@ DRAWS = 400  #: bootstrap samples of the fraction closed; chosen, the ends of it
 PIECES = 24
 SEED = 0  #: of the bootstrap
 INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
-LARGEST = 1e4  #: largest energy of a value, so that a spike makes no gap; chosen. A larger number lets one decide
+LARGEST_ENERGY = 1e4  #: largest energy of a value, so that no spike makes a gap; chosen. A larger number lets one do
 #: gap above the floor, in units of it, up to which the fraction closed is said to be 0; chosen. A larger number gives
 #: none for small gaps, a smaller one a ratio of two noises
 LEAST_EXCESS = 0.02
@@ -56,31 +55,31 @@ class Gap:
 
     cells: in which it is measured, bool (CELLS,) for each half, as the other half shows them; deficit: by how much the
     mean energy there is below 1 once the effects named are in the model, 0 at least; energies_before (n,): energies
-    without any effect, the deficit added; shrink: by the effects named.
+    without any effect, the deficit added; closure: by the effects named.
     """
 
     cells: tuple[np.ndarray, np.ndarray]
     deficit: float
     energies_before: np.ndarray
-    shrink: Shrink
+    closure: Closure
 
 
-def gap_of(data: Data, parts: Sequence[BlockSet], hypothesis: Candidate | None) -> Gap:
+def gap_of(data: Data, halves: Sequence[BlockSet], hypothesis: Candidate | None) -> Gap:
     """The gap of two halves of the data, each in the cells that the other shows. hypothesis: the effects named."""
     terms = _terms(hypothesis)
-    cells = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
-    after = _energies(data, parts, terms, cells)
+    cells = _standing_out(data, halves[1], terms[1]), _standing_out(data, halves[0], terms[0])
+    after = _energies(data, halves, terms, cells)
     deficit = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
-    before = deficit + _energies(data, parts, _terms(None), cells)
-    shrink = shrink_of_jitter(data) if is_only_jitter(hypothesis) else _shrink(before, deficit + after)
-    return Gap(cells, deficit, before, shrink)
+    before = deficit + _energies(data, halves, _terms(None), cells)
+    closure = closure_of_jitter(data) if is_only_jitter(hypothesis) else _closure(before, deficit + after)
+    return Gap(cells, deficit, before, closure)
 
 
-def shrink_of(data: Data, parts: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Shrink:
+def closure_of(data: Data, halves: Sequence[BlockSet], candidate: Candidate, gap: Gap) -> Closure:
     """How far another hypothesis than the effects named closes the gap of two halves."""
     if is_only_jitter(candidate):
-        return shrink_of_jitter(data)
-    return _shrink(gap.energies_before, gap.deficit + _energies(data, parts, _terms(candidate), gap.cells))
+        return closure_of_jitter(data)
+    return _closure(gap.energies_before, gap.deficit + _energies(data, halves, _terms(candidate), gap.cells))
 
 
 def is_only_jitter(candidate: Candidate | None) -> bool:
@@ -89,16 +88,16 @@ def is_only_jitter(candidate: Candidate | None) -> bool:
         and all(t.shows_in == CLOCK and not t.signature.loses_rows for t in candidate.terms)
 
 
-def _shrink(before: np.ndarray, after: np.ndarray) -> Shrink:
-    """The shrink from held-out energies (n,) without and with effects; without any energy the gap is at its floor."""
+def _closure(before: np.ndarray, after: np.ndarray) -> Closure:
+    """The closure by held-out energies (n,) without and with effects; without any energy the gap is at its floor."""
     if not len(before):
-        return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
-    return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
-                  Quantity(share_closed(before.mean(), after.mean()), *_interval(before, after)))
+        return Closure(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
+    return Closure(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
+                  Quantity(fraction_closed(before.mean(), after.mean()), *_interval(before, after)))
 
 
-def shrink_of_jitter(data: Data) -> Shrink:
-    """The shrink where only the logged times are irregular: how well the jitter of one half predicts the other's.
+def closure_of_jitter(data: Data) -> Closure:
+    """The closure where only the logged times are irregular: how well the jitter of one half predicts the other's.
 
     The gap is the rms of the logged times around regular ones, over that of nominal flights. After an effect is in the
     model, what is left is the floor and what the halves differ by. Two numbers give no interval.
@@ -109,11 +108,10 @@ def shrink_of_jitter(data: Data) -> Shrink:
            for half in (0, 1)]
     before = float(np.mean(rms)) / floor
     after = 1.0 + abs(rms[0] - rms[1]) / floor
-    share = share_closed(before ** 2, after ** 2)
-    return Shrink(before, after, Quantity(share))
+    return Closure(before, after, Quantity(fraction_closed(before ** 2, after ** 2)))
 
 
-def share_closed(before: float, after: float) -> float:
+def fraction_closed(before: float, after: float) -> float:
     """Fraction of the gap above the floor that is closed, (rms before - rms after) / (rms before - 1), within -1 and 1.
 
     before, after: mean energies, the squares of these rms values; the floor is 1. The fraction is 0 where the gap is no
@@ -124,30 +122,30 @@ def share_closed(before: float, after: float) -> float:
 
 
 def _interval(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
-    """Ends of the 90 % interval of `share_closed`, by block bootstrap of held-out energies (n,) before and after."""
+    """Ends of the 90 % interval of `fraction_closed`, by block bootstrap of held-out energies (n,) before and after."""
     pieces = min(PIECES, len(before))
     means_before, means_after = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
     drawn = np.random.default_rng(SEED).integers(0, pieces, (DRAWS, pieces))
-    shares = [share_closed(b, a) for b, a in zip(means_before[drawn].mean(axis=1), means_after[drawn].mean(axis=1),
-                                                 strict=True)]
-    low, high = np.percentile(shares, INTERVAL)
+    fractions = [fraction_closed(b, a) for b, a in zip(means_before[drawn].mean(axis=1),
+                                                       means_after[drawn].mean(axis=1), strict=True)]
+    low, high = np.percentile(fractions, INTERVAL)
     return float(low), float(high)
 
 
-def nearer(data: Data, parts: Sequence[BlockSet], candidate: Candidate | None, gap: Gap) -> bool:
+def nearer(data: Data, halves: Sequence[BlockSet], candidate: Candidate | None, gap: Gap) -> bool:
     """Whether the cells of a gap lie nearer to the floor with a hypothesis than without, on held-out blocks.
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
     """
-    without, within = (_off_floor(data, parts, terms, gap.cells) for terms in (_terms(None), _terms(candidate)))
+    without, within = (_off_floor(data, halves, terms, gap.cells) for terms in (_terms(None), _terms(candidate)))
     return within < without
 
 
-def _off_floor(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]],
+def _off_floor(data: Data, halves: Sequence[BlockSet], terms: Sequence[Sequence[Term]],
                cells: Sequence[np.ndarray]) -> float:
     """Distance of the cells' energy from the floor, above or below, summed over their values."""
     total, count = np.zeros(CELLS), np.zeros(CELLS)
-    for cell, energies in _held_out(data, parts, terms, cells):
+    for cell, energies in _held_out(data, halves, terms, cells):
         total += np.bincount(cell, energies, CELLS)
         count += np.bincount(cell, minlength=CELLS)
     return float(np.abs(total - count).sum())
@@ -158,38 +156,38 @@ def _terms(candidate: Candidate | None) -> Sequence[Sequence[Term]]:
     return [f.terms for f in candidate.fits] if candidate and candidate.fits else ((), ())
 
 
-def _energies(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
+def _energies(data: Data, halves: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> np.ndarray:
     """Energies (n,) of both halves: see `_held_out`."""
-    return np.concatenate([energies for _, energies in _held_out(data, parts, terms, cells)])
+    return np.concatenate([energies for _, energies in _held_out(data, halves, terms, cells)])
 
 
-def _held_out(data: Data, parts: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
+def _held_out(data: Data, halves: Sequence[BlockSet], terms: Sequence[Sequence[Term]], cells: Sequence[np.ndarray],
               ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """For each half, cell number (n,) and energy (n,) of its values in the cells.
 
     The energy is that of what effects as fitted to the other half leave. cells: mask (CELLS,) for each half.
     """
     for half in (0, 1):
-        remainder = left_over(data, parts[half], terms[1 - half])
+        remainder = left_over(data, halves[half], terms[1 - half])
         cell = remainder.problem.flat.cells
         use = remainder.problem.elements.valid & cells[half][cell]
         yield cell[use], _energy(remainder)[use]
 
 
-def _standing_out(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
-    """Mask (CELLS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
-    remainder = left_over(data, part, ())
+def _standing_out(data: Data, half: BlockSet, terms: Sequence[Term]) -> np.ndarray:
+    """Mask (CELLS,) of the cells that show a gap in a half of the data, or in which effects fitted to it gain."""
+    remainder = left_over(data, half, ())
     cell, valid = remainder.problem.flat.cells, remainder.problem.elements.valid
     count = np.bincount(cell, valid, CELLS)
     mean = np.bincount(cell, _energy(remainder) * valid, CELLS) / np.maximum(count, 1)
     error = np.sqrt(1.0 / (OVERLAP_WEIGHT * np.maximum(count, 1)))
     out = mean > 1.0 + STANDARD_ERRORS * error + MARGIN
     if terms:
-        out |= cell_gains(data, part, terms) > CELL_GAIN
+        out |= cell_gains(data, half, terms) > CELL_GAIN
     return out & (count >= FEWEST_VALUES)
 
 
 def _energy(remainder: LeftOver) -> np.ndarray:
-    """Energy (n,) of each value, LARGEST at most."""
-    return np.minimum(squared(remainder.gap) / remainder.power, LARGEST)
+    """Energy (n,) of each value, LARGEST_ENERGY at most."""
+    return np.minimum(squared(remainder.gap) / remainder.power, LARGEST_ENERGY)

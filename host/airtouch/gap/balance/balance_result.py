@@ -31,13 +31,13 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import (
     BASELINE,
     Cell,
+    Closure,
     Control,
     Diagnosis,
     GapMap,
     OverallGap,
     Quantity,
     RankedCandidate,
-    Shrink,
 )
 from airtouch.gap.where import summary
 from airtouch.vehicle import Vehicle
@@ -45,7 +45,7 @@ from airtouch.vehicle import Vehicle
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
 #: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen
 WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
-LEAST_GAP = 1e-9  #: over the floor, that a share of the gap is taken of at least
+LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
            "leave both as they are were not tried")
@@ -78,17 +78,17 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     first, probability = answer_of(probability_of)
     verdict = first if first in ("none", "unknown") else "effect"
     fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
-    shrink = {name: _shrink(gap, base, fit) for name, fit in fits.items()}
+    closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first], len(flights))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, probability_of, shrink)),
-        indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, shrink[first]),
-        shrink=shrink[first].share if verdict == "effect" else None,
-        control=_control(probability_of, first, shrink) if verdict == "effect" else None,
+        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, probability_of, closures)),
+        indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
+        shrink=closures[first].shrink if verdict == "effect" else None,
+        control=_control(probability_of, first, closures) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
@@ -104,8 +104,8 @@ def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
     return [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
 
 
-def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
-    """Gap before and after in standard deviations of the floor, and the share of it that goes, with its interval.
+def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
+    """Gap before and after in standard deviations of the floor, and the fraction of it that closes, with its interval.
 
     gap (4,): BALANCE from the nominal mean.
     """
@@ -118,26 +118,27 @@ def _shrink(gap: np.ndarray, base: Reference, fit: Likeliest) -> Shrink:
     before, after = rms(gap), rms(gap - fit.change)
     after_each = np.sqrt((((gap - fit.hypothesis.change) / spread) ** 2).mean(axis=1))
 
-    def share(rest: float) -> float:
-        """Share of the gap over the floor that goes when this rms is left."""
+    def closed(rest: float) -> float:
+        """Fraction of the gap above the floor that is closed when this rms is left."""
         return float(np.clip((before - rest) / max(before - 1.0, LEAST_GAP), 0.0, 1.0)) if before > 1.0 else 0.0
 
-    low, high = share(quantile(after_each, fit.weight, HIGH)), share(quantile(after_each, fit.weight, LOW))
-    return Shrink(before, after, Quantity(share(after), min(low, share(after)), max(high, share(after))))
+    low, high = closed(quantile(after_each, fit.weight, HIGH)), closed(quantile(after_each, fit.weight, LOW))
+    return Closure(before, after, Quantity(closed(after), min(low, closed(after)), max(high, closed(after))))
 
 
-def _gap(verdict: str, shrink: Shrink) -> OverallGap:
+def _gap(verdict: str, closure: Closure) -> OverallGap:
     """The gap before and after in standard deviations of the floor; unchanged where no effect is named."""
-    return {"before": shrink.before, "floor": 1.0, "after": shrink.after if verdict == "effect" else shrink.before}
+    return {"before": closure.before, "floor": 1.0, "after": closure.after if verdict == "effect" else closure.before}
 
 
-def _control(probability_of: Mapping[str, float], first: str, shrink: Mapping[str, Shrink]) -> Control | None:
+def _control(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
     """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
     wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
-    return None if wrong is None else Control(wrong, shrink[wrong])
+    return None if wrong is None else Control(wrong, closures[wrong])
 
 
-def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[str, Shrink]) -> list[RankedCandidate]:
+def _ranking(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
+             ) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     together = _weights_together(first, probability_of)
     best = max(together.values())
@@ -150,7 +151,7 @@ def _ranking(first: str, probability_of: Mapping[str, float], shrink: Mapping[st
             return f"counted with {first}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
-    return sorted((RankedCandidate(n, p, shrink[n].share, reason(n, p)) for n, p in together.items()),
+    return sorted((RankedCandidate(n, p, closures[n].shrink, reason(n, p)) for n, p in together.items()),
                   key=lambda r: (r.name != first, -r.probability))
 
 

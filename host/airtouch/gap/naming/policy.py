@@ -42,7 +42,7 @@ TEMPERATURE = 6.0
 #: commands alone show it. Chosen 2026-11-21: a larger number saves fits and loses weak random effects
 HOPELESS = 0.5
 #: nats that a variant's mean term may be behind the best in screening and still be fitted with its random part; chosen:
-#: odds of 20, as between candidates (`answer.ranking.TOLD_APART`)
+#: odds of 20, as between candidates (`answer.ranking.LEAST_DIFFERENCE`)
 ABOUT_AS_GOOD = 3.0
 #: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time: less means
 #: more fits, more loses effects that screening takes for weaker than they are

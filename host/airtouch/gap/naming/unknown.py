@@ -30,11 +30,16 @@ def over_prediction_ratio(selection: Selection) -> float:
     return nats / selection.policy.unknown.least if nats else 0.0
 
 
-def against_over_limit(selection: Selection) -> float:
-    """How much speaks against the effects named over its limit: what they leave, or over-prediction."""
+def remainder_ratio(selection: Selection) -> float:
+    """Nats of what the effects named leave over their limit."""
     remainder = against(selection)
     never_negative = float(np.logaddexp(remainder.nats, 0.0))  # softplus: the nats where these are many, else above 0
-    return max(never_negative / remainder.limit, over_prediction_ratio(selection))
+    return never_negative / remainder.limit
+
+
+def against_over_limit(selection: Selection) -> float:
+    """How much speaks against the effects named over its limit: what they leave, or over-prediction."""
+    return max(remainder_ratio(selection), over_prediction_ratio(selection))
 
 
 def is_explained(selection: Selection) -> bool:

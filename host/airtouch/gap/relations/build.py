@@ -1,6 +1,6 @@
 """Learn a library from about 25,000 simulated flights, in half an hour of one core.
 
-    python -m airtouch.gap.relations.build OUT.npz [--scenario diagnosis] [--vehicle crazyflie-2.1-flow]
+    python -m airtouch.gap.relations.build OUT.npz [--scenario diagnosis] [--vehicle crazyflie-2.1-flow] [--force]
 
 The flights' seed is no sealed set's (`learning.SEED`), so that the file is the same every time.
 
@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from airtouch.errors import in_one_line
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
-from airtouch.gap.relations.calibration import calibrated, two_of
+from airtouch.gap.relations.calibration import calibrated, nominal_distance, two_of
 from airtouch.gap.relations.effect_class import KNOT, KNOT_FACTOR, ClassFlights, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
@@ -38,8 +39,9 @@ from airtouch.gap.relations.learning import (
     scaled,
     weakest_strength,
 )
-from airtouch.gap.relations.library import STORED, Library, NominalDistance, packed, read, save
+from airtouch.gap.relations.library import STORED, Coordinates, Library, packed, read, save
 from airtouch.gap.relations.settings import SHIPPED, BuildSettings
+from airtouch.logs.files import check_free
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import DEFAULT_VEHICLE, load
 
@@ -101,15 +103,15 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: 
     axes = whitening.lower.T @ projection  # as they are after the rounding
     classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
         p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
-    scatter_of_nameless = _scatter_of_nameless(nameless @ axes)[:, :settings.rank_of_nameless]
-    library = Library(
-        scene.scenario, scene.vehicle.name, standard, projection, (standard(features) @ projection).mean(axis=0),
-        LearnedModel(classes, np.zeros((projection.shape[1], 0)), scatter_of_nameless),
-        NominalDistance(0.0, 1.0), pair_scatter=0.0)
+    coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
+    additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
+                            nameless=_scatter_of_nameless(nameless @ axes)[:, :settings.rank_of_nameless])
     say("flights of two effects")
-    interaction = _interaction(scene, library, paired, settings.flights_of_two)[:, :settings.rank_of_interaction]
-    library = replace(library, model=replace(library.model, interaction=interaction))
+    interaction = _interaction(scene, coordinates, additive, paired, settings.flights_of_two)
+    model = replace(additive, interaction=interaction[:, :settings.rank_of_interaction])
     say("calibration")
+    distance = nominal_distance(scene, coordinates.rounded(), settings.calibration.nominal_flights)
+    library = Library(scene.scenario, scene.vehicle.name, coordinates, model, distance)
     return calibrated(scene, read(packed(library)), settings.calibration, say)  # as it will be read, rounded
 
 
@@ -118,7 +120,7 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     """Flights of one class, from strengths that hardly show to the highest; nominal: whitened (F,) by number."""
     high = drawing.kind.highest
     few = dict(list(nominal.items())[:settings.weakest_flights])
-    low = min(weakest_strength(high, partial(_length_of_shift, scene, whitening, few, drawing)), high / KNOT_FACTOR)
+    low = min(weakest_strength(high, partial(_shifts, scene, whitening, few, drawing)), high / KNOT_FACTOR)
     of_direction = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
     count = int(of_direction * settings.flights_per_knot * (np.log(high / low) / KNOT + 1.0))
     flown = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
@@ -128,14 +130,12 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
 
 
-def _length_of_shift(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,
-                     strength: float) -> float:
-    """Median length of the whitened shift by a class at a strength; infinite where no flight ends well."""
-    lengths = []
-    for i in nominal:
-        f = fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))])
-        lengths += [] if f is None else [np.linalg.norm(whitening(f)[0] - nominal[i])]
-    return float(np.median(lengths)) if lengths else np.inf
+def _shifts(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, strength: float,
+            ) -> list[np.ndarray]:
+    """Whitened shifts (F,) by a class at a strength, of the flights of these numbers that end well."""
+    flown = ((i, fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))]))
+             for i in nominal)
+    return [whitening(f)[0] - nominal[i] for i, f in flown if f is not None]
 
 
 def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
@@ -149,8 +149,12 @@ def _scatter_of_nameless(shift: np.ndarray) -> np.ndarray:
     return axes.T * deviation
 
 
-def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights], count: int) -> np.ndarray:
-    """Directions (Q, r), times the standard deviation, of what two effects are beside their sum, over the smaller."""
+def _interaction(scene: Scene, coordinates: Coordinates, additive: LearnedModel, paired: Sequence[PairedFlights],
+                 count: int) -> np.ndarray:
+    """Directions (Q, r), times the standard deviation, of what two effects are beside their sum, over the smaller.
+
+    additive: a model in which two effects are their sum; count: of flights with two effects.
+    """
     relative, noise = [], []
     for i in range(count):
         rng = np.random.default_rng([SEED, Stream.PAIR, i])
@@ -158,7 +162,7 @@ def _interaction(scene: Scene, library: Library, paired: Sequence[PairedFlights]
         f = fly(scene, i, [paired[j].draw_strong(rng) for j in (a, b)])
         if f is None:
             continue
-        residual, smaller = _residual_of_two(library, library.coordinates(f[None])[0], a, b)
+        residual, smaller = _residual_of_two(additive, coordinates(f[None])[0], a, b)
         if smaller > CLEAR_OF_TWO:
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
@@ -177,28 +181,31 @@ def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
     return axes[stands].T * np.sqrt(deviation[stands] ** 2 - noise)
 
 
-def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
+def _residual_of_two(model: LearnedModel, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the length of the smaller one's shift."""
-    one, two = library.model.classes[a], library.model.classes[b]
-    flight = FlightHypotheses(values, library.model)
+    one, two = model.classes[a], model.classes[b]
+    flight = FlightHypotheses(values, model)
     both = flight.with_two(one, two)
     return flight.rescaling(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
 def main() -> None:
-    """Build a library and write it."""
+    """Build a library and write it; refuse before the work what could not be written after it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path, help="file of the library, replaced if it is there")
+    parser.add_argument("out", type=Path, help="file of the library")
     parser.add_argument("--scenario", default="diagnosis", help="what is flown (default %(default)s)")
     parser.add_argument("--vehicle", default=DEFAULT_VEHICLE, help="name or .toml file (default %(default)s)")
-    arguments = parser.parse_args()
-    library = build(Scene(arguments.scenario, load(arguments.vehicle)), say=lambda text: print(text, flush=True))
-    save(library, arguments.out)
+    parser.add_argument("--force", action="store_true", help="replace the file")
+    options = parser.parse_args()
+    check_free(options.out, options.force)
+    library = build(Scene(options.scenario, load(options.vehicle)), say=lambda text: print(text, flush=True))
+    save(library, options.out, options.force)
     for c in library.model.classes:
-        shares = c.calibration
-        print(f"{c.name} {c.shape or ''}: nameless share {shares.nameless_share:.3f}, "
-              f"second share {shares.second_share:.3f}, distance scatter {shares.distance_scatter:.3f}")
+        measured = c.calibration
+        print(f"{c.name} {c.shape or ''}: nameless share {measured.nameless_share:.3f}, "
+              f"second share {measured.second_share:.3f}, distance scatter {measured.distance_scatter:.3f}")
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line("build"):
+        main()

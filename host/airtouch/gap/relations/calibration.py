@@ -1,7 +1,7 @@
 """Calibrate a library on simulated flights that it was not learned from: distances, shares of evidence, parameters.
 
-`calibrated` does so in three steps: the distance of nominal flights, each class by flights with its effect
-(`calibrate_class`), two effects together (`_scatter_of_two`).
+Three steps: the distance of nominal flights (`nominal_distance`), then in `calibrated` each class by flights with its
+effect (`calibrate_class`) and two effects together (`_scatter_of_two`).
 
 How many flights it takes is in `settings`. Thresholds without another source were chosen on flights of `learning.SEED`
 alone (host/docs/looks.md, 2026-11-24, 12:43 UTC, and 2026-11-25, 09:07 UTC). What other values were tried is not
@@ -20,7 +20,7 @@ from airtouch.gap.relations.effect_class import ClassCalibration
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Say, Scene, Stream, all_drawings, fly, halved, scaled
-from airtouch.gap.relations.library import Library, NominalDistance
+from airtouch.gap.relations.library import Coordinates, Library, NominalDistance
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.relations.settings import CalibrationSettings
 from airtouch.gap.signatures.alike import interchangeable
@@ -39,8 +39,7 @@ LEAST_SCATTER = 1e-4  #: of a distance, over the evidence; a bound of the search
 
 
 def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, say: Say = lambda _: None) -> Library:
-    """The library with its distances and the calibration of its classes, alone and by two."""
-    library = replace(library, distance=_nominal_distance(scene, library, settings.nominal_flights))
+    """The library with the calibration of its classes, alone and by two."""
     drawing_of = {(d.name, d.shape): d for d in all_drawings()}
     drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
     classes = []
@@ -63,10 +62,10 @@ def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing
                           library.nominal_scatter))
 
 
-def _nominal_distance(scene: Scene, library: Library, count: int) -> NominalDistance:
-    """`Library.distance` by so many flights, the standard deviation from the middle two thirds."""
+def nominal_distance(scene: Scene, coordinates: Coordinates, count: int) -> NominalDistance:
+    """The distance of nominal flights by so many of them, the standard deviation from the middle two thirds."""
     flown = [f for i in range(count) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
-    squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
+    squared = (coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
     return NominalDistance(float(np.median(squared)), float(0.5 * (high - low)))
 

@@ -100,12 +100,18 @@ def halved(highest: float, most: int, hides: Callable[[float], bool]) -> float:
     return strength
 
 
-def weakest_strength(highest: float, length_of_shift: Callable[[float], float]) -> float:
-    """The highest strength of a class, halved until it shifts flights by WEAKEST_SHIFT or less.
+def weakest_strength(highest: float, shifts: Callable[[float], Sequence[np.ndarray]]) -> float:
+    """The highest strength of a class, halved until the median shift of its flights is WEAKEST_SHIFT or shorter.
 
-    length_of_shift: of flights at a strength, in standard deviations of nominal ones; infinite where none ends well.
+    shifts: those (coordinates,) of the flights at a strength that end well, in standard deviations of nominal ones. A
+    strength at which none ends well is halved.
     """
-    return halved(highest, HALVINGS, lambda strength: length_of_shift(strength) <= WEAKEST_SHIFT)
+    def hides(strength: float) -> bool:
+        """Whether the median shift at a strength is short."""
+        lengths = [np.linalg.norm(shift) for shift in shifts(strength)]
+        return bool(lengths) and float(np.median(lengths)) <= WEAKEST_SHIFT
+
+    return halved(highest, HALVINGS, hides)
 
 
 def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,

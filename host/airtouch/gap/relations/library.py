@@ -36,30 +36,54 @@ class NominalDistance(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Coordinates:
+    """The map from a flight's features to its coordinates, Q of them, of which nominal flights have the covariance 1.
+
+    Features are standardised, multiplied by `projection` (features, Q), and `middle` (Q,), the nominal mean, is
+    subtracted.
+    """
+
+    standard: Standard
+    projection: np.ndarray
+    middle: np.ndarray
+
+    def __call__(self, features: np.ndarray) -> np.ndarray:
+        """Coordinates (n, Q) of features (n, features)."""
+        return self.standard(features) @ self.projection - self.middle
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by their names in a file."""
+        return {"standard.middle": self.standard.middle, "standard.deviation": self.standard.deviation,
+                "projection": self.projection, "middle": self.middle}
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, np.ndarray]) -> "Coordinates":
+        """The map of `arrays`, maybe among others."""
+        return cls(Standard(arrays["standard.middle"], arrays["standard.deviation"]), arrays["projection"],
+                   arrays["middle"])
+
+    def rounded(self) -> "Coordinates":
+        """The map as a file holds it."""
+        return Coordinates.of({name: array.astype(float) for name, array in _rounded(self.arrays()).items()})
+
+
+@dataclass(frozen=True)
 class Library:
     """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
-    projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
-    less the middle.
     pair_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
     """
 
     scenario: str
     vehicle: str
-    standard: Standard
-    projection: np.ndarray
-    middle: np.ndarray
+    coordinates: Coordinates
     model: LearnedModel
     distance: NominalDistance
-    pair_scatter: float
+    pair_scatter: float = 0.0
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Other processes read the shipped library from their own package: it is 30 MB of a study that is sent."""
         return (shipped, ()) if self is shipped() else super().__reduce_ex__(protocol)
-
-    def coordinates(self, features: np.ndarray) -> np.ndarray:
-        """Coordinates (n, Q) of features (n, features)."""
-        return self.standard(features) @ self.projection - self.middle
 
     @property
     def nominal_scatter(self) -> float:
@@ -102,17 +126,20 @@ class Library:
         return replace(self, model=replace(self.model, classes=tuple(classes)))
 
 
-def save(library: Library, path: Path) -> None:
-    """Write a library as npz, most numbers in half precision; raises AirTouchError where it cannot be written."""
-    write_bytes(packed(library), path, True)
+def save(library: Library, path: Path, force: bool = False) -> None:
+    """Write a library as npz, most numbers in half precision; raises AirTouchError as `logs.files.write_bytes`."""
+    write_bytes(packed(library), path, force)
+
+
+def _rounded(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays in the precision of a file."""
+    return {name: array.astype(np.float32 if name.endswith(EXACT) else STORED) for name, array in arrays.items()}
 
 
 def packed(library: Library) -> bytes:
     """The bytes of a library's file."""
     model = library.model
-    arrays = {"standard.middle": library.standard.middle, "standard.deviation": library.standard.deviation,
-              "projection": library.projection, "middle": library.middle, "interaction": model.interaction,
-              "nameless": model.nameless,
+    arrays = {**library.coordinates.arrays(), "interaction": model.interaction, "nameless": model.nameless,
               **{name: np.array([getattr(c.calibration, name) for c in model.classes]) for name in SHARES}}
     for i, c in enumerate(model.classes):
         arrays |= {f"{i}.{part}": getattr(c, part) for part in PARTS}
@@ -122,9 +149,8 @@ def packed(library: Library) -> bytes:
              "pair_scatter": library.pair_scatter,
              "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
              "readouts": [(r := c.calibration.readout) and r.parameters for c in model.classes]}
-    rounded: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(EXACT) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
-    np.savez_compressed(file, **rounded, words=np.array(json.dumps(words)))
+    np.savez_compressed(file, words=np.array(json.dumps(words)), **_rounded(arrays))  # type: ignore[arg-type]
     return file.getvalue()
 
 
@@ -141,8 +167,8 @@ def read(content: bytes) -> Library:
                                                  **{share: float(arrays[share][i]) for share in SHARES}))
         for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
     return Library(
-        words["scenario"], words["vehicle"], Standard(arrays["standard.middle"], arrays["standard.deviation"]),
-        arrays["projection"], arrays["middle"], LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
+        words["scenario"], words["vehicle"], Coordinates.of(arrays),
+        LearnedModel(classes, arrays["interaction"], arrays["nameless"]),
         distance=NominalDistance(*words["distance"]), pair_scatter=words["pair_scatter"])
 
 
@@ -158,13 +184,23 @@ def shipped() -> Library:
 
 
 def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Library | None:
-    """The library for flights of a vehicle whose nominal flights have these features; None where there is none.
+    """The shipped library, None where it does not hold for flights of a vehicle: see `why_no_library`."""
+    return None if why_no_library(vehicle, nominal) else shipped()
 
-    It must be of the same vehicle as declared, and the nominal flights must lie where simulated ones lie: those of
-    another mission, of another simulator or of a real vehicle do not.
+
+def why_no_library(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> str:
+    """Why the shipped library does not hold for flights of a vehicle, "" where it does.
+
+    vehicle: as declared; nominal: features of its nominal flights, None of one whose log lacks columns.
     """
-    known = [f for f in nominal if f is not None]
     library = shipped()
-    if not known or len(known) < len(nominal) or replace(load(library.vehicle), name=vehicle.name) != vehicle:
-        return None
-    return library if library.lies_as_nominal(library.coordinates(np.array(known))) else None
+    known = [f for f in nominal if f is not None]
+    if not known:
+        return "no nominal flight has features to compare"
+    if len(known) < len(nominal):
+        return "the log of a nominal flight lacks columns"
+    if replace(load(library.vehicle), name=vehicle.name) != vehicle:
+        return f"the vehicle is declared unlike {library.vehicle}"
+    if not library.lies_as_nominal(library.coordinates(np.array(known))):
+        return f"the nominal flights lie elsewhere than simulated ones of the scenario {library.scenario!r}"
+    return ""

@@ -51,7 +51,7 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
     """
     drawing = Drawing(name, kinds_of(get(name))[name])
     high = drawing.kind.highest
-    low = min(weakest_strength(high, partial(_length_of_shift, library, scene, drawing)), HIGHEST_START * high)
+    low = min(weakest_strength(high, partial(_shifts, library, scene, drawing)), HIGHEST_START * high)
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()]))
                  for i in range(settings.pairs)]
     flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
@@ -73,10 +73,10 @@ def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> Cl
     return ClassCalibration(calibration.readout, *(max(getattr(one, name) for one in calibrations) for name in SHARES))
 
 
-def _length_of_shift(library: Library, scene: Scene, drawing: Drawing, strength: float) -> float:
-    """By how much an effect at a strength moves the coordinates of one flight; infinite where it does not end well."""
+def _shifts(library: Library, scene: Scene, drawing: Drawing, strength: float) -> list[np.ndarray]:
+    """The shift (Q,) of the coordinates of one flight by an effect at a strength; none where it does not end well."""
     pair = _pair(library, scene, drawing, (0, strength))
-    return np.inf if pair is None else float(np.linalg.norm(pair.flight - pair.nominal))
+    return [] if pair is None else [pair.flight - pair.nominal]
 
 
 def _pair(library: Library, scene: Scene, drawing: Drawing, numbered: tuple[int, float]) -> Pair | None:

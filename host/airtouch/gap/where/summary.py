@@ -31,7 +31,7 @@ HALF = 0.5  #: fraction of a cell's energy from which on the named effects close
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase of the flights: rms over its cells of gap over floor, and how many cells stand out of their floor.
+    """One phase of the flights: rms over its cells of gap over floor, and how many cells stand out from their floor.
 
     energy: of all its cells over the floor, in blocks, by which phases are put in order; stay, worse: cells that
     still stand out, and that got worse, with the named effects in the model.
@@ -89,7 +89,7 @@ def stays(cell: Cell) -> bool:
 
 
 def got_worse(cell: Cell) -> bool:
-    """Whether the named effects made the cell larger, by a tenth or more, and it stands out of its floor."""
+    """Whether the named effects made the cell larger, by a tenth or more, and it stands out from its floor."""
     return cell.after is not None and stays(cell) and cell.after > WORSE * cell.gap
 
 
@@ -129,7 +129,7 @@ def headline(cells: Sequence[Cell], named: bool = False) -> Cell | None:
 
 
 def same_place(cells: Iterable[Cell], one: Cell) -> list[Cell]:
-    """The cells in the air of one's channel and band that stand out of their floor."""
+    """The cells in the air of one's channel and band that stand out from their floor."""
     return [c for c in cells if c.regime == "all" and c.phase != GROUND_NAME and stands_out(c)
             and (c.channel, c.band_hz) == (one.channel, one.band_hz)]
 
