@@ -9,7 +9,7 @@ from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
-from airtouch.gap.naming.records import Candidate, Charges, Step, Strength
+from airtouch.gap.naming.records import Candidate, Charges, Step, Strength, Unsteadiness
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, unsteady
@@ -71,3 +71,9 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
         of_wakes = {UNSTEADY_TORQUE: unsteady(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
         sizes |= {name: size for name, size in of_wakes.items() if name in data.study.scatter.passing}
     return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))
+
+
+def unsteadiness_of(data: Data) -> Unsteadiness:
+    """How much less steady flights are than nominal ones, of which the scatter is known."""
+    assert data.study.scatter is not None  # else it is not judged
+    return Unsteadiness(*data.study.scatter.rarity(unsteady(data)))

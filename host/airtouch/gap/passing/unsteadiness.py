@@ -41,3 +41,12 @@ def _relative_powers(study: Study, flight: Flight, columns: tuple[int, ...]) -> 
         return np.zeros(0)
     relative = (known / np.exp(np.log(known).mean(axis=1, keepdims=True))).mean(axis=0)
     return relative / np.exp(np.log(relative).mean())
+
+
+def over_rest(study: Study, flight: Flight, column: int) -> np.ndarray:
+    """Rms of a column of the residual in each piece over the median of the flight's (pieces,); NaN where not known."""
+    power = powers(study, flight, column, YAW.band_hz, YAW.piece_s)
+    known = power > 0.0
+    if not known.any():
+        return np.full(len(power), np.nan)
+    return np.sqrt(np.where(known, power, np.nan) / np.median(power[known]))
