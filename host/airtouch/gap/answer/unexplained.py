@@ -62,9 +62,9 @@ def _unsteady_cell(study: Study, flights: Sequence[Flight], near: tuple[Rejected
 
     It is one of the torques or the lift, whichever is farther from how steady it is in nominal flights.
     """
-    assert study.scatter is not None  # else nobody knows how steady flights are
-    sizes = unsteady(Data(study, flights))
-    name = max(sizes, key=lambda n: study.scatter.rarity({n: sizes[n]})[0])
+    scatter, sizes = study.scatter, unsteady(Data(study, flights))
+    assert scatter is not None  # else nobody knows how steady flights are
+    name = max(sizes, key=lambda n: scatter.rarity({n: sizes[n]})[0])
     ratios = [(f, c, over_rest(study, f, c)) for f in flights for c in COLUMNS[name]]
     flight, column, ratio = max((r for r in ratios if np.isfinite(r[2]).any()), key=lambda r: float(np.nanmax(r[2])))
     first, last = worst_stretch(ratio)

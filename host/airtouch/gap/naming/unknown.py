@@ -5,8 +5,9 @@ Three things speak against them, each held against a limit of its own:
 1. what they leave, which the nameless model gains beside them; where the relations of signals decide, what these
    measure. Its limit: `policy.UnknownLimit`;
 2. what they predict that the flights do not show (`over_prediction`), with the least of these limits;
-3. that the flights are less steady than nominal ones (`passing.unsteadiness`), which no effect explains that is equally
-   strong all along. Its limit is what one nominal flight in a hundred exceeds.
+3. that the flights are less steady than nominal ones (`passing.unsteadiness`). Noise that is equally strong all along
+   does not explain that, nor does an error of the logged times. Its limit is what one nominal flight in a hundred
+   exceeds.
 
 The flights are explained where the largest of the ratios to the limits is below 1.
 """
@@ -15,7 +16,7 @@ import numpy as np
 
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.signatures.signature import SPECTRUM
+from airtouch.gap.signatures.signature import MEAN
 
 
 def against(selection: Selection) -> Against:
@@ -46,10 +47,11 @@ def remainder_ratio(selection: Selection) -> float:
 def unsteadiness_ratio(selection: Selection) -> float:
     """Nats by which the flights are less steady than nominal ones over their limit.
 
-    It is 0 where an effect is named that may come and go: any but noise, whose strength is the same all along.
+    It is 0 where an effect is named that may explain it: any but noise that is equally strong all along, and errors of
+    the logged times alone.
     """
     hypothesis = selection.named_hypothesis
-    if hypothesis is not None and any(t.shows_in != SPECTRUM or t.gate for t in hypothesis.terms):
+    if hypothesis is not None and any(t.shows_in == MEAN or t.gate for t in hypothesis.terms):
         return 0.0
     return selection.unsteadiness.nats / selection.unsteadiness.limit
 

@@ -55,7 +55,7 @@ def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStren
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
-    """Size of each passing effect but those of `without`, how unsteady the flights are and how far pushes point down."""
+    """Size of each passing effect but those of `without`; how unsteady flights are and how far pushes point down."""
     passing = passing_effects(data, without)
     sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in PASSING}
     return {**sizes, **unsteady(data), DOWNWARD: downward(data)}

@@ -72,8 +72,9 @@ class Scatter:
 
     rate: mean and standard deviation of its fourth root (`fourth_root`); passing by effect: of its size, of how
     unsteady torque and lift are and of how far pushes point down (`passing.unsteadiness`, `passing.one_sided`).
-    vehicle: whose flights a class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
-    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
+    vehicle: whose flights a class of the table was measured on. middle: mean (k,) of the strengths of a random effect,
+    which are never negative; the others' is 0. exact: whether the flights come from the models that effects are fitted
+    with.
     """
 
     rms: Mapping[str, np.ndarray]
