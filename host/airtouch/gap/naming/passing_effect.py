@@ -74,6 +74,9 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
 
 
 def unsteadiness_of(data: Data) -> Unsteadiness:
-    """How much less steady flights are than nominal ones, of which the scatter is known."""
-    assert data.study.scatter is not None  # else it is not judged
-    return Unsteadiness(*data.study.scatter.rarity(unsteady(data)))
+    """How much less steady flights are than nominal ones; 0 nats where it is not known how steady those are."""
+    scatter = data.study.scatter
+    if scatter is None:
+        return Unsteadiness()
+    sizes = {name: size for name, size in unsteady(data).items() if name in scatter.passing}
+    return Unsteadiness(*scatter.rarity(sizes)) if sizes else Unsteadiness()

@@ -180,7 +180,7 @@ def policy_of(study: Study, seconds: float) -> NamingPolicy:
         misfit_by_cell=study.simulated,
         loop_is_assumed=not study.simulated,
         judges_over_prediction=study.simulated,
-        judges_unsteadiness=not study.simulated and study.scatter is not None,
+        judges_unsteadiness=not study.simulated,
         must_close_gap=not study.simulated,
         unknown=unknown_limit(study, seconds))
 
