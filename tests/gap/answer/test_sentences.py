@@ -74,6 +74,10 @@ def test_unknown_names_what_comes_nearest_and_closes_nothing():
     assert which == "No known effect explains it (probability 93%); the nearest is mass with 4.0%."
     assert how_far == "Nothing closes it yet: over all it stays 4 times the floor."
 
+    far = diagnosis([cell("force_z", "hover", 0.5)], "unknown", ())
+    ranking = tuple(replace(r, probability=0.0004) if r.name == "mass" else r for r in far.ranking)
+    assert sentences(replace(far, ranking=ranking))[1] == "No known effect explains it (probability 93%)."
+
 
 def test_an_unsteady_flight_is_told_by_its_seconds():
     shaken = OpenCell("torque_z", (15.0, 40.0), "hover", "a.csv", 3.2, 4.8, 4.26, floor=REST_OF_FLIGHT)

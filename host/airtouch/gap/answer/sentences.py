@@ -8,6 +8,8 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, ratio, short
 
+LEAST_PROBABILITY = 0.0005  #: of the nearest effect, to be named: a smaller one would be shown as 0.0 %
+
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
     """Where the gap lies, which effect it is and how probable that is, how far it closes."""
@@ -39,7 +41,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"No unmodelled effect stands out (probability {probability})."
     if diagnosis.verdict == "unknown":
-        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
+        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")
+                     and r.probability >= LEAST_PROBABILITY), None)
         return (f"No known effect explains it (probability {probability})"
                 + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
