@@ -162,12 +162,16 @@ class Rejected:
         return {"name": self.name, "fails": self.why}
 
 
+REST_OF_FLIGHT = "rest of the flight"  #: as the floor of an open cell
+
+
 @dataclass(frozen=True)
 class OpenCell:
-    """A cell of the map that no effect named explains, and when.
+    """A channel, band and phase of flight that no effect named explains, and when.
 
     from_s, to_s: stretch of a flight in which most of its gap is, over_floor: rms over the floor there at most;
-    follows: signals that its power ranks like; nearest: effects that gain most.
+    follows: signals that its power ranks like; nearest: effects that gain most; floor: what its floor is, that of the
+    map or, where a flight is less steady than nominal ones, REST_OF_FLIGHT, whose median rms it is.
     """
 
     channel: str
@@ -179,6 +183,7 @@ class OpenCell:
     over_floor: float
     follows: tuple[str, ...] = ()
     nearest: tuple[Rejected, ...] = ()
+    floor: str = "nominal flights"
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready."""

@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.ranking import AT_FLOOR, LEAST_DIFFERENCE, alike_of, ranking_of, verdict_of
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step, Unsteadiness
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import terms
@@ -49,6 +49,13 @@ OVER = AT_FLOOR + 0.5
     (selection(()), OVER, "none"), (selection(), OVER, "effect")])
 def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
     assert verdict_of(RECORDED, of, gap(before)) == verdict
+
+
+@pytest.mark.parametrize(("named", "nats", "verdict"), [
+    ((), 12.0, "unknown"), ((), 7.0, "none"), (("mass",), 12.0, "none")])
+def test_what_shakes_for_some_seconds_acts_though_the_gap_is_at_its_floor(named, nats, verdict):
+    unsteady = replace(selection(named), unsteadiness=Unsteadiness(nats, 8.0))
+    assert verdict_of(RECORDED, unsteady, gap(AT_FLOOR)) == verdict
 
 
 LIMIT = 20.0  #: nats that may be left beside a mass that gains 200

@@ -16,6 +16,7 @@ from airtouch.gap.naming.records import (
     Selection,
     Step,
     TakenBack,
+    Unsteadiness,
 )
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
@@ -109,6 +110,18 @@ def test_reasons_where_nothing_is_named():
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")
     assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
+
+
+def test_reason_where_the_flight_is_less_steady_than_nominal_ones():
+    unsteady = replace(selection(()), unsteadiness=Unsteadiness(12.34, 8.0))
+    assert not is_explained(unsteady)
+    assert why_not(unsteady, "none", "unknown") == ("torque and lift are less steady than in nominal flights by 12.3 "
+                                                    "nats, but only up to 8.0 may be chance")
+    steady = replace(unsteady, unsteadiness=Unsteadiness(7.0, 8.0))
+    assert why_not(steady, "unknown", "none") == ("torque and lift are less steady than in nominal flights by 7.0 "
+                                                  "nats, and up to 8.0 may be chance")
+    left_too = replace(unsteady, nameless=NamelessGain(150.0, 40.0))
+    assert why_not(left_too, "none", "unknown").startswith("a model without names gains 40 nats")
 
 
 def test_reason_of_the_best_effect_where_the_answer_is_unknown():

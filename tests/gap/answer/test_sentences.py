@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from airtouch.gap.answer.sentences import sentences
-from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.result import REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -73,3 +73,16 @@ def test_unknown_names_what_comes_nearest_and_closes_nothing():
     assert where == ("The gap lies mostly in lift at 0-0.5 Hz: in hover it is 0.5 m/s^2, 5 times the floor.")
     assert which == "No known effect explains it (probability 93%); the nearest is mass with 4.0%."
     assert how_far == "Nothing closes it yet: over all it stays 4 times the floor."
+
+    far = diagnosis([cell("force_z", "hover", 0.5)], "unknown", ())
+    ranking = tuple(replace(r, probability=0.0004) if r.name == "mass" else r for r in far.ranking)
+    assert sentences(replace(far, ranking=ranking))[1] == "No known effect explains it (probability 93%)."
+
+
+def test_an_unsteady_flight_is_told_by_its_seconds():
+    shaken = OpenCell("torque_z", (15.0, 40.0), "hover", "a.csv", 3.2, 4.8, 4.26, floor=REST_OF_FLIGHT)
+    of = replace(diagnosis([], "unknown", ()), unexplained=(shaken,), gap={"before": 0.97, "after": 0.97, "floor": 1.0})
+    where, _, how_far = sentences(of)
+    assert where == ("The flight is less steady than nominal ones: yaw torque at 15-40 Hz is up to 4.3 times that of "
+                     "the rest of the flight from 3.2 to 4.8 s.")
+    assert how_far == "Over all the gap is at the floor: what acts, acts in some seconds only."

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst_stretch
+from airtouch.gap.naming.records import Unsteadiness
+from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT, UNSTEADY_TORQUE
+from airtouch.gap.result import REST_OF_FLIGHT
 from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.logs.segments import KINDS
-from gap_flights import flight
+from gap_flights import flight, noise
 from made_diagnosis import cell
 from shaken_hover import CELL, STUDY, hover, ratio_of
 
@@ -75,6 +79,23 @@ def test_at_most_five_cells_are_reported():
     assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
 
 
-def selection():
-    """A selection without candidates, of which only those are asked here."""
-    return SimpleNamespace(last_step=None, single_effects={})
+STEADY = Unsteadiness()
+
+
+def selection(unsteadiness=STEADY):
+    """A selection without candidates."""
+    return SimpleNamespace(last_step=None, single_effects={}, named_hypothesis=None, unsteadiness=unsteadiness)
+
+
+def test_an_unsteady_flight_has_the_seconds_and_the_channel_that_is_shaken():
+    """White noise of one channel, four times as strong in 2 s of one flight: the other signal stays steady."""
+    strength = np.where((np.arange(4000) >= 2000) & (np.arange(4000) < 2200), 4.0, 1.0)[:, None]
+    shaken = noise(40.0, 0.1, 3) * np.where([False, True, False], strength, 1.0)
+    flights = [flight(40.0, noise(40.0, 1.0, 5), noise(40.0, 0.1, 4), name="calm.csv"),
+               flight(40.0, noise(40.0, 1.0, 6), shaken, name="shaken.csv")]
+    scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (0.1, 0.1), UNSTEADY_LIFT: (0.1, 0.1)})
+    (entry,) = unexplained(replace(STUDY, scatter=scatter), flights, selection(Unsteadiness(12.0, 8.0)), [])
+    assert (entry.flight, entry.channel, entry.phase) == ("shaken.csv", "torque_y", "hover")
+    assert entry.from_s == pytest.approx(20.0, abs=0.4) and entry.to_s == pytest.approx(22.0, abs=0.4)
+    assert entry.floor == REST_OF_FLIGHT and entry.over_floor == pytest.approx(4.0, rel=0.25)
+    assert unexplained(replace(STUDY, scatter=scatter), flights, selection(Unsteadiness(7.0, 8.0)), []) == []

@@ -8,8 +8,15 @@ import pytest
 
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.policy import UnknownLimit, policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, OverPrediction, Selection, Step
-from airtouch.gap.naming.unknown import against, against_over_limit, is_explained, over_prediction_ratio
+from airtouch.gap.naming.records import Candidate, NamelessGain, OverPrediction, Selection, Step, Unsteadiness
+from airtouch.gap.naming.unknown import (
+    against,
+    against_over_limit,
+    is_explained,
+    over_prediction_ratio,
+    unsteadiness_ratio,
+)
+from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
 
 LEAST = 20.0  #: nats that may be left beside effects that gain little
@@ -55,3 +62,18 @@ def test_flights_are_explained_below_the_limit(ratio, explained):
     softplus_inverse = np.log(np.expm1(ratio * LEAST))
     assert is_explained(selection(left=softplus_inverse * (1.0 + 1e-15))) == explained
     assert is_explained(selection(gain=1000.0, lost=ratio * LEAST)) == explained
+
+
+GATE = (("a.csv", 1.0, 2.0),)
+
+
+@pytest.mark.parametrize(("names", "gate", "counts"), [
+    ((), (), True), (("imu_noise",), (), True), (("packet_loss",), (), True), (("imu_noise", "packet_loss"), (), True),
+    (("imu_noise",), GATE, False), (("mass",), (), False), (("imu_noise", "mass"), (), False)])
+def test_unsteady_flights_speak_against_what_is_equally_strong_all_along(names, gate, counts):
+    named = tuple(replace(terms(name)[0], gate=gate) for name in names)
+    steps = (Step.of(Candidate(names[0], named, 1000.0)),) if names else ()
+    unsteady = replace(selection(), steps=steps, unsteadiness=Unsteadiness(12.0, 8.0))
+    assert unsteadiness_ratio(unsteady) == (1.5 if counts else 0.0)
+    assert is_explained(unsteady) != counts
+    assert is_explained(replace(unsteady, unsteadiness=Unsteadiness(7.9, 8.0)))

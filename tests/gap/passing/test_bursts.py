@@ -1,29 +1,23 @@
-"""Bursts in made signals; how unsteady the yaw torque is against SciPy's filters and a closed form for two levels."""
+"""Bursts in made signals."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts as passing_bursts
-from airtouch.gap.passing.bursts import FORCE, YAW, bursts, unsteady_yaw
+from airtouch.gap.passing.bursts import FORCE, YAW, bursts
 from airtouch.gap.passing.stretches import ENDS
 from gap_flights import fly
 
-PIECE = round(YAW.piece_s / PERIOD_S)
 HERTZ = 25.0  #: of the torque that is put in, in the middle of YAW's band
 
 
 @pytest.fixture(scope="module")
 def nominal_flight():
     return fly(1, 62)[0]
-
-
-def in_the_air(flight):
-    return ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
 
 
 def with_residual(monkeypatch, values):
@@ -64,37 +58,8 @@ def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_fligh
                       pwm=np.where(standing[:, None], 0.0, nominal_flight.pwm))
     with_residual(monkeypatch, np.where(standing, 0.001, 1.0) * values)
     assert bursts(Data(study, [resting]), YAW) == ((), 0.0)
-    assert unsteady_yaw(Data(study, [resting])) < 0.1
-
-
-@pytest.mark.parametrize("ratio", [4.0, 20.0])
-def test_unsteadiness_is_the_log_of_the_arithmetic_over_the_geometric_mean(study, nominal_flight, monkeypatch, ratio):
-    counts = in_the_air(nominal_flight)
-    whole = counts[:len(counts) // PIECE * PIECE].reshape(-1, PIECE).all(axis=1)
-    first = np.flatnonzero(whole)[len(np.flatnonzero(whole)) // 2]
-    begin_s, end_s = first * YAW.piece_s, (first + 8) * YAW.piece_s
-    with_residual(monkeypatch, shaken(nominal_flight, begin_s, end_s, ratio))
-    share = whole[first:first + 8].sum() / whole.sum()
-    expected = np.log(1.0 + share * (ratio - 1.0)) - share * np.log(ratio)
-    assert unsteady_yaw(Data(study, [nominal_flight])) == pytest.approx(expected, rel=0.15)
-
-
-def test_it_is_that_of_scipys_filtered_torque(study, nominal_flight, monkeypatch):
-    torque = np.random.default_rng(1).normal(size=len(nominal_flight)) * np.linspace(0.3, 3.0, len(nominal_flight))
-    with_residual(monkeypatch, torque)
-    counts = in_the_air(nominal_flight)
-    samples = np.arange(len(torque))
-    fast = np.interp(samples, samples[counts], torque[counts])
-    for hertz, kind in zip(YAW.band_hz, ("highpass", "lowpass"), strict=True):
-        fast = sosfiltfilt(butter(2, hertz * 2.0 * PERIOD_S, kind, output="sos"), fast)
-    pieces = len(fast) // PIECE
-    power = np.square(fast[:pieces * PIECE]).reshape(pieces, PIECE).mean(axis=1)
-    power = power[counts[:pieces * PIECE].reshape(pieces, PIECE).all(axis=1)]
-    expected = np.log(power.mean()) - np.log(power).mean()
-    assert unsteady_yaw(Data(study, [nominal_flight])) == pytest.approx(expected, rel=0.02)
 
 
 def test_a_flight_that_only_takes_off_says_nothing(study, nominal_flight):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
-    assert unsteady_yaw(Data(study, [taking_off])) == 0.0
     assert bursts(Data(study, [taking_off]), FORCE) == ((), 0.0)

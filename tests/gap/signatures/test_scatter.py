@@ -170,12 +170,12 @@ def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
 
 def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary_by_two_sizes_together():
     """Two sizes that scatter as Student's, independent of one another; one of them far out may do alone."""
-    scatter = Scatter({}, 7.0, (0.0, 1.0), {"downwash": (0.2, 0.1), "unsteady_yaw": (-0.4, 0.4)})
+    scatter = Scatter({}, 7.0, (0.0, 1.0), {"downwash": (0.2, 0.1), "unsteady_torque": (-0.4, 0.4)})
     sizes = np.random.default_rng(12).standard_t(7.0, (20_000, 2)) * [0.1, 0.4] + [0.2, -0.4]
-    beyond = [scatter.unusual({"downwash": a, "unsteady_yaw": b}) > 0.0 for a, b in sizes]
+    beyond = [scatter.unusual({"downwash": a, "unsteady_torque": b}) > 0.0 for a, b in sizes]
     assert np.mean(beyond) == pytest.approx(FALSE_SHARE, rel=0.25)
-    assert scatter.unusual({"downwash": 0.9, "unsteady_yaw": -2.0}) > 0.0 > scatter.unusual({"downwash": 0.45})
-    assert scatter.unusual({"downwash": 0.45, "unsteady_yaw": 0.8}) > 0.0
+    assert scatter.unusual({"downwash": 0.9, "unsteady_torque": -2.0}) > 0.0 > scatter.unusual({"downwash": 0.45})
+    assert scatter.unusual({"downwash": 0.45, "unsteady_torque": 0.8}) > 0.0
 
 
 def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():

@@ -6,7 +6,7 @@ from airtouch.gap.answer.shrink import Gap, closure_of, nearer
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.naming.unknown import against, is_explained
+from airtouch.gap.naming.unknown import against, is_explained, unsteadiness_ratio
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
@@ -35,19 +35,21 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 
 
 def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
-    """Whether something acts that a gap at its floor cannot show. Any one of three signs is enough.
+    """Whether something acts that a gap at its floor cannot show. Any one of four signs is enough.
 
     1. Every effect named is an error of the logged times or passes. The times are no part of the gap. The gap is
        measured in what both halves of the data show, and an effect that passes is seldom in both.
-    2. In simulated flights: what the logged times hold beside the effects is more than chance allows.
-    3. In simulated flights: the effects named bring the cells nearer to the floor, be it from below. In recorded
+    2. In recorded flights: they are less steady than nominal ones, by more than may be chance. The gap is a mean over
+       seconds in which little acts.
+    3. In simulated flights: what the logged times hold beside the effects is more than chance allows.
+    4. In simulated flights: the effects named bring the cells nearer to the floor, be it from below. In recorded
        flights less power than the floor means calm air.
     """
     hypothesis = selection.named_hypothesis
     if hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms):
         return True
     if not data.study.simulated:
-        return False
+        return unsteadiness_ratio(selection) >= 1.0
     irregular_times = selection.nameless.of_times > against(selection).limit
     return irregular_times or nearer(data, selection.halves, hypothesis, gap)
 

@@ -3,7 +3,13 @@
 from airtouch.gap.answer.words import joined
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
 from airtouch.gap.naming.records import Candidate, Selection, Step
-from airtouch.gap.naming.unknown import against, is_explained, over_prediction_ratio, remainder_ratio
+from airtouch.gap.naming.unknown import (
+    against,
+    is_explained,
+    over_prediction_ratio,
+    remainder_ratio,
+    unsteadiness_ratio,
+)
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
 
@@ -73,16 +79,24 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 
 def _against_in_words(selection: Selection) -> str:
-    """The larger of the two things against the effects named, with its limit: `it`, one of them, is not enough."""
+    """What speaks most against the effects named, with its limit: `it`, one of them, is not enough."""
     lost, worst = selection.over_prediction
-    if worst is not None and over_prediction_ratio(selection) >= remainder_ratio(selection):
+    others = max(remainder_ratio(selection), unsteadiness_ratio(selection))
+    if worst is not None and over_prediction_ratio(selection) >= others:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {cell_in_words(worst)}, "
                 f"but only up to {selection.policy.unknown.least:.0f} may be chance")
     return _remainder_in_words(selection, "it")
 
 
 def _remainder_in_words(selection: Selection, name: str) -> str:
-    """The nats that the effects named leave, 0 at least, with their limit. name: of the effects, "" where none is."""
+    """The nats that the effects named leave, 0 at least, with their limit. name: of the effects, "" where none is.
+
+    Where that is more over its limit, the nats by which the flights are less steady than nominal ones.
+    """
+    unsteady_nats, may_be_chance = selection.unsteadiness
+    if unsteadiness_ratio(selection) > remainder_ratio(selection):
+        most = f"{'but only' if unsteady_nats > may_be_chance else 'and'} up to {may_be_chance:.1f} may be chance"
+        return f"torque and lift are less steady than in nominal flights by {unsteady_nats:.1f} nats, {most}"
     remainder = against(selection)
     nats = f"{max(remainder.nats, 0.0):.0f} nats"
     most = f"{'but only' if remainder.is_too_much else 'and'} up to {remainder.limit:.0f}"

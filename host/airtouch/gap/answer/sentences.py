@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 
 from airtouch.gap.answer.words import joined, name_in_words, quantity
-from airtouch.gap.result import Cell, Diagnosis, NamedEffect
+from airtouch.gap.result import REST_OF_FLIGHT, Cell, Diagnosis, NamedEffect
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, ratio, short
+
+LEAST_PROBABILITY = 0.0005  #: of the nearest effect, to be named: a smaller one would be shown as 0.0 %
 
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
@@ -16,7 +18,11 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 def _where(diagnosis: Diagnosis) -> str:
     """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
-    cell = diagnosis.headline
+    cell, first_open = diagnosis.headline, next(iter(diagnosis.unexplained), None)
+    if first_open is not None and first_open.floor == REST_OF_FLIGHT:
+        return (f"The flight is less steady than nominal ones: {CHANNEL_WORDS[first_open.channel]} at "
+                f"{band_in_words(first_open)} is up to {short(first_open.over_floor)} times that of the rest of the "
+                f"flight from {first_open.from_s:.1f} to {first_open.to_s:.1f} s.")
     if cell is None:
         return "In no cell of the map does the gap stand out from its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
@@ -35,7 +41,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"No unmodelled effect stands out (probability {probability})."
     if diagnosis.verdict == "unknown":
-        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
+        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")
+                     and r.probability >= LEAST_PROBABILITY), None)
         return (f"No known effect explains it (probability {probability})"
                 + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
@@ -63,6 +70,8 @@ def _how_far(diagnosis: Diagnosis) -> str:
         if short(before) == "1":
             return "Over all it is at the floor, so there is nothing to close."
         return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
+    if diagnosis.verdict == "unknown" and before <= 1.0:
+        return "Over all the gap is at the floor: what acts, acts in some seconds only."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"

@@ -1,4 +1,4 @@
-"""What a diagnosis leaves open: in which cells of the map, and when."""
+"""What a diagnosis leaves open: in which cells of the map, and when; what makes a flight less steady than others."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,15 @@ import numpy as np
 
 from airtouch.gap.answer.followed_signals import followed_signals
 from airtouch.gap.answer.reasons import nearest
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.result import Cell, OpenCell
-from airtouch.gap.signals.channels import COLUMN
+from airtouch.gap.naming.unknown import unsteadiness_ratio
+from airtouch.gap.passing.bursts import YAW
+from airtouch.gap.passing.unsteadiness import COLUMNS, over_rest, unsteady
+from airtouch.gap.result import REST_OF_FLIGHT, Cell, OpenCell, Rejected
+from airtouch.gap.signals.channels import CHANNELS, COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.study import Study
@@ -25,7 +29,8 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
                 ) -> list[OpenCell]:
     """What stays open: cells of the map, each with the flight and the seconds of its phase in which most is left.
 
-    cells: the headline, then the others, those with the largest gap before any effect first. Of these the first
+    Where the flights are less steady than nominal ones, what shakes most comes before them (`_unsteady_cell`). cells:
+    the headline, then the others, those with the largest gap before any effect first. Of these the first
     MOST_CELLS are reported, without those on the ground and those of one regime alone.
 
     What is left is measured minus modelled with the effects of the last step, deviations included, at the values fitted
@@ -37,7 +42,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
     gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []
     near = tuple(nearest(selection))
-    out = []
+    out = [_unsteady_cell(study, flights, near)] if unsteadiness_ratio(selection) >= 1.0 else []
     for cell in chosen:
         ratios = _in_phase([(f, ratios_of_blocks(f, gap, cell)) for f, gap in gaps], cell.phase)
         if not ratios:
@@ -50,6 +55,23 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
             to_s=float((begin[last] + LENGTH[AIR]) * PERIOD_S), over_floor=float(ratio[first:last + 1].max()),
             follows=tuple(followed_signals(study, ratios)), nearest=near))
     return out
+
+
+def _unsteady_cell(study: Study, flights: Sequence[Flight], near: tuple[Rejected, ...]) -> OpenCell:
+    """The channel of torque or lift that is shaken most beyond the rest of its flight, and when.
+
+    It is one of the torques or the lift, whichever is farther from how steady it is in nominal flights.
+    """
+    scatter, sizes = study.scatter, unsteady(Data(study, flights))
+    assert scatter is not None  # else nobody knows how steady flights are
+    name = max(sizes, key=lambda n: scatter.rarity({n: sizes[n]})[0])
+    ratios = [(f, c, over_rest(study, f, c)) for f in flights for c in COLUMNS[name]]
+    flight, column, ratio = max((r for r in ratios if np.isfinite(r[2]).any()), key=lambda r: float(np.nanmax(r[2])))
+    first, last = worst_stretch(ratio)
+    from_s, to_s = first * YAW.piece_s, (last + 1) * YAW.piece_s
+    phase = np.bincount(flight.phase[round(from_s / PERIOD_S):round(to_s / PERIOD_S)], minlength=len(KINDS)).argmax()
+    return OpenCell(CHANNELS[column].name, YAW.band_hz, KINDS[phase], flight.name, from_s, to_s,
+                    float(ratio[first:last + 1].max()), nearest=near, floor=REST_OF_FLIGHT)
 
 
 def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from airtouch.gap.result import Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
+from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import band_in_words
 
@@ -60,8 +60,9 @@ def all_open_in_words(cells: Sequence[OpenCell]) -> list[str]:
 def open_in_words(cell: OpenCell) -> str:
     """What stays open, as `lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv`."""
     follows = f"; follows {joined(list(cell.follows))}" if cell.follows else ""
+    floor = "that of the rest of the flight" if cell.floor == REST_OF_FLIGHT else "the floor"
     return (f"{CHANNEL_WORDS[cell.channel]}, {band_in_words(cell)}, {cell.phase}: up to {cell.over_floor:.1f} times "
-            f"the floor from {cell.from_s:.1f} to {cell.to_s:.1f} s of {Path(cell.flight).name}{follows}")
+            f"{floor} from {cell.from_s:.1f} to {cell.to_s:.1f} s of {Path(cell.flight).name}{follows}")
 
 
 def nearest_in_words(diagnosis: Diagnosis) -> list[str]:

@@ -9,10 +9,10 @@ from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
-from airtouch.gap.naming.records import Candidate, Charges, Step, Strength
-from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
+from airtouch.gap.naming.records import Candidate, Charges, Step, Strength, Unsteadiness
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
+from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, unsteady
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
@@ -68,6 +68,15 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
     assert data.study.scatter is not None  # no passing effect is looked for without nominal flights
     sizes = {key: size_of(gain / data.seconds, strength)}
     if key == OVERHEAD:
-        of_wakes = {UNSTEADY_YAW: unsteady_yaw, DOWNWARD: downward}
-        sizes |= {name: measure(data) for name, measure in of_wakes.items() if name in data.study.scatter.passing}
+        of_wakes = {UNSTEADY_TORQUE: unsteady(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
+        sizes |= {name: size for name, size in of_wakes.items() if name in data.study.scatter.passing}
     return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))
+
+
+def unsteadiness_of(data: Data) -> Unsteadiness:
+    """How much less steady flights are than nominal ones; 0 nats where it is not known how steady those are."""
+    scatter = data.study.scatter
+    if scatter is None:
+        return Unsteadiness()
+    sizes = {name: size for name, size in unsteady(data).items() if name in scatter.passing}
+    return Unsteadiness(*scatter.rarity(sizes)) if sizes else Unsteadiness()

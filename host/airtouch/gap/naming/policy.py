@@ -152,8 +152,9 @@ class NamingPolicy:
     where it acts, so that the gain in improved cells alone counts.
 
     loop_is_assumed: whether the spectrum of an effect that changes the loop is assumed, not measured;
-    judges_over_prediction: whether effects are held against what the flights do not show; must_close_gap: whether
-    names must close a part of the gap; unknown: what the nameless model may gain.
+    judges_over_prediction: whether effects are held against what the flights do not show; judges_unsteadiness: whether
+    flights are held against how steady nominal ones are; must_close_gap: whether names must close a part of the gap;
+    unknown: what the nameless model may gain.
     """
 
     least_evidence: float
@@ -162,6 +163,7 @@ class NamingPolicy:
     misfit_by_cell: bool
     loop_is_assumed: bool
     judges_over_prediction: bool
+    judges_unsteadiness: bool
     must_close_gap: bool
     unknown: UnknownLimit
 
@@ -178,6 +180,7 @@ def policy_of(study: Study, seconds: float) -> NamingPolicy:
         misfit_by_cell=study.simulated,
         loop_is_assumed=not study.simulated,
         judges_over_prediction=study.simulated,
+        judges_unsteadiness=not study.simulated,
         must_close_gap=not study.simulated,
         unknown=unknown_limit(study, seconds))
 

@@ -120,6 +120,16 @@ class OverPrediction(NamedTuple):
     worst_cell: int | None = None
 
 
+class Unsteadiness(NamedTuple):
+    """Nats by which flights are less steady than nominal ones, and their limit, which one nominal in a hundred exceeds.
+
+    See `passing.unsteadiness`; 0 nats where that is not judged.
+    """
+
+    nats: float = 0.0
+    limit: float = 1.0
+
+
 class TakenBack(NamedTuple):
     """An effect that was named and is no more, as it closes too little of recorded flights' gap, and the shrink."""
 
@@ -137,7 +147,7 @@ class Selection:
     none; policy: what the flights must show; assumed: whether the spectrum of an effect of the last step is assumed, as
     it is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects named;
     inference: what named the effects, where the relations of signals did; taken_back: what recorded flights name no
-    more.
+    more; unsteadiness: how much less steady the flights are than nominal ones.
     """
 
     single_effects: Mapping[str, Candidate]
@@ -150,6 +160,7 @@ class Selection:
     over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
     taken_back: TakenBack = TakenBack()
+    unsteadiness: Unsteadiness = Unsteadiness()
 
     @property
     def last_step(self) -> Step | None:

@@ -18,7 +18,7 @@ from airtouch.gap.naming.forward import PartialSelection, Search, forward
 from airtouch.gap.naming.judging import Trial, trial_of
 from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.over_prediction import over_prediction_of
-from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect
+from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, unsteadiness_of
 from airtouch.gap.naming.policy import WAKE_SHARE
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection
 from airtouch.gap.naming.thresholds import assumes
@@ -120,9 +120,11 @@ def _by_replay(search: Search, partial: PartialSelection) -> Selection:
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
-    if not policy.judges_over_prediction:
-        return selection
-    return replace(selection, over_prediction=over_prediction_of(trial, selection.named_hypothesis))
+    if policy.judges_unsteadiness:
+        selection = replace(selection, unsteadiness=unsteadiness_of(trial.data))
+    if policy.judges_over_prediction:
+        selection = replace(selection, over_prediction=over_prediction_of(trial, selection.named_hypothesis))
+    return selection
 
 
 def nameless_nats(trial: Trial, base: Candidate | None) -> float:

@@ -1,15 +1,22 @@
 """What speaks against the effects named, and when that makes the answer `unknown`.
 
-Two things speak against them, each held against a limit of its own: what they leave, which the nameless model gains
-beside them (where the relations of signals decide, what these measure), and what they predict that the flights do not
-show (`over_prediction`). The flights are explained where the larger of the two ratios to the limits is below 1. The
-limits: `policy.UnknownLimit`.
+Three things speak against them, each held against a limit of its own:
+
+1. what they leave, which the nameless model gains beside them; where the relations of signals decide, what these
+   measure. Its limit: `policy.UnknownLimit`;
+2. what they predict that the flights do not show (`over_prediction`), with the least of these limits;
+3. that the flights are less steady than nominal ones (`passing.unsteadiness`). Noise that is equally strong all along
+   does not explain that, nor does an error of the logged times. Its limit is what one nominal flight in a hundred
+   exceeds.
+
+The flights are explained where the largest of the ratios to the limits is below 1.
 """
 
 import numpy as np
 
 from airtouch.gap.evidence.against import Against
 from airtouch.gap.naming.records import Selection
+from airtouch.gap.signatures.signature import MEAN
 
 
 def against(selection: Selection) -> Against:
@@ -37,11 +44,23 @@ def remainder_ratio(selection: Selection) -> float:
     return never_negative / remainder.limit
 
 
+def unsteadiness_ratio(selection: Selection) -> float:
+    """Nats by which the flights are less steady than nominal ones over their limit.
+
+    It is 0 where an effect is named that may explain it: any but noise that is equally strong all along, and errors of
+    the logged times alone.
+    """
+    hypothesis = selection.named_hypothesis
+    if hypothesis is not None and any(t.shows_in == MEAN or t.gate for t in hypothesis.terms):
+        return 0.0
+    return selection.unsteadiness.nats / selection.unsteadiness.limit
+
+
 def against_over_limit(selection: Selection) -> float:
-    """How much speaks against the effects named over its limit: what they leave, or over-prediction."""
-    return max(remainder_ratio(selection), over_prediction_ratio(selection))
+    """The most that speaks against the effects named, over its limit."""
+    return max(remainder_ratio(selection), over_prediction_ratio(selection), unsteadiness_ratio(selection))
 
 
 def is_explained(selection: Selection) -> bool:
-    """Whether what is left is the floor, or close to it, and the effects named do not over-predict."""
+    """Whether nothing speaks against the effects named by more than may be chance."""
     return against_over_limit(selection) < 1.0

@@ -16,9 +16,9 @@ from airtouch.gap.naming.records import Candidate
 from airtouch.gap.naming.rounds import every_strength
 from airtouch.gap.naming.select import nameless_nats
 from airtouch.gap.nominal.consistency import of_one_trim
-from airtouch.gap.passing.bursts import UNSTEADY_YAW, unsteady_yaw
 from airtouch.gap.passing.gates import passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
+from airtouch.gap.passing.unsteadiness import unsteady
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
@@ -55,10 +55,10 @@ def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStren
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
-    """Size of each passing effect but those of `without`, and the two measures of a wake beside it."""
+    """Size of each passing effect but those of `without`; how unsteady flights are and how far pushes point down."""
     passing = passing_effects(data, without)
     sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in PASSING}
-    return {**sizes, UNSTEADY_YAW: unsteady_yaw(data), DOWNWARD: downward(data)}
+    return {**sizes, **unsteady(data), DOWNWARD: downward(data)}
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:

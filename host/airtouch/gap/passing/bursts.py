@@ -18,8 +18,6 @@ from airtouch.gap.signals.channels import residual
 from airtouch.gap.study import Study
 from airtouch.simulation.effects.effect import Gate
 
-UNSTEADY_YAW = "unsteady_yaw"  #: of `Scatter.passing`, what nominal flights have of `unsteady_yaw`
-
 
 @dataclass(frozen=True)
 class Signal:
@@ -48,7 +46,7 @@ def bursts(data: Data, signal: Signal) -> tuple[Gate, float]:
     gate: list[tuple[str, float, float]] = []
     cost = 0.0
     for flight in data.flights:
-        gain = _gains(_powers(data.study, flight, signal), signal)
+        gain = _gains(powers(data.study, flight, signal.column, signal.band_hz, signal.piece_s), signal)
         known = int(np.isfinite(gain).sum())
         if known < LEAST_PIECES:
             continue
@@ -58,18 +56,6 @@ def bursts(data: Data, signal: Signal) -> tuple[Gate, float]:
     seconds = sum(end - begin for _, begin, end in gate)
     whole = seconds > WHOLE * data.seconds
     return ((), 0.0) if whole else (tuple(gate), cost)
-
-
-def unsteady_yaw(data: Data) -> float:
-    """Log of the arithmetic over the geometric mean of the yaw torque's power in pieces of YAW.
-
-    It is 0 where the torque is equally strong all along (Wiener entropy, in time), and grows with bursts. Each flight's
-    powers are over their geometric mean; 0 where nothing is known.
-    """
-    powers = [_powers(data.study, flight, YAW) for flight in data.flights]
-    known = [p[p > 0.0] for p in powers if np.count_nonzero(p) >= LEAST_PIECES]
-    over = [p / np.exp(np.log(p).mean()) for p in known]
-    return float(np.log(np.concatenate(over).mean())) if over else 0.0
 
 
 def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -84,10 +70,10 @@ def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, flo
     return (both_ways(lowpass(high), out) if high < 1.0 else out), counts
 
 
-def _powers(study: Study, flight: Flight, signal: Signal) -> np.ndarray:
-    """Mean square (pieces,) of a signal in its band; 0 in pieces with a sample that does not count."""
-    fast, counts = in_band(study, flight, signal.column, signal.band_hz)
-    size = round(signal.piece_s / PERIOD_S)
+def powers(study: Study, flight: Flight, column: int, band_hz: tuple[float, float], piece_s: float) -> np.ndarray:
+    """Mean square (pieces,) of a column of the residual in a band; 0 in pieces with a sample that does not count."""
+    fast, counts = in_band(study, flight, column, band_hz)
+    size = round(piece_s / PERIOD_S)
     pieces = len(fast) // size
     power = (fast[:pieces * size].reshape(pieces, size) ** 2).mean(axis=1)
     return np.where(counts[:pieces * size].reshape(pieces, size).all(axis=1), power, 0.0)

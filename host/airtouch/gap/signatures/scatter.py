@@ -71,9 +71,10 @@ class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
     rate: mean and standard deviation of its fourth root (`fourth_root`); passing by effect: of its size, of how
-    unsteady the yaw torque is and of how far pushes point down (`passing.bursts`, `passing.one_sided`). vehicle: whose
-    flights a class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
-    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
+    unsteady torque and lift are and of how far pushes point down (`passing.unsteadiness`, `passing.one_sided`).
+    vehicle: whose flights a class of the table was measured on. middle: mean (k,) of the strengths of a random effect,
+    which are never negative; the others' is 0. exact: whether the flights come from the models that effects are fitted
+    with.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -137,16 +138,21 @@ class Scatter:
         return least + seconds * (middle + float(stdtrit(self.freedom, 1.0 - FALSE_SHARE)) * spread) ** 4
 
     def unusual(self, sizes: Mapping[str, float]) -> float:
+        """Nats by which the rarity of sizes is over its limit, negative below (`rarity`)."""
+        nats, limit = self.rarity(sizes)
+        return nats - limit
+
+    def rarity(self, sizes: Mapping[str, float]) -> tuple[float, float]:
         """Log likelihood (Student) by which sizes of passing effects, together, exceed those of nominal flights.
 
-        sizes: by name, as in `passing`; their log likelihoods add up, as if nominal flights had them independently of
-        one another. It is 0 at the sum that a share FALSE_SHARE of nominal flights exceeds, and negative below.
+        The second number is its limit, which a share FALSE_SHARE of nominal flights exceeds. sizes: by name, as in
+        `passing`; their log likelihoods add up, as if nominal flights had them independently of one another.
         """
-        rarity = 0.0
+        nats = 0.0
         for name, size in sizes.items():
             middle, spread = self.passing.get(name, (0.0, 0.0))
-            rarity += _rarity(max(size - middle, 0.0) / max(spread, LEAST_SPREAD), self.freedom)
-        return rarity - _exceeded(len(sizes), self.freedom)
+            nats += _rarity(max(size - middle, 0.0) / max(spread, LEAST_SPREAD), self.freedom)
+        return float(nats), _exceeded(len(sizes), self.freedom)
 
 
 def _rarity(far: np.ndarray | float, freedom: float) -> Any:

@@ -20,7 +20,7 @@ def test_the_shipped_table_is_written_as_it_was_read():
 
 
 def test_every_class_has_the_size_of_every_passing_effect():
-    sizes = frozenset({"downwash", "gust", "wind", "unsteady_yaw", "downward"})
+    sizes = frozenset({"downwash", "gust", "wind", "unsteady_torque", "unsteady_lift", "downward"})
     assert {frozenset(s.passing) for s in table().values()} == {sizes}
 
 

@@ -142,10 +142,12 @@ def test_nominal_flights_are_given_the_seconds_of_wakes_of_their_vehicle(stand_i
 
 
 def test_measures_without_seconds_are_held_against_nominal_flights_of_the_vehicle(stand_in, monkeypatch, capsys):
-    """One measure tells both wakes from both nominal flights, one tells nothing, one ranks them the other way."""
+    """Of both wakes and both nominal flights the measures order all pairs, half, three of four and none."""
     stand_in(without_seconds)
-    sizes = {"w1": (3.0, 1.0, 0.0), "w2": (4.0, 3.0, 0.0), "n1": (1.0, 2.0, 1.0), "n2": (2.0, 2.0, 1.0)}
-    measures = (without_seconds.OVERHEAD, without_seconds.UNSTEADY_YAW, without_seconds.DOWNWARD)
+    sizes = {"w1": (3.0, 1.0, 2.0, 0.0), "w2": (4.0, 3.0, 5.0, 0.0),
+             "n1": (1.0, 2.0, 1.0, 1.0), "n2": (2.0, 2.0, 3.0, 1.0)}
+    measures = (without_seconds.OVERHEAD, without_seconds.UNSTEADY_TORQUE, without_seconds.UNSTEADY_LIFT,
+                without_seconds.DOWNWARD)
     monkeypatch.setattr(without_seconds, "passing_sizes",
                         lambda data: dict(zip(measures, sizes[data[1]], strict=True)))
     monkeypatch.setattr(without_seconds, "DRAWS", 20)
@@ -156,5 +158,5 @@ def test_measures_without_seconds_are_held_against_nominal_flights_of_the_vehicl
     without_seconds.show_without_seconds("F")
     rows = capsys.readouterr().out.splitlines()[2:]
     assert [row.split(" | ")[1] for row in rows] == list(measures)
-    assert [row.split(" | ")[2][:4] for row in rows] == ["1.00", "0.50", "0.00"]
-    assert [row.split(" | ")[3] for row in rows] == ["2 of 2, of 2 |", "1 of 2, of 2 |", "0 of 2, of 2 |"]
+    assert [row.split(" | ")[2][:4] for row in rows] == ["1.00", "0.50", "0.75", "0.00"]
+    assert [row.split(" | ")[3] for row in rows] == [f"{n} of 2, of 2 |" for n in (2, 1, 1, 0)]

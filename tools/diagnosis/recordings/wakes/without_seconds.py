@@ -12,8 +12,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import passing_sizes
-from airtouch.gap.passing.bursts import UNSTEADY_YAW
 from airtouch.gap.passing.one_sided import DOWNWARD
+from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.sealed.intervals import auroc
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
@@ -41,7 +41,7 @@ def show_without_seconds(flights: Path) -> None:
         print(f"{Path(case.flight).name}", file=sys.stderr, flush=True)
     print("| vehicle | measure | AUROC, 95 % interval | wakes beyond every nominal flight |\n|---|---|---|---|")
     for vehicle_name in sorted({name for name, _ in of_truth}):
-        for measure in (OVERHEAD, UNSTEADY_YAW, DOWNWARD):
+        for measure in (OVERHEAD, UNSTEADY_TORQUE, UNSTEADY_LIFT, DOWNWARD):
             wakes, calm = (np.array([sizes[measure] for sizes in of_truth[vehicle_name, truth]])
                            for truth in ("downwash", "none"))
             area, (low, high) = auroc(wakes.tolist(), calm.tolist()), auroc_interval(wakes, calm)

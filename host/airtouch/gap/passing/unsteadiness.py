@@ -1,0 +1,52 @@
+"""How unsteady a flight is: whether torque and lift are far stronger in some seconds than in others.
+
+The spectra of blocks are means over seconds, and no two nominal flights have the same. But each is about as steady as
+the next, and what comes and goes makes a flight less steady than they are, whatever it is: each is held against itself.
+"""
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.passing.bursts import LEAST_PIECES, YAW, powers
+from airtouch.gap.signals.channels import FORCE, TORQUE
+from airtouch.gap.study import Study
+
+UNSTEADY_TORQUE, UNSTEADY_LIFT = "unsteady_torque", "unsteady_lift"  #: of `Scatter.passing`
+#: columns of the residual whose powers make each of the two
+COLUMNS = {UNSTEADY_TORQUE: tuple(range(TORQUE.start, TORQUE.stop)), UNSTEADY_LIFT: (FORCE.stop - 1,)}
+
+
+def unsteady(data: Data) -> dict[str, float]:
+    """How unsteady torque and lift are, by name (`unsteadiness`)."""
+    return {name: unsteadiness(data, columns) for name, columns in COLUMNS.items()}
+
+
+def unsteadiness(data: Data, columns: tuple[int, ...]) -> float:
+    """Log of the arithmetic over the geometric mean of the power of some columns of the residual, piece by piece.
+
+    Band and pieces are YAW's, above the commands by which the vehicle is steered. It is 0 where the power is the same
+    all along (Wiener entropy, in time), and grows with bursts. Each flight's powers, and each column's, are over their
+    geometric mean; 0 where nothing is known.
+    """
+    relative = np.concatenate([_relative_powers(data.study, flight, columns) for flight in data.flights])
+    return float(np.log(relative.mean() / np.exp(np.log(relative).mean()))) if len(relative) else 0.0
+
+
+def _relative_powers(study: Study, flight: Flight, columns: tuple[int, ...]) -> np.ndarray:
+    """Powers (pieces,) of columns, each over its geometric mean, averaged; without the pieces that do not count."""
+    of_columns = np.array([powers(study, flight, c, YAW.band_hz, YAW.piece_s) for c in columns])
+    known = of_columns[:, (of_columns > 0.0).all(axis=0)]
+    if known.shape[1] < LEAST_PIECES:
+        return np.zeros(0)
+    relative = (known / np.exp(np.log(known).mean(axis=1, keepdims=True))).mean(axis=0)
+    return relative / np.exp(np.log(relative).mean())
+
+
+def over_rest(study: Study, flight: Flight, column: int) -> np.ndarray:
+    """Rms of a column of the residual in each piece over the median of the flight's (pieces,); NaN where not known."""
+    power = powers(study, flight, column, YAW.band_hz, YAW.piece_s)
+    known = power > 0.0
+    if not known.any():
+        return np.full(len(power), np.nan)
+    return np.sqrt(np.where(known, power, np.nan) / np.median(power[known]))
