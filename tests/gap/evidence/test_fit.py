@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence import fit as fit_module
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, converged, fit
+from airtouch.gap.evidence.gauss_newton import gauss_newton
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
 from airtouch.gap.evidence.problem import problem_of, whole_of
@@ -29,6 +31,30 @@ def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start
     assert judge(data, blocks, begun.terms) == pytest.approx(judge(data, blocks, free.terms), abs=1.0)
     assert begun.scaled == pytest.approx(free.scaled, rel=0.03)
     assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
+
+
+def test_the_turn_of_the_highest_posterior_is_returned(monkeypatch):
+    """The second turn is led astray by five natural steps: the first is returned, with the strength that it has."""
+    terms = (candidates.terms("mass")[0], *candidates.terms("imu_noise"))
+    data = Data(FLOOR, [hover(1, (0.0, 0.0, -0.5), louder=1.5)])
+    blocks, turns = whole_of(data), []
+
+    def astray(posterior, x, *more):
+        turn = gauss_newton(posterior, x, *more)
+        if turns:
+            far = turn.x + 5.0
+            turn = turn._replace(x=far, residual=problem_of(data, blocks).residual([terms[0].fitted(far).active()]))
+        turns.append(turn)
+        return turn
+
+    monkeypatch.setattr(fit_module, "gauss_newton", astray)
+    result = fit(data, blocks, terms)
+    assert len(turns) == 2 and np.array_equal(result.scaled, turns[0].x)
+    assert result.terms[0].values["fraction"] == terms[0].fitted(turns[0].x).values["fraction"]
+    mean, noise = result.terms
+    levels = [judge(data, blocks, [mean, replace(noise, values={"factor": noise.values["factor"] * by})])
+              for by in (0.95, 1.0, 1.05)]
+    assert np.argmax(levels) == 1
 
 
 def test_a_fit_goes_on_until_it_stands_still(study):
