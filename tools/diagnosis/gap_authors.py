@@ -1,4 +1,4 @@
-"""Diagnoses the authors' flights against the simulator: three questions of host/docs/gap-real.md, one report each.
+"""Diagnoses the authors' flights against the simulator: three questions of host/docs/gap-findings.md, one report each.
 
     python tools/diagnosis/gap_authors.py [FLIGHTS/airtouch] [OUT]    # 1 to 2 min a question
 

@@ -2,7 +2,7 @@
 
     python tools/diagnosis/gap_training.py --out out/gap-training    # 40 min on a busy machine
 
-On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is in host/docs/gap-real.md.
+On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is in host/docs/gap-findings.md.
 
 1. Diagnosis. The folds of the authors' clean flights are divided in two groups (--groups). Those of a group are
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);

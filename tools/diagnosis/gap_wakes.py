@@ -18,7 +18,7 @@ vehicle had been overhead in the seconds of each downwash flight of its kind: ho
     python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test without the seconds, 3 to 5 min
 
 Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
-the two apart. The figures of all three are in host/docs/gap-real.md.
+the two apart. The figures are in host/docs/gap-real.md and gap-findings.md.
 """
 
 import argparse

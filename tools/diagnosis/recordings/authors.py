@@ -1,4 +1,4 @@
-"""The authors' flights as the diagnosis is asked about them: three questions of host/docs/gap-real.md."""
+"""The authors' flights as the diagnosis is asked about them: three questions of host/docs/gap-findings.md."""
 
 import csv
 from pathlib import Path
