@@ -42,6 +42,7 @@ from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.result import Diagnosis
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import read
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
@@ -50,9 +51,9 @@ from diagnosis.recordings.folder import add_folder
 from diagnosis.recordings.kept import REFUSED, Result, add_keep, complete
 from diagnosis.recordings.table import answer, print_table
 
-#: (row, truth) -> flights of --quick
-QUICK = {("swarm", "ground_effect"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
-         ("crazypad", "slung load"): 1, ("peers", "weak_motor"): 1}
+#: (row, truth) -> flights of --quick; `unknown`: a wake that is no candidate
+QUICK = {("swarm", "ground_effect"): 1, ("swarm", "unknown"): 1, ("crazypad", "normal"): 1,
+         ("crazypad", "rotor damage"): 2, ("crazypad", "slung load"): 1, ("peers", "weak_motor"): 1}
 QUICK_WRONG = 1  #: of the flights of --quick, at most: it tells a broken diagnosis, not a slightly worse one
 #: (vehicle, baseline, effects left out) -> this process's last diagnosis, whose calibration serves the next such case
 _LAST: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Diagnosis] = {}
@@ -149,8 +150,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 def cases_of(options: argparse.Namespace) -> list[Case]:
     """The cases that the options name. Raises AirTouchError where there are none."""
     if options.quick:  # of the parts for building, and two peers
-        cases = quick([c for row in options.rows
-                       for c in ROWS[row](options.flights, "view" if row == "peers" else "build")])
+        cases = [c for row in options.rows for c in ROWS[row](options.flights, "view" if row == "peers" else "build")]
+        cases = quick([*cases, *without_truths(c for c in cases if c.truth == OVERHEAD)])
     else:
         cases = [c for row in options.rows for c in ROWS[row](options.flights, options.part)]
     if options.partner:
