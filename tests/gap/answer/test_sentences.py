@@ -80,9 +80,12 @@ def test_unknown_names_what_comes_nearest_and_closes_nothing():
 
 
 def test_an_unsteady_flight_is_told_by_its_seconds():
-    shaken = OpenCell("torque_z", (15.0, 40.0), "hover", "a.csv", 3.2, 4.8, 4.26, floor=REST_OF_FLIGHT)
+    shaken = OpenCell("torque_z", (15.0, 40.0), "hover", "flights/a.csv", 3.2, 4.8, 4.26, floor=REST_OF_FLIGHT)
     of = replace(diagnosis([], "unknown", ()), unexplained=(shaken,), gap={"before": 0.97, "after": 0.97, "floor": 1.0})
     where, _, how_far = sentences(of)
     assert where == ("The flight is less steady than nominal ones: yaw torque at 15-40 Hz is up to 4.3 times that of "
-                     "the rest of the flight from 3.2 to 4.8 s.")
+                     "the rest of the flight from 3.2 to 4.8 s of a.csv.")
     assert how_far == "Over all the gap is at the floor: what acts, acts in some seconds only."
+    steady = replace(of, unexplained=(replace(shaken, floor="nominal flights"),))
+    assert sentences(steady)[2] == ("Over all the gap is at the floor, but the signals do not fit a flight without an "
+                                    "effect.")

@@ -1,9 +1,10 @@
 """The answer of a diagnosis in three sentences: where, which, how far."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from airtouch.gap.answer.words import joined, name_in_words, quantity
-from airtouch.gap.result import REST_OF_FLIGHT, Cell, Diagnosis, NamedEffect
+from airtouch.gap.result import REST_OF_FLIGHT, Cell, Diagnosis, NamedEffect, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, ratio, short
@@ -16,13 +17,18 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
     return _where(diagnosis), _which(diagnosis), _how_far(diagnosis)
 
 
+def unsteady_cell(diagnosis: Diagnosis) -> OpenCell | None:
+    """What is shaken in a flight that is less steady than nominal ones; None in any other."""
+    return next((cell for cell in diagnosis.unexplained if cell.floor == REST_OF_FLIGHT), None)
+
+
 def _where(diagnosis: Diagnosis) -> str:
-    """The cell that the answer speaks of, and in how many phases of flight its channel and band stand out."""
-    cell, first_open = diagnosis.headline, next(iter(diagnosis.unexplained), None)
-    if first_open is not None and first_open.floor == REST_OF_FLIGHT:
-        return (f"The flight is less steady than nominal ones: {CHANNEL_WORDS[first_open.channel]} at "
-                f"{band_in_words(first_open)} is up to {short(first_open.over_floor)} times that of the rest of the "
-                f"flight from {first_open.from_s:.1f} to {first_open.to_s:.1f} s.")
+    """The seconds of an unsteady flight; else the headline, and in how many phases its channel and band stand out."""
+    cell, shaken = diagnosis.headline, unsteady_cell(diagnosis)
+    if shaken is not None:
+        return (f"The flight is less steady than nominal ones: {CHANNEL_WORDS[shaken.channel]} at "
+                f"{band_in_words(shaken)} is up to {short(shaken.over_floor)} times that of the rest of the flight "
+                f"from {shaken.from_s:.1f} to {shaken.to_s:.1f} s of {Path(shaken.flight).name}.")
     if cell is None:
         return "In no cell of the map does the gap stand out from its floor."
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
@@ -71,7 +77,8 @@ def _how_far(diagnosis: Diagnosis) -> str:
             return "Over all it is at the floor, so there is nothing to close."
         return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict == "unknown" and before <= 1.0:
-        return "Over all the gap is at the floor: what acts, acts in some seconds only."
+        return "Over all the gap is at the floor" + (": what acts, acts in some seconds only." if unsteady_cell(diagnosis)
+                                                     else ", but the signals do not fit a flight without an effect.")
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
