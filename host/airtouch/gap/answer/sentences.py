@@ -77,8 +77,8 @@ def _how_far(diagnosis: Diagnosis) -> str:
             return "Over all it is at the floor, so there is nothing to close."
         return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict == "unknown" and before <= 1.0:
-        return "Over all the gap is at the floor" + (": what acts, acts in some seconds only." if unsteady_cell(diagnosis)
-                                                     else ", but the signals do not fit a flight without an effect.")
+        return ("Over all the gap is at the floor: what acts, acts in some seconds only." if unsteady_cell(diagnosis)
+                else "Over all the gap is at the floor, but the signals do not fit a flight without an effect.")
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
