@@ -7,6 +7,8 @@ import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.segments import KINDS
+from airtouch.simulation import signals as at
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
 
@@ -44,3 +46,13 @@ def test_rows_that_come_late_by_turns_are_jitter(log):
     late = np.random.default_rng(0).normal(0.0, 1e-3, len(log))
     flight = as_flight(FlightLog({**log.columns, "t_s": log["t_s"] + late}, log.meta))
     assert flight.clock_s.std() == pytest.approx(1e-3, rel=0.05) and not flight.lost.any()
+
+
+def test_without_a_down_range_the_height_comes_from_the_position(log):
+    """In a hover over the flat floor, 2 s before the platform: the simulated range is the truth, within its noise."""
+    ranged = as_flight(log)
+    unranged = as_flight(FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
+    hover = ranged.phase == KINDS.index("hover")
+    assert hover.sum() > 100 and log["z_m"][hover].max() < 2.0
+    difference = unranged.signals[hover, at.HEIGHT] - ranged.signals[hover, at.HEIGHT]
+    assert np.abs(np.median(difference)) < 0.03
