@@ -111,7 +111,8 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
         slopes_are_new = stuck or np.array_equal(now.x, slopes.at)
-        if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
+        finished = before - now.cost < LEAST_STEP_GAIN if gained else slopes_are_new
+        if finished:
             break
         stuck = not gained
     return MeanFit(now.x, covariance, now.residual)
@@ -149,7 +150,10 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
 
 
 def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
-    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest of all such moves."""
+    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest by the commands' loop.
+
+    The residual is that without effects at every move: only the expected power and the floor's cost change with it.
+    """
     low, high = bounds_of(mean)
     best, out = -np.inf, x
     for i, amount in itertools.product(own, GRID):
