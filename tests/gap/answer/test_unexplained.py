@@ -93,7 +93,7 @@ def test_an_unsteady_flight_has_the_seconds_and_the_channel_that_is_shaken():
     shaken = noise(40.0, 0.1, 3) * np.where([False, True, False], strength, 1.0)
     flights = [flight(40.0, noise(40.0, 1.0, 5), noise(40.0, 0.1, 4), name="calm.csv"),
                flight(40.0, noise(40.0, 1.0, 6), shaken, name="shaken.csv")]
-    scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (0.1, 0.1), UNSTEADY_LIFT: (0.1, 0.1)})
+    scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (-2.5, 0.5), UNSTEADY_LIFT: (-2.5, 0.5)})
     (entry,) = unexplained(replace(STUDY, scatter=scatter), flights, selection(Unsteadiness(12.0, 8.0)), [])
     assert (entry.flight, entry.channel, entry.phase) == ("shaken.csv", "torque_y", "hover")
     assert entry.from_s == pytest.approx(20.0, abs=0.4) and entry.to_s == pytest.approx(22.0, abs=0.4)

@@ -142,16 +142,13 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
 
 def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
-    """The spectra of channels in the air, means over the flights that have the channel.
-
-    None where no flight has a block in the air, and none of a channel that no flight has.
-    """
+    """The spectra of channels in the air, means over flights; none where no flight has a block there."""
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_NOMINAL_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
-    before = _mean_of_known([_power(g.flight, g.before) for g in flown])
+    before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
     after = _power_after(study, flown, effects, floor) if effects else None
     return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
@@ -163,28 +160,17 @@ def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
     return (np.abs(short_time_spectra(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
 
 
-def _mean_of_known(power: Sequence[np.ndarray], known: Sequence[np.ndarray] | None = None) -> np.ndarray:
-    """Mean (bins, COUNT) over the flights of which the power (bins, COUNT) is known; NaN where it is of none.
-
-    known: powers (bins, COUNT) that are NaN where a flight does not count; by default the powers themselves.
-    """
-    counts = np.isfinite(power if known is None else known)
-    many = counts.sum(axis=0)
-    return np.where(counts, power, 0.0).sum(axis=0) / np.where(many > 0, many, np.nan)
-
-
 def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:
-    """Mean power (bins, COUNT) with effects in the model, over the flights that have a channel.
+    """Mean power (bins, COUNT) with effects in the model.
 
     No sample of a random effect can be predicted, only its power. What it leaves is the floor times the ratio of the
     power to that expected, floor and random effect together: the floor where the model is right, less where it predicts
     too much.
     """
-    powers = [_power(g.flight, g.before if g.after is None else g.after) for g in gaps]
-    power = _mean_of_known(powers)
+    power = np.mean([_power(g.flight, g.before if g.after is None else g.after) for g in gaps], axis=0)
     random = random_of(effects)
     if not random:
         return power
-    of_random = [np.sum([random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random], axis=0)
-                 for data in (Data(study, [g.flight]) for g in gaps)]
-    return power * floor / (floor + _mean_of_known(of_random, powers))
+    of_random = sum(sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
+                    for data in (Data(study, [g.flight]) for g in gaps))
+    return power * floor / (floor + of_random / len(gaps))

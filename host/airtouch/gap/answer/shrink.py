@@ -20,7 +20,6 @@ from airtouch.gap.evidence.clock import nominal_jitter_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN, JudgedBlocks, cell_gains, judged_blocks
 from airtouch.gap.evidence.problem import BlockSet
-from airtouch.gap.flights.clock import jitter_rms_s
 from airtouch.gap.naming.records import Candidate
 from airtouch.gap.result import Closure, Quantity
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
@@ -104,7 +103,8 @@ def closure_of_jitter(data: Data) -> Closure:
     model, what is left is the floor and what the halves differ by. Two numbers give no interval.
     """
     floor = nominal_jitter_s(data.study)
-    rms = [jitter_rms_s(piece for f in data.flights for piece in np.array_split(f.clock_s, JITTER_PIECES)[half::2])
+    rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
+                                                 np.array_split(f.clock_s, JITTER_PIECES)[half::2]]) ** 2)))
            for half in (0, 1)]
     before = float(np.mean(rms)) / floor
     after = 1.0 + abs(rms[0] - rms[1]) / floor

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.flights.clock import LEAST_JITTER_S, jitter_rms_s
+from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signatures.signature import CLOCK
 from airtouch.gap.signatures.term import Term
@@ -24,8 +24,7 @@ CORRELATION_S = 0.1  #: s over which arrival times are correlated; chosen. A lar
 class TimesFault(NamedTuple):
     """Size of a fault of the logged times, and the log likelihood, nats, that it gains over the nominal size.
 
-    size: s of jitter beyond the nominal one, 0 where there is none; or fraction of lost samples, the nominal ones among
-    them, also where it gains nothing.
+    size: s of jitter, or fraction of lost samples.
     """
 
     size: float
@@ -44,10 +43,11 @@ def jitter(data: Data) -> TimesFault:
     n/2 (r - 1 - log r), where r is the ratio of the variances.
     """
     nominal = nominal_jitter_s(data.study)
-    measured = jitter_rms_s(f.clock_s for f in data.flights)
+    clock = np.concatenate([f.clock_s for f in data.flights])
+    measured = float(np.std(clock))
     if measured <= nominal:
         return TimesFault(0.0, 0.0)
-    n = sum(len(f.clock_s) for f in data.flights) * PERIOD_S / CORRELATION_S
+    n = len(clock) * PERIOD_S / CORRELATION_S
     gain = 0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal))
     return TimesFault(float(np.sqrt(measured ** 2 - nominal ** 2)), float(gain))
 

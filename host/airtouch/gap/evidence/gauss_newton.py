@@ -111,8 +111,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
         slopes_are_new = stuck or np.array_equal(now.x, slopes.at)
-        finished = before - now.cost < LEAST_STEP_GAIN if gained else slopes_are_new
-        if finished:
+        if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
             break
         stuck = not gained
     return MeanFit(now.x, covariance, now.residual)
@@ -150,10 +149,7 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
 
 
 def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
-    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest by the commands' loop.
-
-    The residual is that without effects at every move: only the expected power and the floor's cost change with it.
-    """
+    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest of all such moves."""
     low, high = bounds_of(mean)
     best, out = -np.inf, x
     for i, amount in itertools.product(own, GRID):

@@ -1,6 +1,5 @@
 """A log on a regular 10 ms clock: resampled where it is faster, with a row of NaN for each one that was lost."""
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -36,15 +35,6 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
         if period is not None and period < FAST_PERIOD_S:
             return resample(log, 100.0)
     return log
-
-
-def jitter_rms_s(times: Iterable[np.ndarray]) -> float:
-    """Root mean square (s) of logged times minus regular ones, arrays (m,) of one flight or piece each.
-
-    It is about 0, not about the mean: `Flight.clock_s` lies about a straight line through its flight's times, so that
-    neither a constant offset nor another rate of the clock is left in it; both are no jitter.
-    """
-    return float(np.sqrt(np.mean(np.concatenate(list(times)) ** 2)))
 
 
 class RegularLog(NamedTuple):

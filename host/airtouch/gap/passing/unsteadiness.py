@@ -15,14 +15,19 @@ from airtouch.gap.study import Study
 UNSTEADY_TORQUE, UNSTEADY_LIFT = "unsteady_torque", "unsteady_lift"  #: of `Scatter.passing`
 #: columns of the residual whose powers make each of the two
 COLUMNS = {UNSTEADY_TORQUE: tuple(range(TORQUE.start, TORQUE.stop)), UNSTEADY_LIFT: (FORCE.stop - 1,)}
+#: entropy at least, of flights of which nothing is known too: noise that is equally strong all along has 0.02 to 0.06
+STEADY = 1e-3
 
 
 def unsteady(data: Data) -> dict[str, float]:
-    """How unsteady torque and lift are, by name (`unsteadiness`)."""
-    return {name: unsteadiness(data, columns) for name, columns in COLUMNS.items()}
+    """How unsteady torque and lift are, by name: natural logarithm of their `entropy`, but no less than of STEADY.
+
+    The logarithm scatters more nearly as a Student's variable than the entropy does (host/docs/looks.md, 2026-11-27).
+    """
+    return {name: float(np.log(max(entropy(data, columns), STEADY))) for name, columns in COLUMNS.items()}
 
 
-def unsteadiness(data: Data, columns: tuple[int, ...]) -> float:
+def entropy(data: Data, columns: tuple[int, ...]) -> float:
     """Log of the arithmetic over the geometric mean of the power of some columns of the residual, piece by piece.
 
     Band and pieces are YAW's, above the commands by which the vehicle is steered. It is 0 where the power is the same

@@ -21,18 +21,10 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from airtouch.errors import AirTouchError, in_one_line
+from airtouch.errors import in_one_line
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, nominal_distance, two_of
-from airtouch.gap.relations.effect_class import (
-    FLIGHTS_PER_COEFFICIENT,
-    KNOT,
-    KNOT_FACTOR,
-    ClassFlights,
-    EffectClass,
-    learn_class,
-    stands_out,
-)
+from airtouch.gap.relations.effect_class import KNOT, KNOT_FACTOR, ClassFlights, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -57,8 +49,6 @@ from airtouch.vehicle import DEFAULT_VEHICLE, load
 LEAST_NAMELESS_LENGTH = 3.0
 #: two effects show their interaction where the smaller one's shift is longer, nominal standard deviations
 LEAST_PAIR_LENGTH = 12.0
-#: flights that a class is learned from, at least: those of a curve of two knots
-LEAST_CLASS_FLIGHTS = 2 * FLIGHTS_PER_COEFFICIENT
 
 
 @dataclass(frozen=True)
@@ -94,10 +84,7 @@ class PairedFlights:
 
 
 def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: None) -> Library:
-    """The library of a scene, learned from flights that are simulated there, and calibrated. say: told of each step.
-
-    Raises AirTouchError where fewer than LEAST_CLASS_FLIGHTS flights show a class.
-    """
+    """The library of a scene, learned from flights that are simulated there, and calibrated. say: told of each step."""
     say("nominal flights")
     flown = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
     features = np.array(list(flown.values()))
@@ -116,8 +103,8 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: 
                       settings.directions_of_nameless)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(HALF_PRECISION).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(_class_of(p.drawing, ClassFlights(p.amount, p.shift @ axes, (p.whitened - middle) @ axes))
-                    for p in paired)
+    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
+        p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
     coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
     additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
                             nameless=_nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
@@ -143,14 +130,6 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     whitened = whitening(np.array([f for *_, f in flown]))
     shift = whitened - np.array([nominal[i] for i, *_ in flown])
     return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
-
-
-def _class_of(drawing: Drawing, flights: ClassFlights) -> EffectClass:
-    """The class of flights as drawn; raises AirTouchError where too few of them show it."""
-    learned = learn_class(drawing.name, drawing.kind.effect, drawing.shape, flights, LEAST_CLASS_FLIGHTS)
-    if learned is None:
-        raise AirTouchError(f"{drawing.name}: too few of {len(flights.amount)} flights show it; fly more of each class")
-    return learned
 
 
 def _shifts(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, strength: float,

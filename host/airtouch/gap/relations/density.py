@@ -118,12 +118,9 @@ class _Likelihood:
         return values - ((values @ self.axes) * (1.0 - 1.0 / variance)) @ self.axes.T
 
     def clipped(self, strength: np.ndarray) -> np.ndarray:
-        """A strength (parameters,) with its magnitude cut to what was flown; of 0 all parameters get alike."""
-        least, most = self.effect_class.least, self.effect_class.most
+        """A strength (parameters,) with its magnitude cut to what was flown."""
         magnitude = float(np.linalg.norm(strength))
-        if magnitude == 0.0:
-            return np.full(len(strength), least / np.sqrt(len(strength)))
-        return strength / max(magnitude, SMALLEST) * np.clip(magnitude, least, most)
+        return strength / max(magnitude, SMALLEST) * np.clip(magnitude, self.effect_class.least, self.effect_class.most)
 
     def slopes(self, strength: np.ndarray) -> np.ndarray:
         """Change (parameters, Q) of the expected shift per parameter, rescaled."""

@@ -39,24 +39,17 @@ class Readout:
     amount: np.ndarray
 
     def shows_sign(self, strength: np.ndarray) -> bool:
-        """Whether a strength (s,), not 0, tells the sign of the amount; that of several parameters is not asked.
-
-        A strength of a sign that no calibration flight has tells it as far as the other sign does.
-        """
+        """Whether a strength (s,) tells the sign of the amount; that of several parameters is not asked."""
         if self.strength.shape[1] > 1 or self.amount.shape[1] > 1:
             return True
-        same_sign = self.strength[:, 0] * strength[0] > 0.0
-        positive = self.amount[same_sign if same_sign.any() else ~same_sign, 0] > 0.0
+        positive = self.amount[self.strength[:, 0] * strength[0] > 0.0, 0] > 0.0
         return max(positive.mean(), 1.0 - positive.mean()) >= LEAST_SIGN_AGREEMENT
 
     def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,).
 
-        An amount is positive where the strength does not show its sign. Raises ValueError where the strength is 0, as
-        no class has that: its logarithm is read.
+        An amount is positive where the strength does not show its sign.
         """
-        if not strength.any():
-            raise ValueError("a strength of 0 has no amount: it must be of a fitted class")
         if self.strength.shape[1] == 1 and self.amount.shape[1] == 1:
             return self._along(float(strength[0]))
         return self._across(strength)
@@ -67,9 +60,9 @@ class Readout:
         A strength of a sign that no calibration flight has is read as the mirror image of the other sign.
         """
         same_sign = self.strength[:, 0] * strength > 0.0
-        if not same_sign.any():
+        if strength != 0.0 and not same_sign.any():
             mirrored, error_of_it = self._along(-strength)
-            return (-mirrored if self.shows_sign(np.array([strength])) else mirrored), error_of_it
+            return (-mirrored if self.shows_sign(np.array([-strength])) else mirrored), error_of_it
         distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
         ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
         weight = _weights(distance)
@@ -117,7 +110,7 @@ def amount_of(effect: Effect, name: str, value: float) -> float:
 
 
 def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
-    """The parameters of an effect whose class has a strength (s,), not 0, in a flight."""
+    """The parameters of an effect whose class has a strength (s,) in a flight."""
     return {name: _quantity(effect, name, float(amount), float(deviation))
             for name, amount, deviation in zip(readout.parameters, *readout(strength), strict=True)}
 

@@ -91,7 +91,7 @@ def floor_of(nominal: Sequence[NominalBlocks], sensor_rms: np.ndarray) -> Floor:
     power = {AIR: _floor_power(in_air, sensors[AIR]), REST: _floor_power(powers[REST], sensors[REST])}
     offset, beyond = _offsets(nominal, power[AIR][0])
     return Floor(power=power, block_counts={r: len(p) for r, p in powers.items()}, offset=offset, offset_beyond=beyond,
-                 clock_s=jitter_rms_s(f.clock_s for f in flights),
+                 clock_s=float(np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2))),
                  lost=float(np.mean(np.concatenate([f.lost for f in flights]))),
                  slopes=slopes, least_power=LEAST_FLOOR * sensors[AIR])
 
