@@ -153,8 +153,9 @@ def learn_class(name: str, effect: str, shape: float | None, flights: ClassFligh
                 ) -> EffectClass | None:
     """A class from flights of it; name, effect, shape: as `EffectClass` has them.
 
-    It is None where fewer than `least_flights` show the effect, or all of them at one strength. With one parameter the strength is the shift along the class's main direction: what else of a flight makes the
-    effect stronger or weaker (a battery's charge, the phase of four rotors) counts as its strength.
+    It is None where fewer than `least_flights` show the effect, or all of them at one strength. With one parameter the
+    strength is the shift along the class's main direction: what else of a flight makes the effect stronger or weaker (a
+    battery's charge, the phase of four rotors) counts as its strength.
     """
     amount = flights.amount
     if amount.shape[1] == 1:
