@@ -148,6 +148,19 @@ def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():
     assert poorer == pytest.approx(power, abs=1e-9) and power[3:].max() < 1e-9
 
 
+def test_a_spectrum_is_the_mean_over_the_flights_that_have_its_sensor():
+    """One flight of three lacks its gyro: of rates it says nothing, of force as much as the others."""
+    one, two, three = (hover(seed, length_s=SECONDS) for seed in (1, 2, 3))
+    flown, effects = (one, replace(two, rates=None), three), [terms("imu_noise")[0].fitted(np.ones(1))]
+    cells = [cell(channel, "hover", 1.0) for channel in ("force_z", "rate_x")]
+    force, turning = pictures(*flown, cells=cells, effects=effects).spectra
+    assert (force.channel, turning.channel) == ("force_z", "rate_x")
+    expected = pictures(one, three, cells=cells, effects=effects).spectra[1]
+    np.testing.assert_allclose(turning.before, expected.before)
+    np.testing.assert_allclose(turning.after, expected.after)
+    np.testing.assert_allclose(force.before, pictures(one, two, three, cells=cells).spectra[0].before)
+
+
 def test_without_a_cell_the_commands_are_all():
     curves = pictures(flight(SECONDS), cells=[])
     assert curves.signal is None and curves.spectra == () and not len(curves.frequency_hz)

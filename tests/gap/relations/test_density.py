@@ -78,6 +78,15 @@ def test_several_parameters_are_solved_together():
     assert fit(of, values, unchanged(Q)).strength == pytest.approx(np.linalg.lstsq(plane.T, values)[0], abs=1e-3)
 
 
+def test_several_parameters_of_a_flight_without_a_shift_are_of_the_least_magnitude():
+    """Least squares gives 0 there, where the curve has no slope."""
+    of = EffectClass("two", "two", None, 2, False, KNOTS, np.repeat(np.eye(Q)[:2, None], len(KNOTS), axis=1),
+                     np.zeros((Q, 0)), np.zeros(0))
+    result = fit(of, np.zeros(Q), unchanged(Q))
+    assert np.linalg.norm(result.strength) == pytest.approx(of.least)
+    assert np.isfinite(result.evidence)
+
+
 def test_principal_axes_are_those_of_a_singular_value_decomposition():
     """Two of six loadings are the same: an axis without variance counts for nothing."""
     loadings = np.random.default_rng(5).normal(size=(40, 6)) * np.array([1e3, 10.0, 1.0, 0.1, 1.0, 1.0])

@@ -123,3 +123,35 @@ def test_a_class_has_two_signs_from_a_tenth_of_negative_strengths_on(negative, s
     strength[np.flatnonzero(strength < 0.0)[negative:]] *= -1.0
     shift = strength[:, None] * np.eye(Q)[0]
     assert learn_class("one", "one", None, ClassFlights(np.abs(strength[:, None]), shift, shift)).signed is signed
+
+
+@pytest.mark.parametrize(("shortest", "longest"), [(0.6, 1.5), (0.6, 0.9)])
+@pytest.mark.parametrize("seed", range(4))
+def test_weak_shifts_in_any_direction_are_no_class(shortest, longest, seed):
+    """Each of 40 shifts is longer than LEAST_SHIFT, but few are along the direction that they have in common."""
+    rng = np.random.default_rng(seed)
+    way = rng.normal(size=(40, Q))
+    shift = way / np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(shortest, longest, (40, 1))
+    flights = ClassFlights(np.ones((40, 1)), shift, shift + rng.normal(size=(40, Q)))
+    assert learn_class("one", "one", None, flights, least_flights=20) is None
+
+
+def test_strengths_of_one_magnitude_are_no_class():
+    """A curve along the strength needs two, and the prior of the strength a range."""
+    strength = np.full((40, 1), 5.0)
+    shift = strength * np.eye(Q)[0]
+    assert learn_class("one", "one", None, ClassFlights(strength, shift, shift)) is None
+
+
+def test_a_curve_does_not_pass_through_few_flights():
+    """24 flights over a factor of 3^11, with two signs: their scatter of 30 % shows.
+
+    With a knot for each factor of three, each coordinate would have as many coefficients as there are flights.
+    """
+    rng = np.random.default_rng(8)
+    strength = np.geomspace(1.0, 3.0 ** 11, 24) * np.where(np.arange(24) % 2 == 0, 1.0, -1.0)
+    shift = strength[:, None] * np.eye(Q)[0]
+    shift[:, 1:] += 0.3 * np.abs(strength[:, None]) * rng.normal(size=(24, Q - 1))
+    learned = learn_class("one", "one", None, ClassFlights(np.sign(strength[:, None]), shift, shift))
+    assert learned.signed
+    assert len(learned.variances) and np.sqrt(learned.variances[0]) > 0.5 * 0.3

@@ -96,6 +96,21 @@ def test_a_strength_of_which_both_signs_come_is_read_as_a_size():
     assert clear.shows_sign(np.array([10.0])) and clear(np.array([10.0]))[0] == pytest.approx([-20.0], rel=1e-3)
 
 
+def test_a_sign_that_no_calibration_flight_has_tells_the_amounts_as_the_other_does():
+    size = np.geomspace(1.0, 100.0, 40)
+    mixed = size * np.where(np.arange(40) % 2 == 0, 1.0, -1.0)
+    for amount, shown in ((2.0 * size, True), (-2.0 * size, True), (mixed, False)):
+        readout = Readout(("share",), size[:, None], amount[:, None])
+        assert readout.shows_sign(np.array([-20.0])) is readout.shows_sign(np.array([20.0])) is shown
+
+
+@pytest.mark.parametrize("parameters", [1, 2])
+def test_a_strength_of_0_is_refused(parameters):
+    strength = np.random.default_rng(5).uniform(1.0, 10.0, (40, parameters))
+    with pytest.raises(ValueError, match="must not be 0"):
+        Readout(("x", "y")[:parameters], strength, strength)(np.zeros(parameters))
+
+
 def test_weights_fall_as_a_normal_density_from_the_nearest_flight_or_from_one_width_away():
     """Distances in units of the width: within the calibration as they are, beyond it less the way to it."""
     width = readout_module.KERNEL_WIDTH

@@ -142,16 +142,24 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
 
 def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
-    """The spectra of channels in the air, means over flights; none where no flight has a block there."""
+    """The spectra of channels in the air, means over the flights that have the channel; none where none has."""
     flown = [g for g in gaps if len(starts(g.flight, AIR))]
     if not flown:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_NOMINAL_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
-    before = np.mean([_power(g.flight, g.before) for g in flown], axis=0)
+    before = _mean_of_known([_power(g.flight, g.before) for g in flown])
     after = _power_after(study, flown, effects, floor) if effects else None
     return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
+
+
+def _mean_of_known(powers: Sequence[np.ndarray]) -> np.ndarray:
+    """Mean power (bins, COUNT) over the flights that have a channel, as rates need a gyro; NaN where none has."""
+    stacked = np.array(powers)
+    known = np.isfinite(stacked)
+    count = known.sum(axis=0)
+    return np.where(count > 0, np.where(known, stacked, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
@@ -167,10 +175,11 @@ def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term
     power to that expected, floor and random effect together: the floor where the model is right, less where it predicts
     too much.
     """
-    power = np.mean([_power(g.flight, g.before if g.after is None else g.after) for g in gaps], axis=0)
+    powers = [_power(g.flight, g.before if g.after is None else g.after) for g in gaps]
     random = random_of(effects)
     if not random:
-        return power
-    of_random = sum(sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
-                    for data in (Data(study, [g.flight]) for g in gaps))
-    return power * floor / (floor + of_random / len(gaps))
+        return _mean_of_known(powers)
+    of_random = [sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
+                 for data in (Data(study, [g.flight]) for g in gaps)]
+    expected = _mean_of_known([np.where(np.isfinite(p), r, np.nan) for p, r in zip(powers, of_random, strict=True)])
+    return _mean_of_known(powers) * floor / (floor + expected)

@@ -99,8 +99,9 @@ def _closure(before: np.ndarray, after: np.ndarray) -> Closure:
 def closure_of_jitter(data: Data) -> Closure:
     """The closure where only the logged times are irregular: how well the jitter of one half predicts the other's.
 
-    The gap is the rms of the logged times around regular ones, over that of nominal flights. After an effect is in the
-    model, what is left is the floor and what the halves differ by. Two numbers give no interval.
+    The gap is the rms of the logged times around regular ones, their mean not removed, over that of nominal flights.
+    After an effect is in the model, what is left is the floor and what the halves differ by. Two numbers give no
+    interval.
     """
     floor = nominal_jitter_s(data.study)
     rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in

@@ -37,7 +37,7 @@ def nominal_jitter_s(study: Study) -> float:
 
 
 def jitter(data: Data) -> TimesFault:
-    """Jitter of the logged times: its size is their rms (s) beyond that of nominal flights.
+    """Jitter of the logged times: its size is their standard deviation (s) beyond the rms of nominal flights.
 
     The gain is that of normal times whose variance is the measured one, over nominal ones: of n independent values
     n/2 (r - 1 - log r), where r is the ratio of the variances.

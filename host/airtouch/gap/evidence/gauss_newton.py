@@ -149,7 +149,10 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
 
 
 def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
-    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the likeliest of all such moves."""
+    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the best of all such moves.
+
+    The residual stays that without effects: a move counts by the expected power and by the cost of the floor alone.
+    """
     low, high = bounds_of(mean)
     best, out = -np.inf, x
     for i, amount in itertools.product(own, GRID):

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.features.feature_space import Standard, cholesky_factor, directions, standard_of
 from airtouch.gap.relations.calibration import calibrated, nominal_distance, two_of
-from airtouch.gap.relations.effect_class import KNOT, KNOT_FACTOR, ClassFlights, learn_class, stands_out
+from airtouch.gap.relations.effect_class import KNOT, KNOT_FACTOR, ClassFlights, EffectClass, learn_class, stands_out
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
@@ -103,8 +103,7 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: 
                       settings.directions_of_nameless)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(HALF_PRECISION).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, ClassFlights(
-        p.amount, p.shift @ axes, (p.whitened - middle) @ axes)) for p in paired)
+    classes = tuple(_class_of(p, axes, middle) for p in paired)
     coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
     additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
                             nameless=_nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
@@ -115,6 +114,19 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: 
     distance = nominal_distance(scene, coordinates.rounded(), settings.calibration.nominal_flights)
     library = Library(scene.scenario, scene.vehicle.name, coordinates, model, distance)
     return calibrated(scene, read(packed(library)), settings.calibration, say)  # as it will be read, rounded
+
+
+def _class_of(paired: PairedFlights, axes: np.ndarray, middle: np.ndarray) -> EffectClass:
+    """The class of paired flights in the coordinates along axes (F, Q); middle (F,): mean of nominal flights.
+
+    Raises AirTouchError where too few of the flights show the effect.
+    """
+    drawing = paired.drawing
+    flights = ClassFlights(paired.amount, paired.shift @ axes, (paired.whitened - middle) @ axes)
+    learned = learn_class(drawing.name, drawing.kind.effect, drawing.shape, flights)
+    if learned is None:
+        raise AirTouchError(f"too few flights show {drawing.name}: fly more for each knot")
+    return learned
 
 
 def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing,

@@ -118,7 +118,10 @@ class _Likelihood:
         return values - ((values @ self.axes) * (1.0 - 1.0 / variance)) @ self.axes.T
 
     def clipped(self, strength: np.ndarray) -> np.ndarray:
-        """A strength (parameters,) with its magnitude cut to what was flown."""
+        """A strength (parameters,) with its magnitude cut to what was flown; 0 becomes the least, in equal parts."""
+        if not strength.any():
+            strength = np.ones_like(strength)
+            return strength * (self.effect_class.least / np.linalg.norm(strength))
         magnitude = float(np.linalg.norm(strength))
         return strength / max(magnitude, SMALLEST) * np.clip(magnitude, self.effect_class.least, self.effect_class.most)
 

@@ -33,6 +33,9 @@ FIRST_KNOT_QUANTILE = 0.01
 #: a shift of this length or longer has the full weight in the main direction, nominal deviations
 FULL_WEIGHT_LENGTH = 3.0
 FIT_ROUNDS = 2  #: fits of a curve: of all flights, then without outliers
+#: flights for each coefficient of a coordinate of the curve, at least: with fewer the curve has fewer knots, and with
+#: one it would pass through every flight; chosen
+FLIGHTS_PER_COEFFICIENT = 2
 GRID_PER_KNOT = 6  #: strengths for each knot at which a class of one parameter is tried first
 #: a direction counts as scatter if its eigenvalue is more than this times the largest one that noise alone gives
 #: (Marchenko and Pastur 1967, for infinitely many samples)
@@ -146,11 +149,13 @@ class ClassFlights(NamedTuple):
         return ClassFlights(*(values[which] for values in self))
 
 
-def learn_class(name: str, effect: str, shape: float | None, flights: ClassFlights) -> EffectClass:
+def learn_class(name: str, effect: str, shape: float | None, flights: ClassFlights, least_flights: int = 2,
+                ) -> EffectClass | None:
     """A class from flights of it; name, effect, shape: as `EffectClass` has them.
 
-    With one parameter the strength is the shift along the class's main direction: what else of a flight makes the
-    effect stronger or weaker (a battery's charge, the phase of four rotors) counts as its strength.
+    It is None where fewer than `least_flights` show the effect, or all of them at one strength. With one parameter the
+    strength is the shift along the class's main direction: what else of a flight makes the effect stronger or weaker (a
+    battery's charge, the phase of four rotors) counts as its strength.
     """
     amount = flights.amount
     if amount.shape[1] == 1:
@@ -158,8 +163,14 @@ def learn_class(name: str, effect: str, shape: float | None, flights: ClassFligh
         flights = flights._replace(amount=strength[:, None]).chosen(np.abs(strength) > LEAST_SHIFT)
     else:
         flights = flights._replace(amount=amount / np.median(np.abs(amount[amount != 0.0])))
+    if len(flights.amount) < least_flights:
+        return None
+    learned = None
     for _ in range(FIT_ROUNDS):
-        learned, near = _fitted(name, effect, shape, flights)
+        fitted = _fitted(name, effect, shape, flights)
+        if fitted is None:
+            return None
+        learned, near = fitted
         flights = flights.chosen(near)
     return learned
 
@@ -171,21 +182,28 @@ def _along_main_direction(shift: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return shift @ (direction * np.sign((unit @ direction).sum()))
 
 
-def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights) -> tuple[EffectClass, np.ndarray]:
-    """The class of flights whose amounts are strengths, and which of them lie about its curve as most do, bool (n,)."""
+def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights,
+            ) -> tuple[EffectClass, np.ndarray] | None:
+    """The class of flights whose amounts are strengths, and which of them lie about its curve as most do, bool (n,).
+
+    None where all strengths are of one magnitude: a curve along the strength needs two.
+    """
     strength, shift, coordinates = flights
     magnitude = np.linalg.norm(strength, axis=1)
     signed = bool((strength < 0.0).mean() > LEAST_NEGATIVE_FRACTION)
     low, high = np.log(np.quantile(magnitude, [FIRST_KNOT_QUANTILE, 1.0]))
-    knots = np.linspace(low, high, max(int(np.ceil((high - low) / KNOT)), 1) + 1)
+    if not high > low:
+        return None
     parts = _parts(strength, signed)
+    most_knots = len(strength) // (FLIGHTS_PER_COEFFICIENT * parts.shape[1])
+    knots = np.linspace(low, high, max(min(int(np.ceil((high - low) / KNOT)) + 1, most_knots), 2))
     columns = (parts[:, :, None] * _hats(magnitude, knots)[:, None]).reshape(len(strength), -1)
     weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_WEIGHT_LENGTH)
     table = np.linalg.lstsq(columns * weight[:, None], shift * weight[:, None], rcond=1e-6)[0]
     expected = columns @ table
     length = np.linalg.norm(expected, axis=1)
     distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHT_LENGTH)
-    near = distance < OUTLIER_RATIO * np.median(distance)
+    near = distance <= OUTLIER_RATIO * np.median(distance)
     axes, variances = _scatter(coordinates[near] - expected[near], length[near], columns.shape[1])
     table = table.reshape(parts.shape[1], len(knots), -1)
     return EffectClass(name, effect, shape, parameters=strength.shape[1], signed=signed, knots=knots, table=table,

@@ -60,7 +60,9 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))
     amount = amount[:, np.abs(amount).max(axis=0) > 0.0]
-    own = learn_class(name, name, None, ClassFlights(amount, flight - nominal, flight))
+    own = learn_class(name, name, None, ClassFlights(amount, flight - nominal, flight), settings.least_pairs)
+    if own is None:
+        return library
     known = library.model.classes
     calibration = calibrate_class(scene, library.with_classes([*known, own]), len(known), drawing, settings.calibration)
     return library.with_classes([*known, replace(own, calibration=_at_least(calibration, known))])

@@ -39,17 +39,24 @@ class Readout:
     amount: np.ndarray
 
     def shows_sign(self, strength: np.ndarray) -> bool:
-        """Whether a strength (s,) tells the sign of the amount; that of several parameters is not asked."""
+        """Whether a strength (s,), not 0, tells the sign of the amount; that of several parameters is not asked.
+
+        A strength of a sign that no calibration flight has tells as much as one of the other sign.
+        """
         if self.strength.shape[1] > 1 or self.amount.shape[1] > 1:
             return True
-        positive = self.amount[self.strength[:, 0] * strength[0] > 0.0, 0] > 0.0
-        return max(positive.mean(), 1.0 - positive.mean()) >= LEAST_SIGN_AGREEMENT
+        same_sign = self.strength[:, 0] * strength[0] > 0.0
+        positive = self.amount[same_sign if same_sign.any() else ~same_sign, 0] > 0.0
+        return bool(max(positive.mean(), 1.0 - positive.mean()) >= LEAST_SIGN_AGREEMENT)
 
     def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,).
+        """Amounts (k,) of a flight with a fitted strength (s,), not 0, and their standard deviations (k,).
 
-        An amount is positive where the strength does not show its sign.
+        An amount is positive where the strength does not show its sign. Raises ValueError where the strength is 0, of
+        which no logarithm is.
         """
+        if not np.any(strength):
+            raise ValueError("a strength that is read out must not be 0")
         if self.strength.shape[1] == 1 and self.amount.shape[1] == 1:
             return self._along(float(strength[0]))
         return self._across(strength)
@@ -60,7 +67,7 @@ class Readout:
         A strength of a sign that no calibration flight has is read as the mirror image of the other sign.
         """
         same_sign = self.strength[:, 0] * strength > 0.0
-        if strength != 0.0 and not same_sign.any():
+        if not same_sign.any():
             mirrored, error_of_it = self._along(-strength)
             return (-mirrored if self.shows_sign(np.array([-strength])) else mirrored), error_of_it
         distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
