@@ -11,6 +11,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 from rich.console import Console
@@ -187,6 +188,8 @@ def main() -> None:
     parser.add_argument("--flights", type=whole_number(1), default=20, help="how many at most (default %(default)s)")
     parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
     options = parser.parse_args()
+    if find_spec("tflite_micro") is None:
+        parser.error("tflite-micro is not installed: pip install '.[test]'")
     flights = load_flights(options.flights)
     table = Table(title=f"Benchmarks, median of {PAIRS} pairs, one thread", title_justify="left")
     for name in ("what", "ours", "peer", "faster", "peer is", ""):

@@ -1,7 +1,8 @@
 """Diagnoses recorded and other people's simulated flights, each row of the table in host/docs/gap-real.md.
 
-    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep x.jsonl]
-    python tools/gap_real.py --quick    # a few flights of each row; fails where the diagnosis is broken
+    python tools/gap_real.py [FLIGHTS] [--rows authors swarm ...] [--jobs 2] [--keep x.jsonl]    # 9 min on two cores
+    python tools/gap_real.py [FLIGHTS] --part view    # or build (default), all; view: about 12 min
+    python tools/gap_real.py --quick    # a few flights of each row, 30 s; fails where the diagnosis is broken
 
 build: the flights on which settings may be chosen: the authors' folds 0 to 2, neural-swarm's days 19 and 20, three of
 CrazyPAD's conditions in four. view: the rest, of which each look is a line of host/docs/looks.md, and the peers, on
@@ -126,7 +127,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
     parser.add_argument("--part", choices=("build", "view", "all"),
-                        help="flights on which settings may be chosen, the others, or both (default: build)")
+                        help="build: flights on which settings may be chosen, 9 min on two cores; view: the others, "
+                             "about 12 min (default: build)")
     parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), help="rows of the table (default: all but nominal)")
     parser.add_argument("--jobs", type=whole_number(1), default=2, help="processes (default %(default)s)")
     add_keep(parser)
@@ -137,10 +139,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--leave-out", action="store_true",
                         help="flights with an effect alone, without that effect among the candidates")
     parser.add_argument("--quick", action="store_true",
-                        help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
+                        help=f"a few flights of each row, 30 s; fails where more than {QUICK_WRONG} of them are wrong")
     options = parser.parse_args(arguments)
-    if options.quick and (options.rows or options.part):
-        parser.error("--quick has its own flights: leave out --rows and --part")
+    given = {"--part": options.part, "--rows": options.rows, "--partner": options.partner,
+             "--leave-out": options.leave_out, "--most-baseline": options.most_baseline is not None}
+    if options.quick and any(given.values()):
+        parser.error("--quick has its own flights and baselines: leave out "
+                     + ", ".join(name for name, is_given in given.items() if is_given))
     options.rows, options.part = options.rows or DEFAULT_ROWS, options.part or "build"
     if options.partner and not any("neuralswarm" in DATA_SETS[row] for row in options.rows):
         parser.error("--partner is of neural-swarm's flights: add swarm or nominal to --rows, or leave it out")

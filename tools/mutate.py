@@ -52,7 +52,7 @@ GROUPS = {
             "screening/test_screen", "screening/test_first_order", "test_select", "test_thresholds"))),
 }
 #: mutmut's exit codes, by what they say
-KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)
+KILLED, SURVIVED, NOT_REACHED, TIMED_OUT = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)
 #: what is added to pyproject.toml in a copy
 CONFIG = """
 [tool.mutmut]
@@ -80,10 +80,10 @@ def stage(name: str, force: bool) -> Path:
     return place
 
 
-def run_mutmut(place: Path, *mutants: str) -> None:
-    """Run the named mutants, or all; those that are done are not run again."""
-    subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
-                   env=os.environ | {"AIRTOUCH_FLIGHTS": str(data_folder().resolve())})
+def run_mutmut(place: Path, *mutants: str) -> int:
+    """Run the named mutants, or all; those that are done are not run again. Returns mutmut's exit code."""
+    return subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
+                          env=os.environ | {"AIRTOUCH_FLIGHTS": str(data_folder().resolve())}).returncode
 
 
 def results(place: Path) -> dict[str, int | None]:
@@ -94,14 +94,31 @@ def results(place: Path) -> dict[str, int | None]:
     return exit_codes
 
 
-def table(codes: dict[str, int | None]) -> float:
+def run_group(place: Path, sample: int | None, seed: int) -> tuple[int, list[str]]:
+    """Run the mutants of a copy, or a sample of them. Returns mutmut's exit code, and the mutants that it was to run.
+
+    There are none where mutmut does not come as far as to make them.
+    """
+    if not sample:
+        code = run_mutmut(place)
+        return code, sorted(results(place))
+    code = 0
+    if not results(place):
+        code = run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants; ends with 1, as none is called so
+    if not (names := sorted(results(place))):
+        return code, []
+    names = random.Random(seed).sample(names, min(sample, len(names)))
+    return run_mutmut(place, *names), names
+
+
+def print_table(codes: dict[str, int | None]) -> float:
     """Print a line for each module and one for all. Returns the fraction of all that is noticed."""
     by_module: dict[str, Counter] = {}
     for mutant, code in codes.items():
         if code is not None:
             module = mutant.rsplit(".", 1)[0].removeprefix("airtouch.")
-            outcome = "noticed" if code in KILLED + LATE else "unnoticed" if code in SURVIVED else \
-                "reached by no test" if code in UNSEEN else f"exit code {code}"
+            outcome = "noticed" if code in KILLED + TIMED_OUT else "unnoticed" if code in SURVIVED else \
+                "reached by no test" if code in NOT_REACHED else f"exit code {code}"
             by_module.setdefault(module, Counter())[outcome] += 1
     total = Counter()
     for count in by_module.values():
@@ -122,12 +139,12 @@ def table(codes: dict[str, int | None]) -> float:
 def print_mutants(place: Path, codes: dict[str, int | None]) -> None:
     """Print the mutants that no test noticed."""
     for mutant, code in codes.items():
-        if code in SURVIVED + UNSEEN:
+        if code in SURVIVED + NOT_REACHED:
             subprocess.run([sys.executable, "-m", "mutmut", "show", mutant], cwd=place)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run or show the mutants of the groups; 1 where the fraction noticed of one is below LEAST."""
+    """Run or show the mutants of the groups; 1 where mutmut fails, or the fraction noticed of one is below LEAST."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
     parser.add_argument("--sample", type=int, help="mutants of each group")
@@ -151,17 +168,12 @@ def main(arguments: list[str] | None = None) -> int:
             print_mutants(BUILD / name, codes)
             continue
         place = stage(name, args.force)
-        if args.sample:
-            if not results(place):
-                run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants and runs none
-            names = sorted(results(place))
-            names = random.Random(args.seed).sample(names, min(args.sample, len(names)))
-            run_mutmut(place, *names)
-        else:
-            run_mutmut(place)
-            names = sorted(results(place))
+        code, names = run_group(place, args.sample, args.seed)
+        if code or not names:
+            print(f"mutate: mutmut failed on {name} with exit code {code}; what it printed is above", file=sys.stderr)
+            return 1
         print(f"{name}, {len(names)} of {len(results(place))} mutants:")
-        worst = min(worst, table({n: c for n, c in results(place).items() if n in set(names)}))
+        worst = min(worst, print_table({n: c for n, c in results(place).items() if n in set(names)}))
     return 0 if worst >= LEAST else 1
 
 

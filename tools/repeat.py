@@ -88,6 +88,8 @@ def main() -> int:
     args = parser.parse_args()
     if args.times < 1:
         parser.error("--times must be at least 1")
+    if missing := [test for test in args.tests if not Path(test.split("::")[0]).exists()]:
+        parser.error(f"no such file or folder: {', '.join(missing)}")
     args.out.mkdir(parents=True, exist_ok=True)
     plugin = Repeat(args.times, args.out)
     quiet = ["-p", "no:terminal", "-o", "addopts=--strict-markers --import-mode=importlib", "-p", "no:cacheprovider"]

@@ -1,5 +1,7 @@
 """The comparisons of `bench.py`: which medians it reports, and that two that differ are not compared."""
 
+import sys
+
 import pytest
 
 from airtouch.errors import AirTouchError
@@ -26,6 +28,16 @@ def test_a_peer_that_computes_something_else_is_refused(monkeypatch):
     monkeypatch.setattr(bench, "scipy_band_power", lambda x: 1.01 * right(x))
     with pytest.raises(AirTouchError, match="is not SciPy's"):
         bench.bench_band_power(table, [made_flight(n=300)])
+
+
+def test_a_peer_that_is_not_installed_is_named_before_anything_is_timed(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["bench.py"])
+    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    monkeypatch.setattr(bench, "load_flights", lambda limit: pytest.fail("flights were read"))
+    with pytest.raises(SystemExit) as stop:
+        bench.main()
+    assert stop.value.code == 2
+    assert "tflite-micro is not installed: pip install '.[test]'" in capsys.readouterr().err
 
 
 def test_a_peers_time_is_that_of_one_window(monkeypatch):

@@ -4,10 +4,10 @@
     python tools/diagnosis/gap_crazypad.py [FOLDER] --corrections
 
 The figures are in host/docs/gap-crazypad.md. FOLDER holds the flights and their manifest.csv. The label is read after
-the diagnosis. With --json, flights that the file holds already are not diagnosed again. What the diagnosis takes as
-known beforehand (`priors.Priors`) was chosen with these conditions in view; --leave-one-out chooses it anew for each
-condition, from a grid, by the others alone. --corrections fits how unsteadiness and heave follow the corrections of
-the estimated velocity (`hover_balance.ANSWER`), on the building part: all but every fourth condition.
+the diagnosis. With --json, flights that the file holds already are not diagnosed again. The priors of the diagnosis
+were chosen with these conditions in view; --leave-one-out chooses them anew for each condition, from a grid, by the
+others alone. --corrections fits how unsteadiness and heave follow the corrections of the estimated velocity, on the
+building part: all but every fourth condition.
 """
 
 import argparse

@@ -3,7 +3,7 @@
     python tools/diagnosis/gap_fan.py [FLIGHTS/airtouch]    # 20 s
 
 For each flight: mean roll and yaw torque of the commands, and how many blocks of 2.56 s have
-more than FAR times the floor's power of roll or yaw torque between 0.6 and 12 Hz. Its figures are in
+more than 5 times the floor's power of roll or yaw torque between 0.6 and 12 Hz. Its figures are in
 host/docs/gap-findings.md.
 """
 

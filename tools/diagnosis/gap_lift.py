@@ -47,7 +47,7 @@ def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float,
 
 
 def main() -> None:
-    """Print the ratio of fitted to published lift of the ground in recorded flights, by day and vehicle."""
+    """Print the ratio of fitted to measured lift near the floor in recorded flights, by day and vehicle."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
     folder = parser.parse_args().flights / "neuralswarm"

@@ -1,4 +1,4 @@
-"""Prints diagnoses of flights made with other people's simulators, each alone: top-1, top-3, shrink.
+"""Prints diagnoses of flights made with other people's simulators, each alone: first answers, gap closed.
 
     python tools/diagnosis/gap_peers.py [FLIGHTS/peers] [--keep x.jsonl]    # 8 to 28 s of one core a flight
 
@@ -76,14 +76,15 @@ def diagnose_flight(folder: Path, label: peers.Row) -> PeerResult:
 
 def summary(results: Sequence[PeerResult]) -> str:
     """Lines with the counts of right answers, and with the gap closed where the first answer is right."""
-    top_1, top_3 = (sum(r.within(n) for r in results) for n in (1, 3))
-    text = f"top-1 {share_text(top_1, len(results))}; top-3 {share_text(top_3, len(results))} (95 % intervals)"
+    first, three = (sum(r.within(n) for r in results) for n in (1, 3))
+    n = len(results)
+    text = f"first answer {share_text(first, n)}; first three {share_text(three, n)} (95 % intervals)"
     right = [r for r in results if r.within(1) and r.shrink is not None]
     if not right:
         return text
     shrinks = sorted(r.shrink for r in right if r.shrink is not None)
     controls = [r.control for r in right if r.control is not None]
-    return (f"{text}\nshrink with the right effect: median {shrinks[len(shrinks) // 2]:.2f}, "
+    return (f"{text}\ngap closed with the right effect: median {shrinks[len(shrinks) // 2]:.2f}, "
             f">= {GOAL:.2f} in {sum(s >= GOAL for s in shrinks)} of {len(shrinks)}"
             + (f"; with a wrong one at most {max(controls):.2f}" if controls else ""))
 
@@ -104,7 +105,7 @@ def main() -> None:
 
     labels = {label["file"]: label for label in peers.labelled(folder)}
     results = [PeerResult(**r) for r in complete(labels, run, lambda result: result["file"], options.keep)]
-    print("| effect | strength | verdict | named | shrink | with a wrong effect | CPU s "
+    print("| effect | strength | verdict | named | gap closed | with a wrong effect | CPU s "
           "|\n|---|---|---|---|---|---|---|")
     print("\n".join(result.row() for result in results))
     print(f"\n{summary(results)}")

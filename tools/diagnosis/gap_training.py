@@ -8,7 +8,7 @@ On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is 
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);
    then low passes over the platform, from 5 s before it, with free air earlier in the same flights as baseline
    (what is there only close to a surface, which the rest of the flight would drown; same day, propellers and
-   battery). Kept in OUT/diagnosis_*.json until --again; --diagnose stops there.
+   battery). Kept in OUT/diagnosis_*.json until --force; --diagnose stops there.
 2. Training. `best` on flights simulated without any effect, then with the effects that were named added one after
    another at their fitted values, then with the vehicle as calibrated in free air, and for reference with
    the scenario's own effects, set by hand. The same missions in every row. Models are kept in OUT/models; one is
@@ -61,12 +61,12 @@ def cut(flights: Flights, groups: Sequence[str]) -> list[Flights]:
     return [{f: log for f, log in flights.items() if str(f.condition.fold) in folds} for folds in groups]
 
 
-def diagnoses(flights: Flights, store: Path, again: bool = False) -> dict[str, Any]:
+def diagnoses(flights: Flights, store: Path, force: bool = False) -> dict[str, Any]:
     """Both diagnoses of some flights and the calibration, JSON-ready; read from the file `store` if it exists.
 
-    again: they are made anew, and the file is replaced when they are there.
+    force: they are made anew, and the file is replaced when they are there.
     """
-    if again or not store.is_file():
+    if force or not store.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
         cuts = [pair for pair in map(pieces, evenly_spaced(close, MOST_PASSES)) if pair is not None]
@@ -194,7 +194,7 @@ def main() -> None:
                         help="simulated flights to train on (default 90)")
     parser.add_argument("--steps", type=whole_number(1), default=800, help="training steps (default 800)")
     parser.add_argument("--seeds", type=whole_number(1), default=2, help="trainings a row (default 2)")
-    parser.add_argument("--again", action="store_true", help="diagnose anew")
+    parser.add_argument("--force", action="store_true", help="begin anew")
     parser.add_argument("--diagnose", action="store_true", help="only diagnose")
     options = parser.parse_args()
     group_names = options.groups.split(",")
@@ -210,7 +210,7 @@ def main() -> None:
     chains = []
     for name, group in zip(group_names, groups, strict=True):
         store = options.out / f"diagnosis_{name}.json"
-        chains.append(chain(diagnoses(group, store, options.again)))
+        chains.append(chain(diagnoses(group, store, options.force)))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
     if not options.diagnose:
         print_table(chains, group_names, groups, options)

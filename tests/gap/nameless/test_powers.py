@@ -40,7 +40,7 @@ def test_information_is_that_of_a_real_value_under_students_law(nu):
 
 @pytest.mark.parametrize(("simulated", "counted"), [(True, [False, True]), (False, [False, False])])
 def test_less_power_counts_above_the_means_of_simulated_flights(simulated, counted):
-    gained, weaker = np.full(CELLS, 2.0 * powers.CHANCE), np.zeros(CELLS, bool)
+    gained, weaker = np.full(CELLS, 2.0 * powers.LEAST_COLUMN_GAIN), np.zeros(CELLS, bool)
     above = powers._above_chance(gained, weaker, np.arange(CELLS), simulated)
     assert above[[0, COUNT]].tolist() == counted, "the first channel's means, and its band above"
     assert not powers._above_chance(gained / 4.0, ~weaker, np.arange(CELLS), simulated).any()

@@ -8,11 +8,11 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts as passing_bursts
-from airtouch.gap.passing.bursts import FORCE, YAW, bursts
+from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, bursts
 from airtouch.gap.passing.stretches import ENDS
 from gap_flights import fly
 
-HERTZ = 25.0  #: of the torque that is put in, in the middle of YAW's band
+HERTZ = 25.0  #: of the torque that is put in, in the middle of YAW_BURSTS' band
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def nominal_flight():
 def with_residual(monkeypatch, values):
     """Flights whose residual has `values` (n,) in the columns of both signals."""
     columns = np.zeros((len(values), 6))
-    columns[:, [FORCE.column, YAW.column]] = values[:, None]
+    columns[:, [FORCE_BURSTS.column, YAW_BURSTS.column]] = values[:, None]
     monkeypatch.setattr(passing_bursts, "residual", lambda *_: columns)
 
 
@@ -33,7 +33,7 @@ def shaken(flight, begin_s, end_s, ratio):
     return np.where((t >= begin_s) & (t < end_s), np.sqrt(ratio), 1.0) * np.sin(2.0 * np.pi * HERTZ * t)
 
 
-@pytest.mark.parametrize("signal", [FORCE, YAW])
+@pytest.mark.parametrize("signal", [FORCE_BURSTS, YAW_BURSTS])
 def test_bursts_are_where_the_power_is(study, nominal_flight, monkeypatch, signal):
     begin_s = round(10.0 / signal.piece_s) * signal.piece_s
     end_s = begin_s + 4 * signal.piece_s
@@ -47,7 +47,7 @@ def test_bursts_are_where_the_power_is(study, nominal_flight, monkeypatch, signa
 
 def test_a_flight_that_is_shaken_alike_all_along_has_no_bursts(study, nominal_flight, monkeypatch):
     with_residual(monkeypatch, shaken(nominal_flight, 0.0, 0.0, 1.0))
-    assert bursts(Data(study, [nominal_flight]), YAW) == ((), 0.0)
+    assert bursts(Data(study, [nominal_flight]), YAW_BURSTS) == ((), 0.0)
 
 
 def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_flight, monkeypatch):
@@ -57,9 +57,9 @@ def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_fligh
     resting = replace(nominal_flight, phase=np.where(standing, GROUND, nominal_flight.phase),
                       pwm=np.where(standing[:, None], 0.0, nominal_flight.pwm))
     with_residual(monkeypatch, np.where(standing, 0.001, 1.0) * values)
-    assert bursts(Data(study, [resting]), YAW) == ((), 0.0)
+    assert bursts(Data(study, [resting]), YAW_BURSTS) == ((), 0.0)
 
 
 def test_a_flight_that_only_takes_off_says_nothing(study, nominal_flight):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
-    assert bursts(Data(study, [taking_off]), FORCE) == ((), 0.0)
+    assert bursts(Data(study, [taking_off]), FORCE_BURSTS) == ((), 0.0)

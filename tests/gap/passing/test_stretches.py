@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.passing.bursts import FORCE, bursts
+from airtouch.gap.passing.bursts import FORCE_BURSTS, bursts
 from airtouch.gap.passing.stretches import MOST_STRETCHES, best_stretches, cost_of_stretch
 from hovers import FLOOR, hover
 
@@ -48,13 +48,13 @@ def shaken(since_s, until_s, factor):
 
 
 def test_a_burst_is_found_in_its_seconds_and_costs_the_choice_of_its_ends():
-    gate, cost = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]), FORCE)
+    gate, cost = bursts(Data(FLOOR, [shaken(12.0, 14.0, 5.0)]), FORCE_BURSTS)
     (name, since, until), = gate
     assert name == "shaken"
-    assert (since, until) == pytest.approx((12.0, 14.0), abs=FORCE.piece_s)
-    assert cost == pytest.approx(cost_of_stretch(int(30.0 / FORCE.piece_s)))
+    assert (since, until) == pytest.approx((12.0, 14.0), abs=FORCE_BURSTS.piece_s)
+    assert cost == pytest.approx(cost_of_stretch(int(30.0 / FORCE_BURSTS.piece_s)))
 
 
-@pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(FORCE.lively)])
+@pytest.mark.parametrize("factor", [1.0, 0.2, 0.5 * np.sqrt(FORCE_BURSTS.burst_ratio)])
 def test_a_calm_or_hardly_livelier_stretch_is_no_burst(factor):
-    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)]), FORCE) == ((), 0.0)
+    assert bursts(Data(FLOOR, [shaken(12.0, 14.0, factor)]), FORCE_BURSTS) == ((), 0.0)

@@ -9,12 +9,12 @@ from scipy.signal import butter, sosfiltfilt
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts
-from airtouch.gap.passing.bursts import YAW
+from airtouch.gap.passing.bursts import YAW_BURSTS
 from airtouch.gap.passing.stretches import ENDS
 from airtouch.gap.passing.unsteadiness import COLUMNS, STEADY, UNSTEADY_LIFT, UNSTEADY_TORQUE, over_rest, unsteady
 from gap_flights import fly
 
-PIECE = round(YAW.piece_s / PERIOD_S)
+PIECE = round(YAW_BURSTS.piece_s / PERIOD_S)
 HERTZ = 25.0  #: of what is put in, in the middle of the band
 
 
@@ -48,7 +48,7 @@ def test_it_is_the_log_of_the_arithmetic_over_the_geometric_mean(study, nominal_
     """Two levels of power, one of them in a share s: log(1 + s (ratio - 1)) - s log(ratio). Scales do not matter."""
     whole = counted(nominal_flight)
     first = np.flatnonzero(whole)[np.count_nonzero(whole) // 2]
-    signal = shaken(nominal_flight, first * YAW.piece_s, (first + 8) * YAW.piece_s, ratio)
+    signal = shaken(nominal_flight, first * YAW_BURSTS.piece_s, (first + 8) * YAW_BURSTS.piece_s, ratio)
     share = whole[first:first + 8].sum() / whole.sum()
     expected = np.log(1.0 + share * (ratio - 1.0)) - share * np.log(ratio)
     with_residual(monkeypatch, {2: 0.1 * signal, 3: 3.0 * signal, 4: signal, 5: 0.01 * signal})
@@ -61,8 +61,8 @@ def test_one_torque_that_is_shaken_counts_a_third_of_three_that_are(study, nomin
     ratio, whole = 20.0, counted(nominal_flight)
     first = np.flatnonzero(whole)[np.count_nonzero(whole) // 2]
     steady = shaken(nominal_flight, 0.0, 0.0, 1.0)
-    with_residual(monkeypatch, {2: steady, 3: steady, 4: steady,
-                                5: shaken(nominal_flight, first * YAW.piece_s, (first + 8) * YAW.piece_s, ratio)})
+    yaw = shaken(nominal_flight, first * YAW_BURSTS.piece_s, (first + 8) * YAW_BURSTS.piece_s, ratio)
+    with_residual(monkeypatch, {2: steady, 3: steady, 4: steady, 5: yaw})
     share = whole[first:first + 8].sum() / whole.sum()
     low, high = ((2.0 + level / ratio ** share) / 3.0 for level in (1.0, ratio))
     expected = np.log(share * high + (1.0 - share) * low) - share * np.log(high) - (1.0 - share) * np.log(low)
@@ -77,7 +77,7 @@ def test_it_is_that_of_scipys_filtered_lift(study, nominal_flight, monkeypatch):
     flight, samples = nominal_flight, np.arange(len(lift))
     counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
     fast = np.interp(samples, samples[counts], lift[counts])
-    for hertz, kind in zip(YAW.band_hz, ("highpass", "lowpass"), strict=True):
+    for hertz, kind in zip(YAW_BURSTS.band_hz, ("highpass", "lowpass"), strict=True):
         fast = sosfiltfilt(butter(2, hertz * 2.0 * PERIOD_S, kind, output="sos"), fast)
     pieces = len(fast) // PIECE
     power = np.square(fast[:pieces * PIECE]).reshape(pieces, PIECE).mean(axis=1)[counted(flight)]

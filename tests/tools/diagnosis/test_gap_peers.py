@@ -41,8 +41,8 @@ def test_the_gap_closed_counts_where_the_first_answer_is_right():
     results = [result(["mass"], 0.9, 0.05), result(["mass"], 0.7), result(["mass"], 0.95, 0.1),
                result(["gust", "mass"], 0.1, 0.9), result(["mass"])]
     first, last = gap_peers.summary(results).splitlines()
-    assert first == f"top-1 {share(4, 5)}; top-3 {share(5, 5)} (95 % intervals)"
-    assert last == "shrink with the right effect: median 0.90, >= 0.80 in 2 of 3; with a wrong one at most 0.10"
+    assert first == f"first answer {share(4, 5)}; first three {share(5, 5)} (95 % intervals)"
+    assert last == "gap closed with the right effect: median 0.90, >= 0.80 in 2 of 3; with a wrong one at most 0.10"
     assert len(gap_peers.summary(results[3:]).splitlines()) == 1
 
 
@@ -64,4 +64,5 @@ def test_a_run_goes_on_where_the_last_one_stopped(tmp_path, monkeypatch, capsys)
     gap_peers.main()
     assert diagnosed == ["a.csv", "stopped", "b.csv", "c.csv"]
     lines = capsys.readouterr().out.splitlines()
-    assert lines.count("| mass | 0.1 kg | effect |  | 0.90 |  | 1 |") == 3 and f"top-1 {share(3, 3)}; " in lines[-2]
+    assert lines.count("| mass | 0.1 kg | effect |  | 0.90 |  | 1 |") == 3
+    assert f"first answer {share(3, 3)}; " in lines[-2]

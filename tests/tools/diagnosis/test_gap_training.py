@@ -115,5 +115,5 @@ def test_a_diagnosis_is_replaced_when_the_new_one_is_there(tmp_path):
     store.write_text('{"all": 1}')
     assert gap_training.diagnoses({}, store) == {"all": 1}
     with pytest.raises(AirTouchError, match="0 flights"):
-        gap_training.diagnoses({}, store, again=True)
+        gap_training.diagnoses({}, store, force=True)
     assert store.read_text() == '{"all": 1}'

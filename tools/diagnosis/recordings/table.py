@@ -76,5 +76,5 @@ def print_table(results: list[Result], folder: Path) -> None:
                    "only damaged rotors named": crazypad.only_damaged_rotors,
                    "severity, Spearman": crazypad.severity}
         for text, figure in figures.items():
-            low, high = crazypad.interval(pads, figure)
-            print(f"CrazyPAD, {len(pads)} flights: {text} {figure(pads):.2f} (90 % interval {low:.2f} to {high:.2f})")
+            print(f"CrazyPAD, {len(pads)} flights: {text} "
+                  + crazypad.with_interval(pads, figure, label="90 % interval "))

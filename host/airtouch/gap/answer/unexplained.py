@@ -11,7 +11,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import unsteadiness_ratio
-from airtouch.gap.passing.bursts import YAW
+from airtouch.gap.passing.bursts import YAW_BURSTS
 from airtouch.gap.passing.unsteadiness import COLUMNS, over_rest, unsteady
 from airtouch.gap.result import REST_OF_FLIGHT, Cell, OpenCell, Rejected
 from airtouch.gap.signals.channels import CHANNELS, COLUMN
@@ -68,9 +68,9 @@ def _unsteady_cell(study: Study, flights: Sequence[Flight], near: tuple[Rejected
     ratios = [(f, c, over_rest(study, f, c)) for f in flights for c in COLUMNS[name]]
     flight, column, ratio = max((r for r in ratios if np.isfinite(r[2]).any()), key=lambda r: float(np.nanmax(r[2])))
     first, last = worst_stretch(ratio)
-    from_s, to_s = first * YAW.piece_s, (last + 1) * YAW.piece_s
+    from_s, to_s = first * YAW_BURSTS.piece_s, (last + 1) * YAW_BURSTS.piece_s
     phase = np.bincount(flight.phase[round(from_s / PERIOD_S):round(to_s / PERIOD_S)], minlength=len(KINDS)).argmax()
-    return OpenCell(CHANNELS[column].name, YAW.band_hz, KINDS[phase], flight.name, from_s, to_s,
+    return OpenCell(CHANNELS[column].name, YAW_BURSTS.band_hz, KINDS[phase], flight.name, from_s, to_s,
                     float(ratio[first:last + 1].max()), nearest=near, floor=REST_OF_FLIGHT)
 
 

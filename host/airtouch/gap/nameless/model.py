@@ -1,10 +1,10 @@
 """The nameless model of the residual that a hypothesis leaves: a regression and free powers, without any effect.
 
-Both are fitted to one half of the data and judged on the other. The first is a `regression` of every force, torque and
-rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity, tilt, height over
-what is below, time. The second is a free power in every view, channel and band (`powers`). Only
-columns and bands that gain more than chance among so many does are used. What nominal flights have of a column or a
-band is no evidence: each flight has a coefficient and a power of its own with a prior as wide as they scatter.
+Both are fitted to one half of the data and judged on the other. The `regression` fits every force, torque and rate by
+the flight's own signals: thrust and its rate of change, roll, pitch and yaw commands, velocity, tilt, height over what
+is below, time. The free `powers` are one factor for each view, channel and band. Only columns and bands are used that
+gain more than chance gives the best of so many. What nominal flights have of a column or a band is no evidence: each
+flight has a coefficient and a power of its own with a prior as wide as they scatter.
 """
 
 from collections.abc import Sequence

@@ -9,12 +9,14 @@ from airtouch.gap.evidence.cells import CELLS, above_means, band_cells, channel_
 from airtouch.gap.nameless.columns import NOTHING, NamelessFloor
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
-BELIEF = 2.0  #: nominal flights that the scatter of all channels of a band counts as for that of one channel; chosen
+#: nominal flights that the scatter pooled over a band's channels counts for, beside a channel's own flights; chosen. A
+#: larger number draws the scatter of each channel nearer to that of its band
+POOLED_WEIGHT = 2.0
 #: least standard deviation of log power between flights, simulated and recorded, as no effect's spectrum, and no
 #: recorded flight's air, is modelled any better; chosen. A larger number counts more of a change as nominal
 LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
 #: nats that a column, or a cell's power, must gain on the half that it is fitted to; chosen, chance gives about one
-CHANCE = 4.0
+LEAST_COLUMN_GAIN = 4.0
 UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen
 LONGEST = 1.5  #: longest of these steps, of the natural logarithm of the power; chosen
 SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) for each cell the number of the first cell of its view and sensor
@@ -98,13 +100,13 @@ def power_gain(trained: Powers, held_out: Powers, floor: NamelessFloor, simulate
 
 
 def _above_chance(gained: np.ndarray, stronger: np.ndarray, pool: np.ndarray, simulated: bool) -> np.ndarray:
-    """Mask (CELLS,) of the pools that gain more than CHANCE on the half that they are fitted to.
+    """Mask (CELLS,) of the pools that gain more than LEAST_COLUMN_GAIN on the half that they are fitted to.
 
     gained (CELLS,): nats, by pool; stronger (CELLS,): cells with more power than nominal flights have. In simulated
     flights less power counts as well, above the band of the means.
     """
     counts = stronger | ABOVE_MEANS if simulated else stronger
-    return (gained > CHANCE) & (np.bincount(pool, counts, CELLS) > 0)
+    return (gained > LEAST_COLUMN_GAIN) & (np.bincount(pool, counts, CELLS) > 0)
 
 
 def _of_sensors(powers: Powers, nominal: np.ndarray) -> np.ndarray:
@@ -131,7 +133,7 @@ def power_floor(flights: Sequence[Powers]) -> np.ndarray:
     mean = np.where(known, log_power, 0.0).sum(axis=0) / count
     squares = np.where(known, (log_power - mean) ** 2 - chance, 0.0).sum(axis=0)
     pooled = np.maximum(_of_band(squares) / np.maximum(_of_band(count - 1.0), 1.0), LEAST_SCATTER ** 2)
-    own = (np.maximum(squares, 0.0) + BELIEF * pooled) / (count - 1 + BELIEF)
+    own = (np.maximum(squares, 0.0) + POOLED_WEIGHT * pooled) / (count - 1 + POOLED_WEIGHT)
     return np.stack([mean, np.sqrt(own * (1.0 + 1.0 / count))])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import BlockSet, problem_of
 from airtouch.gap.nameless.columns import CHANNELS, WIDEST, NamelessFloor, Regressors, no_floor, regressors_of
-from airtouch.gap.nameless.powers import CHANCE, Powers, gain_at_even_odds
+from airtouch.gap.nameless.powers import LEAST_COLUMN_GAIN, Powers, gain_at_even_odds
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
@@ -125,12 +125,12 @@ def _shared_system(half: BlockResiduals, sets: Sequence[Regressors], residuals: 
 
 
 def _selected_columns(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int]) -> list[int]:
-    """Columns that each gain CHANCE or more beside those before, the best first; at most MOST_COLUMNS."""
+    """Columns that each gain LEAST_COLUMN_GAIN or more beside those before, the best first; at most MOST_COLUMNS."""
     free: list[int] = []
     gain = 0.0
     while len(free) < MOST_COLUMNS:
         gains = [(_gain_of_columns(normal, right, [*free, k]), k) for k in allowed if k not in free]
-        if not gains or max(gains)[0] - gain < CHANCE:
+        if not gains or max(gains)[0] - gain < LEAST_COLUMN_GAIN:
             break
         gain, k = max(gains)
         free.append(k)

@@ -88,17 +88,17 @@ def forward(search: Search, passing: Candidate | None) -> PartialSelection:
 
     passing: a passing effect, which is the first step; None for none.
     """
-    partial = _begun(search, passing)
+    partial = _first_selection(search, passing)
     while len(partial.names) < MOST_EFFECTS:
         least = search.trial.policy.least_evidence
         best = _best_of(_worth_adding(partial, least), partial.gain, least)
         if best is None:
             break
-        partial = _added(search, partial, best)
+        partial = _with_step(search, partial, best)
     return partial
 
 
-def _begun(search: Search, passing: Candidate | None) -> PartialSelection:
+def _first_selection(search: Search, passing: Candidate | None) -> PartialSelection:
     """The selection before the first effect is added, with a passing effect as a step already."""
     if passing is None:
         extensions = {n: Extension(c, search.least_nats[n]) for n, c in search.single_effects.items()}
@@ -139,7 +139,7 @@ def _best_of(candidates: Sequence[Candidate], before: float, least_evidence: flo
     return max(as_good, key=merit, default=best)
 
 
-def _added(search: Search, partial: PartialSelection, best: Candidate) -> PartialSelection:
+def _with_step(search: Search, partial: PartialSelection, best: Candidate) -> PartialSelection:
     """The selection with a further step: named, or a deviation where its evidence or gain is too small for a name."""
     beside_last = {n: e.candidate for n, e in partial.extensions.items()}
     single_effects = partial.single_effects

@@ -45,24 +45,24 @@ class PricedVariant(NamedTuple):
 class Trial:
     """The flights that hypotheses are judged on, and the likelihood of none.
 
-    halves: the blocks of the flights, in two; policy: what they must show; none_certain, none_uncertain: log likelihood
-    of no effect on each half, with the commands' floor as certain as without random effects, and as uncertain as with
-    them.
+    halves: the blocks of the flights, in two; policy: what they must show; null_log_likelihood: of no effect on each
+    half, with the commands' floor as certain as without random effects; null_log_likelihood_uncertain_floor: the same,
+    with that floor as uncertain as with them.
     """
 
     data: Data
     halves: tuple[BlockSet, BlockSet]
     policy: NamingPolicy
-    none_certain: Sequence[float]
-    none_uncertain: Sequence[float]
+    null_log_likelihood: Sequence[float]
+    null_log_likelihood_uncertain_floor: Sequence[float]
 
 
 def trial_of(data: Data) -> Trial:
     """The trial of some flights: halved, with the policy of their study."""
     of_data = halves(data)
-    none_certain, none_uncertain = ([judge(data, half, (), uncertain) for half in of_data]
-                                    for uncertain in (False, True))
-    return Trial(data, of_data, policy_of(data.study, data.seconds), none_certain, none_uncertain)
+    certain_floor, uncertain_floor = ([judge(data, half, (), uncertain) for half in of_data]
+                                      for uncertain in (False, True))
+    return Trial(data, of_data, policy_of(data.study, data.seconds), certain_floor, uncertain_floor)
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
@@ -136,7 +136,7 @@ def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | No
     start, blocks = _start(base, terms, half), trial.halves[half]
     key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
     return trial.data.workspace.cached(
-        "fit", key, lambda: _refined(trial.data, blocks, fit(trial.data, blocks, terms, start, brief=brief)))
+        "fit", key, lambda: _refine(trial.data, blocks, fit(trial.data, blocks, terms, start, brief=brief)))
 
 
 def price_of(terms: Sequence[Term]) -> float:
@@ -155,8 +155,9 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], uncertain_floor: boo
 
     uncertain_floor: that floor is as uncertain as under random effects, though there are none.
     """
-    none = trial.none_uncertain if uncertain_floor or random_of(terms) else trial.none_certain
-    return judge(trial.data, trial.halves[half], terms, uncertain_floor) - none[half]
+    uncertain = uncertain_floor or random_of(terms)
+    null = trial.null_log_likelihood_uncertain_floor if uncertain else trial.null_log_likelihood
+    return judge(trial.data, trial.halves[half], terms, uncertain_floor) - null[half]
 
 
 def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
@@ -197,7 +198,7 @@ def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
     return out
 
 
-def _refined(data: Data, blocks: BlockSet, fitted: FittedTerms) -> FittedTerms:
+def _refine(data: Data, blocks: BlockSet, fitted: FittedTerms) -> FittedTerms:
     """A fit with those parameters free as well that only a fit close to the truth can find (`Term.refined`)."""
     terms = [t.refined() for t in fitted.terms]
     if all(a.free == b.free for a, b in zip(terms, fitted.terms, strict=True)):

@@ -18,7 +18,7 @@ from airtouch.gap.signatures.signature import OVERHEAD
 
 
 def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
-    """The passing effect that explains most; None where none is news.
+    """The passing effect that explains most; None if no passing effect passes the tests below.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
@@ -37,10 +37,10 @@ def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
     if not passing:
         return None
     overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
-    return _as_judged(trial, max(overhead or passing, key=lambda g: g.gain))
+    return _hypothesis_of(trial, max(overhead or passing, key=lambda g: g.gain))
 
 
-def _as_judged(trial: Trial, effect: PassingEffect) -> Candidate:
+def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Candidate:
     """A passing effect as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost

@@ -31,9 +31,9 @@ FIRST_GAIN = 8.0
 #: that each free parameter of a term beyond its first must gain; a random part or a companion, a term of its own, must
 #: gain LONGER_GAIN instead. Chosen, near Akaike's 1 (1974)
 PRICE = 0.9
-#: that count as one where candidates are compared, as log likelihoods of real flights are too sure of themselves;
-#: chosen 2026-11-21. With a larger number the rarer strength outweighs the gain, and probabilities are nearer to one
-#: another
+#: nats by which gains are divided before candidates are compared, because likelihoods of recorded flights are
+#: overconfident; chosen 2026-11-21. With a larger number the rarer strength outweighs the gain, and probabilities are
+#: nearer to one another
 TEMPERATURE = 6.0
 
 # -- Search --

@@ -27,8 +27,8 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Cand
     judged in full whatever screening says.
     """
     start = start_of(trial, base)
-    variants, not_fitted = _screened(start, candidates, progress, promising)
-    fitted = map_on_two_cores(lambda v: _fitted(trial, v, base), variants)
+    variants, not_fitted = _screen(start, candidates, progress, promising)
+    fitted = map_on_two_cores(lambda v: _fit_variant(trial, v, base), variants)
     best = best_of_each([*fitted, *not_fitted], len(start.terms))
     return with_evidence(trial.data.study.scatter, best, start.gain)
 
@@ -40,14 +40,14 @@ def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> d
     frees it alone, since the strength of the best of several variants would be biased upwards. candidates: variants by
     name.
     """
-    variants, not_fitted = _screened(start_of(trial, None), candidates, every_random=True)
+    variants, not_fitted = _screen(start_of(trial, None), candidates, every_random=True)
     one_by_one = [v for v in variants if not _is_tried_alone(v)]
     fitted = map_on_two_cores(lambda v: cross_validated(trial, v, None), one_by_one)
     best = best_of_each([*fitted, *not_fitted], 0)
     return {name: _one_by_one(c, [f for f in fitted if f.name == name]) for name, c in best.items()}
 
 
-def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
+def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
               progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
               every_random: bool = False) -> tuple[list[PricedVariant], list[Candidate]]:
     """The variants that are worth a fit, and hypotheses of the others.
@@ -59,10 +59,10 @@ def _screened(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     unpromising, random = screen_random(start, screened.random, means, every_random)
     to_fit, not_fitted = _by_promise(_best_variants(means) + unpromising, start.gain, promising)
     means_to_fit = [PricedVariant(c.name, c.terms[len(start.terms):], c.charges.newest_choice_cost) for c in to_fit]
-    return [*screened.unseen, *random, *means_to_fit], not_fitted
+    return [*screened.fit_only, *random, *means_to_fit], not_fitted
 
 
-def _fitted(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Candidate:
+def _fit_variant(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Candidate:
     """A variant fitted beside a base.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full

@@ -51,7 +51,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without, rank_all)
     passing = passing_effect(search, without)
-    answer = _by_replay(search, _searched(search, passing))
+    answer = _by_replay(search, _search_effects(search, passing))
     if inference is None or _own_effect_explains(answer):
         return answer
     return _by_relations(search, inference, without, rank_all)
@@ -75,7 +75,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     passing = passing_effect(search, without)
     if not replay_may_name(passing, inference):
         return answer
-    partial = _searched(search, passing)
+    partial = _search_effects(search, passing)
     if next(iter(partial.names), "") not in (OVERHEAD, inference.likeliest):
         return answer
     return _by_replay(search, partial)
@@ -96,7 +96,7 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     return inference.evidence.get(OVERHEAD, -np.inf) > WAKE_SHARE * most
 
 
-def _searched(search: Search, passing: Candidate | None) -> PartialSelection:
+def _search_effects(search: Search, passing: Candidate | None) -> PartialSelection:
     """Where a forward search ends, its steps with their leave-one-out gains.
 
     passing: the passing effect, its first step; the search is done again without it where beside the other effects it

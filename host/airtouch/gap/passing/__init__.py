@@ -1,8 +1,10 @@
 """Passing effects: when each acts, found in the flight or known from another vehicle's log.
 
-`gates.passing_effects` tries each such effect in the `stretches` of blocks that it explains best and in `bursts`, which
-are shorter than a block, and charges the choice. `bursts` also says how unsteady the yaw torque is, and `one_sided`
-whether pushes point down, as in a wake. `naming.passing_effect` asks all of flights, `nominal.apparent` of nominal
-ones. `overhead` takes the seconds of a wake from another vehicle's log, for `diagnose`, and compares them with the rest
-of that flight.
+- `gates.passing_effects` fits each such effect in the `stretches` of blocks that it explains best and in `bursts`,
+  which are shorter than a block, and charges the choice. `naming.passing_effect` calls it for the flights that are
+  diagnosed, `nominal.apparent` for nominal ones.
+- `unsteadiness` measures how much stronger torque and lift are in some seconds than in others, and `one_sided` whether
+  pushes point down, as in a wake. The same two callers use them.
+- `overhead` finds the seconds in which another vehicle was overhead, from its log, and compares them with the rest of
+  that flight. `diagnosis` calls it.
 """

@@ -14,7 +14,7 @@ from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, cost_of_stretch
-from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.study import Study
 from airtouch.simulation.effects.effect import Gate
 
@@ -23,21 +23,21 @@ from airtouch.simulation.effects.effect import Gate
 class Signal:
     """A channel of the residual (a column of `residual`), and its band, Hz, in pieces of so many seconds.
 
-    freedom: independent values in a piece; lively: power of a burst over the flight's median.
+    freedom: independent values in a piece; burst_ratio: power of a burst over the flight's median.
     """
 
     column: int
     band_hz: tuple[float, float]
     piece_s: float
     freedom: float
-    lively: float = 6.0
+    burst_ratio: float = 6.0
 
 
 #: no number of the force has a source: all were chosen
-FORCE = Signal(2, (1.0, 50.0), 0.16, 3.0)
+FORCE_BURSTS = Signal(COLUMN["force_z"], (1.0, 50.0), 0.16, 3.0)
 #: band and length of the pieces were chosen among six and two on wakes of recorded flights (host/docs/looks.md,
 #: 2026-11-25 20:55); freedom: twice the band's width times the piece's length
-YAW = Signal(5, (15.0, 40.0), 0.32, 16.0)
+YAW_BURSTS = Signal(COLUMN["torque_z"], (15.0, 40.0), 0.32, 16.0)
 LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is sought; chosen
 
 
@@ -80,13 +80,13 @@ def powers(study: Study, flight: Flight, column: int, band_hz: tuple[float, floa
 
 
 def _gains(power: np.ndarray, signal: Signal) -> np.ndarray:
-    """Nats (pieces,) that a power `lively` times the median gains over the median; -inf where it is 0.
+    """Nats (pieces,) that a power `burst_ratio` times the median gains over the median; -inf where it is 0.
 
-    It is the log likelihood ratio of a chi-square of `freedom`. A piece counts as if it were no livelier than that.
+    It is the log likelihood ratio of a chi-square of `freedom`. A piece counts as if it were no stronger than that.
     """
     known = power > 0.0
     if not known.any():
         return np.full(len(power), -np.inf)
-    over = np.minimum(power / np.median(power[known]), signal.lively)
-    gain = 0.5 * signal.freedom * (over * (1.0 - 1.0 / signal.lively) - np.log(signal.lively))
+    over = np.minimum(power / np.median(power[known]), signal.burst_ratio)
+    gain = 0.5 * signal.freedom * (over * (1.0 - 1.0 / signal.burst_ratio) - np.log(signal.burst_ratio))
     return np.where(known, gain, -np.inf)

@@ -14,7 +14,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
-from airtouch.gap.passing.bursts import FORCE, YAW, bursts
+from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, bursts
 from airtouch.gap.passing.stretches import LEAST_BLOCKS, GateTrial, each_block, stretches_of
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
@@ -74,7 +74,7 @@ def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, Passin
     base = no_effect(data)
     if base is None:
         return {}
-    in_bursts, out = [bursts(data, signal) for signal in (FORCE, YAW)], {}
+    in_bursts, out = [bursts(data, signal) for signal in (FORCE_BURSTS, YAW_BURSTS)], {}
     for name, variants in candidates.passing_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best_variant(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)

@@ -6,7 +6,7 @@ The likelihood knows spectra alone, which are the same whichever way a push goes
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.passing.bursts import FORCE, in_band
+from airtouch.gap.passing.bursts import FORCE_BURSTS, in_band
 
 DOWNWARD = "downward"  #: of `Scatter.passing`, what nominal flights have of `downward`
 PUSH_BAND_HZ = (1.0, 8.0)  #: band in which pushes are seen: a wake is passed in a tenth of a second or more; chosen
@@ -20,7 +20,7 @@ def downward(data: Data) -> float:
     """
     deviations = []
     for flight in data.flights:
-        force, counts = in_band(data.study, flight, FORCE.column, PUSH_BAND_HZ)
+        force, counts = in_band(data.study, flight, FORCE_BURSTS.column, PUSH_BAND_HZ)
         pushes = force[counts]
         deviations.append(pushes - pushes.mean() if len(pushes) else pushes)
     pushes = np.concatenate(deviations)

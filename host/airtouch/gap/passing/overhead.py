@@ -90,7 +90,7 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
     if not seconds or study.scatter is None:
         return study
     data, duration = Data(study, [flight]), sum(b - a for a, b in seconds)
-    rest = [_outside(gate, seconds) for gate in _shifted(flight, seconds)]
+    rest = [_outside(gate, seconds) for gate in _shift(flight, seconds)]
     sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * duration]
     middle, spread = study.scatter.passing[OVERHEAD]
     passing = {**study.scatter.passing, KNOWN_OVERHEAD: (float(np.median(sizes)) if sizes else middle, spread)}
@@ -114,7 +114,7 @@ def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
     return tuple(out)
 
 
-def _shifted(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
+def _shift(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
     """The same stretches at SHIFTS - 1 places beside the known one, around a flight, cut at its end."""
     long = len(flight) * PERIOD_S
     return [tuple((flight.name, (a + shift) % long, min((a + shift) % long + b - a, long)) for a, b in seconds)

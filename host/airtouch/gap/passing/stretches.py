@@ -25,7 +25,7 @@ LEAST_WORST = 2  #: blocks that it is first fitted to at least
 STRETCH_ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches
 LEAST_BLOCKS = 6  #: blocks in the air, below which no stretch is sought
 STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
-WHOLE = 0.9  #: share of a flight's blocks above which an effect is no passing one
+WHOLE = 0.9  #: fraction of all flights' blocks in the air, above which an effect is no passing one
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 
@@ -61,7 +61,7 @@ def stretches_of(data: Data, whole: BlockSet, level_without: np.ndarray, terms: 
             break
         acting = chosen
     gate = tuple((data.flights[air.flight[a]].name, *_seconds(air, a, b)) for a, b in stretches)
-    return GateTrial(fitted.terms, _sharpened(data, whole, fitted.terms, gate), cost * len(stretches))
+    return GateTrial(fitted.terms, _sharpen(data, whole, fitted.terms, gate), cost * len(stretches))
 
 
 def cost_of_stretch(blocks: int) -> float:
@@ -139,7 +139,7 @@ def _seconds(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
     return float((air.begin[first] + quarter) * PERIOD_S), float((air.begin[last] + LENGTH[AIR] - quarter) * PERIOD_S)
 
 
-def _sharpened(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
+def _sharpen(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
 
     def level(tried: Gate) -> float:
@@ -148,13 +148,13 @@ def _sharpened(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -
 
     best = level(gate)
     for step, i, end, sign in itertools.product(STEPS_S, range(len(gate)), (0, 1), (-1.0, 1.0)):
-        moved = _moved(gate, i, end, sign * step)
+        moved = _move_end(gate, i, end, sign * step)
         if moved[i][1] < moved[i][2] and (gain := level(moved)) > best:
             best, gate = gain, moved
     return gate
 
 
-def _moved(gate: Gate, i: int, end: int, by_s: float) -> Gate:
+def _move_end(gate: Gate, i: int, end: int, by_s: float) -> Gate:
     """A gate with one end (0: begin, 1: end) of its stretch i moved."""
     flight, *ends = gate[i]
     ends[end] += by_s

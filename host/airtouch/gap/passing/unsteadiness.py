@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.passing.bursts import LEAST_PIECES, YAW, powers
+from airtouch.gap.passing.bursts import LEAST_PIECES, YAW_BURSTS, powers
 from airtouch.gap.signals.channels import FORCE, TORQUE
 from airtouch.gap.study import Study
 
@@ -30,9 +30,9 @@ def unsteady(data: Data) -> dict[str, float]:
 def entropy(data: Data, columns: tuple[int, ...]) -> float:
     """Log of the arithmetic over the geometric mean of the power of some columns of the residual, piece by piece.
 
-    Band and pieces are YAW's, above the commands by which the vehicle is steered. It is 0 where the power is the same
-    all along (Wiener entropy, in time), and grows with bursts. Each flight's powers, and each column's, are over their
-    geometric mean; 0 where nothing is known.
+    Band and pieces are those of YAW_BURSTS, above the commands by which the vehicle is steered. It is 0 where the power
+    is the same all along (Wiener entropy, in time), and grows with bursts. Each flight's powers, and each column's, are
+    over their geometric mean; 0 where nothing is known.
     """
     relative = np.concatenate([_relative_powers(data.study, flight, columns) for flight in data.flights])
     return float(np.log(relative.mean() / np.exp(np.log(relative).mean()))) if len(relative) else 0.0
@@ -40,7 +40,7 @@ def entropy(data: Data, columns: tuple[int, ...]) -> float:
 
 def _relative_powers(study: Study, flight: Flight, columns: tuple[int, ...]) -> np.ndarray:
     """Powers (pieces,) of columns, each over its geometric mean, averaged; without the pieces that do not count."""
-    of_columns = np.array([powers(study, flight, c, YAW.band_hz, YAW.piece_s) for c in columns])
+    of_columns = np.array([powers(study, flight, c, YAW_BURSTS.band_hz, YAW_BURSTS.piece_s) for c in columns])
     known = of_columns[:, (of_columns > 0.0).all(axis=0)]
     if known.shape[1] < LEAST_PIECES:
         return np.zeros(0)
@@ -50,7 +50,7 @@ def _relative_powers(study: Study, flight: Flight, columns: tuple[int, ...]) -> 
 
 def over_rest(study: Study, flight: Flight, column: int) -> np.ndarray:
     """Rms of a column of the residual in each piece over the median of the flight's (pieces,); NaN where not known."""
-    power = powers(study, flight, column, YAW.band_hz, YAW.piece_s)
+    power = powers(study, flight, column, YAW_BURSTS.band_hz, YAW_BURSTS.piece_s)
     known = power > 0.0
     if not known.any():
         return np.full(len(power), np.nan)

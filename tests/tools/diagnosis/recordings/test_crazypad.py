@@ -77,6 +77,15 @@ def test_severity_is_the_order_of_the_losses():
     assert figures.severity(backwards) == pytest.approx(-1.0) and np.isnan(figures.severity(flights[:2]))
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("flights", [
+    [result("normal_flight", verdict="none"), result(LARGE, [2]), result(SMALL, [3]),
+     result("add_weight_string_W2", name="slung_load")],  # those of `gap_real.py --quick`: two have a cut
+    [result(condition, verdict="none") for condition in (LARGE, SMALL, "cut_M1_2.0mm")]])  # all have the same loss
+def test_a_severity_that_flights_do_not_say_is_a_dash(flights):
+    assert figures.with_interval(flights, figures.severity) == "-"
+
+
 def test_intervals_resample_conditions_not_flights():
     """Two conditions, one always right: a quarter of the samples hold it alone, a quarter the other alone.
 

@@ -70,10 +70,14 @@ def interval(table: list[Result], figure: Callable[[list[Result]], float]) -> tu
     return low, high
 
 
-def with_interval(table: list[Result], figure: Callable[[list[Result]], float], digits: int = 2) -> str:
-    """A figure and its 90 % interval, as text."""
+def with_interval(table: list[Result], figure: Callable[[list[Result]], float], digits: int = 2,
+                  label: str = "") -> str:
+    """A figure and, behind a label, its 90 % interval, as text; "-" where the figure is NaN, as of too few flights."""
+    value = figure(table)
+    if np.isnan(value):
+        return "-"
     low, high = interval(table, figure)
-    return f"{figure(table):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    return f"{value:.{digits}f} ({label}{low:.{digits}f} to {high:.{digits}f})"
 
 
 def forgiven(table: list[Result]) -> float:
@@ -110,9 +114,14 @@ def large_only_damaged_rotors(table: list[Result]) -> float:
 
 
 def severity(table: list[Result]) -> float:
-    """Spearman's rank correlation of thrust_loss (0 where none is named) with the millimetres cut."""
+    """Spearman's rank correlation of thrust_loss (0 where none is named) with the millimetres cut.
+
+    NaN of fewer than three flights, and where all have the same loss or cut.
+    """
     pairs = [(cut_mm(r["condition"]), thrust_loss(r)) for r in table if np.isfinite(cut_mm(r["condition"]))]
-    return float(spearmanr(*zip(*pairs, strict=True)).statistic) if len(pairs) > 2 else float("nan")
+    if len(pairs) < 3 or any(len(set(column)) == 1 for column in zip(*pairs, strict=True)):
+        return float("nan")
+    return float(spearmanr(*zip(*pairs, strict=True)).statistic)
 
 
 FEWEST = 6  #: flights from which the severity of a drone's rotor is printed: two conditions of three flights

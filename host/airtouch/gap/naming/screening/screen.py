@@ -55,12 +55,12 @@ class Screened:
     """Variants by how they are screened.
 
     means: hypotheses of mean effects, judged to first order; random: variants with a random effect, for
-    `screen_random`; unseen: those that only a fit can judge.
+    `screen_random`; fit_only: those that only a fit can judge.
     """
 
     means: list[Candidate] = field(default_factory=list)
     random: list[PricedVariant] = field(default_factory=list)
-    unseen: list[PricedVariant] = field(default_factory=list)
+    fit_only: list[PricedVariant] = field(default_factory=list)
 
 
 def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
@@ -85,7 +85,7 @@ def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]]
                 continue
             judged = _screened_means(start, variant)
             if judged is None:
-                screened.unseen.append(variant)
+                screened.fit_only.append(variant)
             else:
                 screened.means.append(judged)
     return screened
@@ -169,7 +169,7 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
         if every_random or best.gain > HOPELESS or mean_promises:
             to_fit += _variants_to_fit(best.variant, own, [m.terms[-1] for m in good_means])
         elif not good_means:
-            unpromising.append(_as_judged(start, best))
+            unpromising.append(_hypothesis_of(start, best))
     return unpromising, to_fit
 
 
@@ -217,7 +217,7 @@ def _variants_to_fit(best: PricedVariant, variants: Sequence[PricedVariant], goo
     return [v for v in variants if not good_means or any(_same(v.terms[0], mean) for mean in good_means)]
 
 
-def _as_judged(start: RoundStart, screened: ScreenedRandom) -> Candidate:
+def _hypothesis_of(start: RoundStart, screened: ScreenedRandom) -> Candidate:
     """A screened random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
     name, terms, cost = screened.variant
     strength = Strength(strength_term(terms).among_all(screened.strength))
