@@ -20,7 +20,7 @@ from airtouch.gap.signatures.term import Term
 #: that the halves of the data chose
 SHAPE_PRICE = 1.0
 #: lower bound of the divisor of a random part, the effect's strength; chosen, far below any that is named
-LEAST_DIVISOR = 1e-6
+LEAST_STRENGTH = 1e-6
 
 
 def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
@@ -78,7 +78,7 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     (name,) = random_part.signature.free  # of the strength
     fitted = {k: random_part.values[name] * random_part.values[k] for k in random_part.free}  # at strength 1
     of_mean, bounds = effect.parameters[name], {p.name: p.high for p in random_part.effect.parameters}
-    strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_DIVISOR)
+    strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_STRENGTH)
     raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
     scaled = {k: replace(effect.parameters[k], value=value / strength) for k, value in fitted.items()}
     return NamedEffect(effect.name, {**effect.parameters, name: raised, **scaled}, effect.seconds)

@@ -79,7 +79,7 @@ def shortfall_by_relations(selection: Selection, inference: Inference, name: str
 
 
 def _against_in_words(selection: Selection) -> str:
-    """What speaks most against the effects named, with its limit: `it`, one of them, is not enough."""
+    """The strongest evidence against the effects named, with its limit, as a clause whose subject is `it`."""
     lost, worst = selection.over_prediction
     others = max(remainder_ratio(selection), unsteadiness_ratio(selection))
     if worst is not None and over_prediction_ratio(selection) >= others:

@@ -36,7 +36,8 @@ HIGHEST_START = 0.5  #: largest fraction of the highest strength at which a clas
 DETECTION_RATE = 0.5  #: fraction of the flights at a strength that show the effect, from which on it shows there
 QUANTILE_OF_SHARES = 0.8  #: fraction of the flights of a class whose own share lies below the one that is stored
 DISTANCE_FREEDOM = 3.0  #: degrees of freedom of Student's t, as which distances scatter: a few flights hit something
-LEAST_SCATTER = 1e-4  #: lower bound of the search for the standard deviation of a distance over the evidence
+#: bounds of the search for the standard deviation of a distance over the evidence
+LEAST_SCATTER, LARGEST_SCATTER = 1e-4, 1.0
 
 
 def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, say: Say = lambda _: None) -> Library:
@@ -172,7 +173,8 @@ def likeliest_distance_scatter(excess: np.ndarray, evidence: np.ndarray, nominal
         scatter = np.hypot(nominal, np.exp(logarithm) * evidence)
         return -float(student.logpdf(excess, DISTANCE_FREEDOM, 0.0, scatter).sum())
 
-    return float(np.exp(minimize_scalar(against, bounds=(np.log(LEAST_SCATTER), 0.0), method="bounded").x))
+    bounds = np.log(LEAST_SCATTER), np.log(LARGEST_SCATTER)
+    return float(np.exp(minimize_scalar(against, bounds=bounds, method="bounded").x))
 
 
 def _readout(drawing: Drawing, shown: Sequence[CalibrationFlight], least: int) -> Readout | None:

@@ -193,7 +193,7 @@ def draw(rng: np.random.Generator) -> list[Active]:
 
 
 def _drawn_property(rng: np.random.Generator) -> Active:
-    """Any property, all its elements or one of them, smaller or larger."""
+    """Any property, all its elements or one of them: multiplied or divided, or by ADDITIONS with an amount added."""
     place = int(rng.integers(len(properties())))
     name, log_factor = properties()[place], log_uniform(*LOG_FACTOR, rng)
     amount = ADDITIONS[name] * log_factor / LOG_FACTOR[1] if name in ADDITIONS \

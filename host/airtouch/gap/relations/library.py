@@ -19,7 +19,7 @@ from airtouch.gap.relations.readout import Readout
 from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
-SHIPPED = "diagnosis.npz"
+SHIPPED_FILE = "diagnosis.npz"
 #: standard deviations of the distance of nominal flights from the median; farther ones are not as those that were
 #: learned from; chosen
 FARTHEST_NOMINAL = 4.0
@@ -185,7 +185,7 @@ def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, 
 @cache
 def shipped() -> Library:
     """The library that comes with the package."""
-    return read((resources.files("airtouch.gap.relations") / SHIPPED).read_bytes())
+    return read((resources.files("airtouch.gap.relations") / SHIPPED_FILE).read_bytes())
 
 
 def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Library | None:
