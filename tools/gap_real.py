@@ -49,7 +49,7 @@ from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners, without_truths
 from diagnosis.recordings.folder import add_folder
-from diagnosis.recordings.kept import REFUSED, Result, add_keep, complete
+from diagnosis.recordings.result_store import REFUSED, Result, add_keep_option, complete
 from diagnosis.recordings.table import answer, print_table
 
 #: (row, truth) -> flights of --quick; `unknown`: a wake that is no candidate
@@ -131,7 +131,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
                              "about 12 min (default: build)")
     parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), help="rows of the table (default: all but nominal)")
     parser.add_argument("--jobs", type=whole_number(1), default=2, help="processes (default %(default)s)")
-    add_keep(parser)
+    add_keep_option(parser)
     parser.add_argument("--partner", action="store_true",
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
     parser.add_argument("--most-baseline", type=whole_number(0), metavar="N",
@@ -141,11 +141,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true",
                         help=f"a few flights of each row, 30 s; fails where more than {QUICK_WRONG} of them are wrong")
     options = parser.parse_args(arguments)
-    given = {"--part": options.part, "--rows": options.rows, "--partner": options.partner,
-             "--leave-out": options.leave_out, "--most-baseline": options.most_baseline is not None}
-    if options.quick and any(given.values()):
+    changes = {"--part": options.part, "--rows": options.rows, "--partner": options.partner,
+               "--leave-out": options.leave_out, "--most-baseline": options.most_baseline is not None}
+    if options.quick and any(changes.values()):
         parser.error("--quick has its own flights and baselines: leave out "
-                     + ", ".join(name for name, is_given in given.items() if is_given))
+                     + ", ".join(name for name, is_set in changes.items() if is_set))
     options.rows, options.part = options.rows or DEFAULT_ROWS, options.part or "build"
     if options.partner and not any("neuralswarm" in DATA_SETS[row] for row in options.rows):
         parser.error("--partner is of neural-swarm's flights: add swarm or nominal to --rows, or leave it out")

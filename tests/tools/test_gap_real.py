@@ -47,14 +47,14 @@ def test_a_kept_result_is_that_of_the_same_baseline_partners_and_candidates(tmp_
              replace(whole, left_out=("mass",))]
     for case in asked:
         for _ in range(2):
-            (result,) = gap_real.diagnose_cases([case], tmp_path / "kept.jsonl", 1)
+            (result,) = gap_real.diagnose_cases([case], tmp_path / "results.jsonl", 1)
             assert (result["baseline"], result["partner"]) == (len(case.baseline), len(case.partner))
             assert tuple(result["left_out"]) == case.left_out
     assert diagnosed == asked, "each once"
 
 
 def test_a_refusal_is_not_kept_and_one_that_was_kept_is_no_result(tmp_path, diagnosed):
-    case, store = cases.Case("swarm", "none", "v", "a.csv", ()), tmp_path / "kept.jsonl"
+    case, store = cases.Case("swarm", "none", "v", "a.csv", ()), tmp_path / "results.jsonl"
     diagnosed.verdict = "refused"
     (refused,) = gap_real.diagnose_cases([case], store, 1)
     assert refused["verdict"] == "refused" and not store.exists()

@@ -107,10 +107,10 @@ root, commands = sys.argv[1], json.load(sys.stdin)
 own = list(sys.path)
 for command in commands:
     name = command[0]
-    sys.argv, said = list(command), io.StringIO()
+    sys.argv, stderr = list(command), io.StringIO()
     sys.path[0] = str(Path(name).parent) if name.endswith(".py") else root  # as Python does
     code = 0
-    with redirect_stderr(said), redirect_stdout(io.StringIO()):
+    with redirect_stderr(stderr), redirect_stdout(io.StringIO()):
         try:
             (runpy.run_path if name.endswith(".py") else runpy.run_module)(name, run_name="__main__")
         except SystemExit as stop:
@@ -122,7 +122,7 @@ for command in commands:
             traceback.print_exc()
             code = 1
     sys.path[:] = own
-    print(json.dumps([code, said.getvalue()]), flush=True)
+    print(json.dumps([code, stderr.getvalue()]), flush=True)
 """
 
 
@@ -149,10 +149,10 @@ def refusals(tmp_path_factory):
 
 def one_line(stderr: str) -> str:
     """What a program says on stderr after the usage, which must be one line."""
-    said = stderr.splitlines()
-    first = next((i for i, line in enumerate(said) if ": error: " in line or line.startswith("Error: ")), 0)
-    assert len(said) == first + 1, stderr
-    return said[first]
+    lines = stderr.splitlines()
+    first = next((i for i, line in enumerate(lines) if ": error: " in line or line.startswith("Error: ")), 0)
+    assert len(lines) == first + 1, stderr
+    return lines[first]
 
 
 @pytest.mark.parametrize(("name", "arguments", "reason"), REFUSED)

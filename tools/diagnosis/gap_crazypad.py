@@ -33,7 +33,7 @@ from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_f
 from recordings.crazypad.labels import VEHICLE, baseline, family, manifest
 from recordings.crazypad.patterns import hover_patterns, likeliest
 from recordings.folder import add_folder
-from recordings.kept import Result, complete
+from recordings.result_store import Result, complete
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
 #: priors to choose from, round numbers below and above those of `PRIORS`

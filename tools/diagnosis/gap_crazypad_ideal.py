@@ -29,7 +29,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
 from recordings.crazypad import figures, labels
-from recordings.kept import Result
+from recordings.result_store import Result
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)

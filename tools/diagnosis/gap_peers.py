@@ -25,7 +25,7 @@ from airtouch.logs import read
 from airtouch.logs.files import check_free
 from recordings import peers
 from recordings.folder import add_folder
-from recordings.kept import Result, add_keep, complete
+from recordings.result_store import Result, add_keep_option, complete
 
 GOAL = 0.8  #: fraction of the gap that the right effect should close (host/docs/gap-real.md)
 
@@ -93,7 +93,7 @@ def main() -> None:
     """Diagnose every labelled flight of the set and print a table with the counts of right answers."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "peers")
-    add_keep(parser)
+    add_keep_option(parser)
     options = parser.parse_args()
     folder: Path = options.folder
     check_data_set(folder)

@@ -34,7 +34,7 @@ from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs.files import check_free
 from recordings import swarm_cuts
 from recordings.folder import add_folder
-from recordings.kept import add_keep
+from recordings.result_store import add_keep_option
 from recordings.wakes.false_alarms import show_false_alarms
 from recordings.wakes.known_seconds import answers_of, show_detected
 from recordings.wakes.tracks import track
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--part", choices=("build", "all"), default="build",
                         help="days 19 and 20, or all days (default %(default)s)")
     parser.add_argument("--answers", type=Path, metavar="FILE", help="what `gap_real.py --keep` wrote")
-    add_keep(parser, "of --false-alarms: ")
+    add_keep_option(parser, "of --false-alarms: ")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--false-alarms", action="store_true", help="what the diagnosis says of nominal flights")
     instead.add_argument("--without-seconds", action="store_true", help="what a test without the seconds detects")

@@ -55,9 +55,10 @@ def test_a_refused_flight_has_a_line_on_stderr_and_the_others_are_done(tmp_path,
         logs.write(log_of(RATIO, seconds=seconds), tmp_path / f"{name}.csv")
     monkeypatch.setattr(sys, "argv", ["rotor_inertia.py", f"{tmp_path}/short.csv", f"{tmp_path}/long.csv"])
     assert rotor_inertia.main() == 2
-    said = capsys.readouterr()
-    assert said.out.startswith("long.csv: ") and len(said.out.splitlines()) == 1
-    assert said.err.startswith("rotor_inertia: ") and "longer flight" in said.err and len(said.err.splitlines()) == 1
+    printed = capsys.readouterr()
+    assert printed.out.startswith("long.csv: ") and len(printed.out.splitlines()) == 1
+    assert printed.err.startswith("rotor_inertia: ") and "longer flight" in printed.err
+    assert len(printed.err.splitlines()) == 1
 
 
 def test_a_real_crazyflies_rotors_have_inertia():

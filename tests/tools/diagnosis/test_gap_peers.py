@@ -58,7 +58,7 @@ def test_a_run_goes_on_where_the_last_one_stopped(tmp_path, monkeypatch, capsys)
         return replace(result(["mass"], 0.9), file=label["file"])
 
     monkeypatch.setattr(gap_peers, "diagnose_flight", diagnose_flight)
-    monkeypatch.setattr(sys, "argv", ["gap_peers.py", str(tmp_path), "--keep", str(tmp_path / "kept.jsonl")])
+    monkeypatch.setattr(sys, "argv", ["gap_peers.py", str(tmp_path), "--keep", str(tmp_path / "results.jsonl")])
     with pytest.raises(AirTouchError, match="too short"):
         gap_peers.main()
     gap_peers.main()

@@ -10,7 +10,7 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 
-from .kept import Result
+from .result_store import Result
 
 #: m above standing at which the lift was measured (flights' medians, the data's SOURCE.md); nothing from 15 cm on,
 #: level below 1 cm

@@ -14,7 +14,7 @@ from airtouch.gap.signatures.alike import interchangeable
 from . import swarm_lift
 from .crazypad import figures as crazypad
 from .crazypad import labels
-from .kept import Result
+from .result_store import Result
 
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 

@@ -33,7 +33,7 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
 
 
 def closure_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
-                      ) -> dict[str, Closure]:
+                       ) -> dict[str, Closure]:
     """How far the effects named close the gap with each of two models of the vehicle; the JSON's `arms`.
 
     "declared": the vehicle as its file declares it, the effects fitted anew beside it; "calibrated": the vehicle as

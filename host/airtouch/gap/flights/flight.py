@@ -151,7 +151,7 @@ def _signals(log: FlightLog, angles: np.ndarray, body_to_world: np.ndarray, phas
     signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
     signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
     if not log.has("zrange_m"):
-        signals[:, at.HEIGHT] = heights.mean(axis=1)
-        low = (phase != GROUND) & (heights.mean(axis=1) < standing_height(row) + TOUCH_M)
+        height = signals[:, at.HEIGHT] = heights.mean(axis=1)
+        low = (phase != GROUND) & (height < standing_height(row) + TOUCH_M)
         touching = within(low, TOUCH_S)
     return signals, touching

@@ -1,6 +1,6 @@
 """The passing effect, tried before those that always act, and its evidence."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from airtouch.gap.naming.records import Candidate, Charges, Step, Strength, Unst
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, unsteady
-from airtouch.gap.signatures.scatter import size_of
+from airtouch.gap.signatures.scatter import Scatter, size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
@@ -69,7 +69,7 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
     sizes = {key: size_of(gain / data.seconds, strength)}
     if key == OVERHEAD:
         of_wakes = {UNSTEADY_TORQUE: unsteady(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
-        sizes |= {name: size for name, size in of_wakes.items() if name in data.study.scatter.passing}
+        sizes |= _of_known_scatter(data.study.scatter, of_wakes)
     return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))
 
 
@@ -78,5 +78,10 @@ def unsteadiness_of(data: Data) -> Unsteadiness:
     scatter = data.study.scatter
     if scatter is None:
         return Unsteadiness()
-    sizes = {name: size for name, size in unsteady(data).items() if name in scatter.passing}
+    sizes = _of_known_scatter(scatter, unsteady(data))
     return Unsteadiness(*scatter.rarity(sizes)) if sizes else Unsteadiness()
+
+
+def _of_known_scatter(scatter: Scatter, sizes: Mapping[str, float]) -> dict[str, float]:
+    """The sizes whose scatter in nominal flights is known."""
+    return {name: size for name, size in sizes.items() if name in scatter.passing}

@@ -48,8 +48,8 @@ def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> d
 
 
 def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
-              progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
-              every_random: bool = False) -> tuple[list[PricedVariant], list[Candidate]]:
+            progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
+            every_random: bool = False) -> tuple[list[PricedVariant], list[Candidate]]:
     """The variants that are worth a fit, and hypotheses of the others.
 
     candidates, progress, promising: as for `round_of`; every_random: as for `screen_random`.

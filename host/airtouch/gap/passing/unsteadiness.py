@@ -23,8 +23,10 @@ def unsteady(data: Data) -> dict[str, float]:
     """How unsteady torque and lift are, by name: natural logarithm of their `entropy`, but no less than of STEADY.
 
     The logarithm scatters more nearly as a Student's variable than the entropy does (host/docs/looks.md, 2026-11-27).
+    It is measured once: the evidence for a wake and the verdict both ask for it.
     """
-    return {name: float(np.log(max(entropy(data, columns), STEADY))) for name, columns in COLUMNS.items()}
+    return data.workspace.cached("unsteady", (), lambda: {
+        name: float(np.log(max(entropy(data, columns), STEADY))) for name, columns in COLUMNS.items()})
 
 
 def entropy(data: Data, columns: tuple[int, ...]) -> float:

@@ -85,13 +85,13 @@ def test_two_diagnoses_of_one_flight_are_refused_and_other_rows_left_out(tmp_pat
     """Of runs with a partner and without, nobody knows which is asked for."""
     first = {"row": "swarm", "flight": "a.csv", "partner": 0, "left_out": [], "verdict": "effect",
              "effects": [{"name": "downwash"}]}
-    kept = tmp_path / "kept.jsonl"
-    kept.write_text("".join(json.dumps(one) + "\n" for one in (first, {**first, "effects": [], **more})))
+    results = tmp_path / "results.jsonl"
+    results.write_text("".join(json.dumps(one) + "\n" for one in (first, {**first, "effects": [], **more})))
     if answer is None:
         with pytest.raises(AirTouchError, match="a.csv was diagnosed more than once, as with --partner"):
-            known_seconds.answers_of(kept)
+            known_seconds.answers_of(results)
     else:
-        assert known_seconds.answers_of(kept) == {"a.csv": answer}
+        assert known_seconds.answers_of(results) == {"a.csv": answer}
 
 
 def test_the_interval_of_an_area_holds_it():

@@ -10,7 +10,7 @@ from scipy.stats import spearmanr
 
 from airtouch.detector.evaluation.bootstrap import resampled
 
-from ..kept import Result
+from ..result_store import Result
 from .labels import FAMILIES, LEAST_MM, cut_mm, family, large, millimetres, rotors
 
 #: effect that a diagnosis names -> family

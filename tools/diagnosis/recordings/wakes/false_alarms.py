@@ -15,7 +15,7 @@ from airtouch.gap.sealed.intervals import share_text
 from airtouch.logs import read
 
 from .. import cases
-from ..kept import Result, complete
+from ..result_store import Result, complete
 from .tracks import LEAST_S, Track, overhead_at
 
 Kind = tuple[str, str]  #: vehicle and manoeuvre of a flight

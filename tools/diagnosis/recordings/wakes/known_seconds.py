@@ -10,7 +10,7 @@ from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import json_lines
 
-from ..kept import REFUSED
+from ..result_store import REFUSED
 from .tracks import LEAST_S, Track, seconds_under
 
 LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number

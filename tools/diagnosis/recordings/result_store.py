@@ -13,7 +13,7 @@ Result = dict[str, Any]  #: JSON-ready
 REFUSED = "refused"  #: verdict of a flight that the diagnosis refuses; such a result is not kept
 
 
-def add_keep(parser: argparse.ArgumentParser, more: str = "") -> None:
+def add_keep_option(parser: argparse.ArgumentParser, more: str = "") -> None:
     """Add the option --keep. more: for its help text."""
     parser.add_argument("--keep", type=Path, metavar="FILE",
                         help=f"{more}JSON lines, made if not there; results that it holds are not computed again, new "
