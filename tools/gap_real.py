@@ -18,6 +18,11 @@ only where --rows names it.
 
 --most-baseline: each flight against so many of its baseline flights at most, the first of them.
 
+    python tools/gap_real.py [FLIGHTS] --rows swarm nominal --other-day    # what baseline flights of another day cost
+
+--other-day: each flight against nominal flights of another day on which the same drone was flown, or over a platform of
+the same height at the same angle; those that have none are left out.
+
     python tools/gap_real.py [FLIGHTS] --rows swarm --leave-out    # flights whose effect no candidate explains
 
 --leave-out: flights with an effect alone, each without its effect among the candidates. `unknown` is right.
@@ -47,7 +52,8 @@ from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import read
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
-from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case, with_partners, without_truths
+from diagnosis.recordings import cases as recorded
+from diagnosis.recordings.cases import DATA_SETS, DEFAULT_ROWS, ROWS, Case
 from diagnosis.recordings.folder import add_folder
 from diagnosis.recordings.result_store import REFUSED, Result, add_keep_option, complete
 from diagnosis.recordings.table import answer, print_table
@@ -136,13 +142,15 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
                         help="give neural-swarm's flights the paths of other vehicles that the data hold")
     parser.add_argument("--most-baseline", type=whole_number(0), metavar="N",
                         help="most baseline flights of each, the first of them (default: all)")
+    parser.add_argument("--other-day", action="store_true", help="nominal flights of another day as a baseline")
     parser.add_argument("--leave-out", action="store_true",
                         help="flights with an effect alone, without that effect among the candidates")
     parser.add_argument("--quick", action="store_true",
                         help=f"a few flights of each row, 30 s; fails where more than {QUICK_WRONG} of them are wrong")
     options = parser.parse_args(arguments)
     changes = {"--part": options.part, "--rows": options.rows, "--partner": options.partner,
-               "--leave-out": options.leave_out, "--most-baseline": options.most_baseline is not None}
+               "--leave-out": options.leave_out, "--other-day": options.other_day,
+               "--most-baseline": options.most_baseline is not None}
     if options.quick and any(changes.values()):
         parser.error("--quick has its own flights and baselines: leave out "
                      + ", ".join(name for name, is_set in changes.items() if is_set))
@@ -156,15 +164,18 @@ def cases_of(options: argparse.Namespace) -> list[Case]:
     """The cases that the options name. Raises AirTouchError where there are none."""
     if options.quick:  # of the parts for building, and two peers
         cases = [c for row in options.rows for c in ROWS[row](options.flights, "view" if row == "peers" else "build")]
-        cases = quick([*cases, *without_truths(c for c in cases if c.truth == OVERHEAD)])
+        cases = quick([*cases, *recorded.without_truths(c for c in cases if c.truth == OVERHEAD)])
     else:
         cases = [c for row in options.rows for c in ROWS[row](options.flights, options.part)]
     if options.partner:
-        cases = with_partners(cases, options.flights)
+        cases = recorded.with_partners(cases, options.flights)
+    if options.other_day:
+        cases = list(recorded.of_another_day(cases))
     if options.leave_out:
-        cases = list(without_truths(cases))
+        cases = list(recorded.without_truths(cases))
     if not cases:
         raise AirTouchError(f"no flight of {' '.join(options.rows)} in the part {options.part}"
+                            + " was flown on two days" * options.other_day
                             + " has an effect to leave out" * options.leave_out)
     return [replace(c, baseline=c.baseline[:options.most_baseline]) for c in cases]
 

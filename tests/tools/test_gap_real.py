@@ -88,6 +88,18 @@ def test_effects_are_left_out_of_the_flights_that_have_them(flights, diagnosed, 
     assert "without downwash | unknown | 0 of" in capsys.readouterr().out
 
 
+def test_recorded_flights_are_held_against_another_day_of_the_same_drone(flights, diagnosed):
+    assert gap_real.main([str(flights), "--rows", "swarm", "nominal", "--other-day"]) == 0
+    swarm = [c for c in diagnosed if "neuralswarm" in c.flight]
+    assert len(swarm) >= 40 and len(diagnosed) > len(swarm)
+    for case in swarm:
+        drone, day = re.search(r"_(cf\d+)d(\d\d)_", case.flight).groups()
+        held_against = {re.search(r"_(cf\d+)d(\d\d)_", file).groups() for file in case.baseline}
+        assert held_against == {(drone, {"19": "20", "20": "19"}[day])}
+    with pytest.raises(AirTouchError, match="no flight of swarm in the part view was flown on two days"):
+        gap_real.main([str(flights), "--rows", "swarm", "--part", "view", "--other-day"])
+
+
 def test_nominal_flights_are_held_against_others_of_their_group(flights):
     build, view = (list(cases.nominal(flights, part)) for part in ("build", "view"))
     assert len(build) >= 60 and len(view) >= 30

@@ -34,6 +34,8 @@ class Case:
     condition: str = ""
     partner: tuple[tuple[str, float], ...] = ()  #: logs of other vehicles, and when they begin after this flight, s
     left_out: tuple[str, ...] = ()  #: effects that are no candidates
+    unit: tuple[str, ...] = ()  #: what flights of several days must share: the drone, or height and angle of the passes
+    day: str = ""
 
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
@@ -56,7 +58,7 @@ def swarm(folder: Path, part: str) -> Iterator[Case]:
     for r in csv.DictReader((own / "manifest.csv").open()):
         if _in_part(part, r["day"] in BUILD_DAYS):
             yield Case("swarm", r["truth"], str(own / f"{r['vehicle']}.toml"), str(own / "flights" / r["file"]),
-                       tuple(base[r["group"]]), r["vehicle"])
+                       tuple(base[r["group"]]), r["vehicle"], unit=(_drone(r),), day=r["day"])
 
 
 def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
@@ -73,6 +75,21 @@ def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
     return out
 
 
+def of_another_day(cases: Iterable[Case]) -> Iterator[Case]:
+    """Cases against flights of the next day, of those among them, on which the same was flown, the first day after the
+    last; none of a drone, or a height and angle, that was flown on one day alone.
+    """
+    cases = list(cases)
+    days: defaultdict[tuple[str, ...], defaultdict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for case in cases:
+        days[case.unit][case.day].update(case.baseline)
+    for case in cases:
+        others = sorted(days[case.unit])
+        day = others[(others.index(case.day) + 1) % len(others)]
+        if case.unit and day != case.day:
+            yield replace(case, baseline=tuple(sorted(days[case.unit][day])[:OTHERS]))
+
+
 def without_truths(cases: Iterable[Case]) -> Iterator[Case]:
     """Cases whose truth is an effect, which is left out of the candidates: to be called `unknown`."""
     for case in cases:
@@ -86,18 +103,21 @@ def nominal(folder: Path, part: str) -> Iterator[Case]:
 
     A group of the authors' is a day and condition, one of neural-swarm's the baseline flights of a drone and day.
     """
-    groups: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
-    for group, files in _calm_groups(folder, part).items():
-        groups[DEFAULT_VEHICLE, "the authors'", *group] = files
+    #: (vehicle, condition, unit, day) -> files
+    groups: defaultdict[tuple[str, str, tuple[str, ...], str], list[str]] = defaultdict(list)
+    for (day, *height_and_angle), files in _calm_groups(folder, part).items():
+        groups[DEFAULT_VEHICLE, "the authors'", tuple(height_and_angle), day] = files
     own = folder / "neuralswarm"
-    vehicle_and_day = {r["group"]: (r["vehicle"], r["day"]) for r in csv.DictReader((own / "manifest.csv").open())}
+    test_flight = {r["group"]: r for r in csv.DictReader((own / "manifest.csv").open())}
     for r in csv.DictReader((own / "baselines.csv").open()):
-        if r["group"] in vehicle_and_day and _in_part(part, vehicle_and_day[r["group"]][1] in BUILD_DAYS):
-            vehicle = vehicle_and_day[r["group"]][0]
-            groups[str(own / f"{vehicle}.toml"), vehicle, r["group"]].append(str(own / "flights" / r["file"]))
-    for (vehicle, condition, *_), files in groups.items():
+        row = test_flight.get(r["group"])
+        if row is not None and _in_part(part, row["day"] in BUILD_DAYS):
+            vehicle = str(own / f"{row['vehicle']}.toml")
+            groups[vehicle, row["vehicle"], (_drone(row),), row["day"]].append(str(own / "flights" / r["file"]))
+    for (vehicle, condition, unit, day), files in groups.items():
         for flight in files if len(files) >= LEAST_GROUP else ():
-            yield Case("nominal", "none", vehicle, flight, tuple(f for f in files if f != flight)[:OTHERS], condition)
+            others = tuple(f for f in files if f != flight)[:OTHERS]
+            yield Case("nominal", "none", vehicle, flight, others, condition, unit=unit, day=day)
 
 
 def crazypad(folder: Path, part: str) -> Iterator[Case]:
@@ -132,6 +152,11 @@ def _calm_groups(folder: Path, part: str) -> dict[tuple[str, str, str], list[str
     """Clean flights of the authors in still air: (day, height, angle) -> files."""
     files = [file for file in collect([folder / "airtouch"]) if _in_part(part, file.condition.fold in BUILD_FOLDS)]
     return {group: [str(file.path) for file in members] for group, members in still_air(files).items()}
+
+
+def _drone(row: swarm_cuts.Row) -> str:
+    """The drone of a row of neural-swarm's manifest, whose group is a drone and a day."""
+    return row["group"].removesuffix(f"d{row['day']}")
 
 
 def _in_part(part: str, build: bool) -> bool:

@@ -72,3 +72,13 @@ def test_crazypad_is_held_against_the_other_normal_flights_of_its_drone(folder):
     baselines = {names([c.flight])[0]: names(c.baseline) for c in recorded_cases.crazypad(folder, "all")}
     assert baselines["nA1.csv"] == ["nA2.csv"] and baselines["c1.csv"] == ["nA1.csv", "nA2.csv"]
     assert names(c.flight for c in recorded_cases.crazypad(folder, "view")) == ["c4.csv"]
+
+
+def test_a_baseline_of_another_day_is_the_next_of_the_same_drone():
+    def case(flight, drone, day, baseline):
+        return recorded_cases.Case("swarm", "none", "v", flight, baseline, unit=(drone,), day=day)
+
+    cases = [case("a1", "a", "19", ("a2", "a3")), case("a4", "a", "20", ("a6", "a5")), case("a7", "a", "21", ("a8",)),
+             case("b1", "b", "19", ("b2",)), recorded_cases.Case("fan", "none", "v", "c1", ("c2",))]
+    other = {c.flight: c.baseline for c in recorded_cases.of_another_day(cases)}
+    assert other == {"a1": ("a5", "a6"), "a4": ("a8",), "a7": ("a2", "a3")}, "b and c were flown on one day"
