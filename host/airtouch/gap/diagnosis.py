@@ -16,7 +16,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights
+from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.records import Selection
@@ -82,8 +82,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
-    nominal = list(ready_flights(baseline, vehicle, notes))
-    usable = list(ready_flights(flights, vehicle, notes))
+    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, notes)), notes)
+    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, notes)), notes)
     if not usable:
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):

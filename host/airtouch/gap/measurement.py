@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import ready, ready_flights
+from airtouch.gap.flights.flight import ready, ready_flights, with_gyro_if_any
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
@@ -104,7 +104,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     mapper: what maps a function over flights, in place of `map`, to spread the work.
     """
     left_out: list[str] = []
-    nominal = list(ready_flights(baseline, vehicle, left_out))
+    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, left_out)), left_out)
     fitted = None
     if nominal and calibrated:
         progress("calibration")

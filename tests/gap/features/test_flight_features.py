@@ -83,3 +83,18 @@ def test_whitened_nominal_flights_have_no_covariance():
     lower = cholesky_factor(draws, doubt=0.0)
     white = np.linalg.solve(lower, (rng.normal(size=(20000, 5)) @ mix.T).T)
     assert np.cov(white) == pytest.approx(np.eye(5), abs=0.04)
+
+
+def test_a_heading_that_passes_half_a_turn_is_no_jump(flight):
+    """The same flight with its logged heading turned by half a turn: what the angles have beyond the gyro stays."""
+    turned = flight.log.with_columns({"yaw_rad": np.angle(np.exp(1j * (flight.log["yaw_rad"] + np.pi)))})
+    assert np.abs(np.diff(turned["yaw_rad"])).max() > 6.0
+    beyond_gyro = [signals_of(ready(log, VEHICLE), VEHICLE).table[:, COLUMNS.index("angle residual z")]
+                   for log in (flight.log, turned)]
+    np.testing.assert_allclose(*beyond_gyro, atol=1e-6)
+
+
+def test_without_a_block_in_the_air_nothing_is_told(flight):
+    signals = signals_of(flight, VEHICLE)
+    nowhere = replace(signals.flight, usable=np.zeros(len(signals.flight), bool))
+    assert np.isnan(coherence.coherence(replace(signals, flight=nowhere))).all()

@@ -52,3 +52,27 @@ def test_fast_tilts_come_from_the_gyro():
     still = {f"acc_world_{a}_mps2": np.full(n, GRAVITY * (a == "z")) for a in "xyz"}
     angles = attitude(log_of(**still, gyro_x_radps=rate, gyro_y_radps=np.zeros(n), gyro_z_radps=np.zeros(n)))
     np.testing.assert_allclose(angles[300:-300, 0], 0.3 * np.sin(2.0 * np.pi * 3.0 * t)[300:-300], atol=0.04)
+
+
+def test_the_tilt_is_told_in_the_heading_that_the_gyro_gives():
+    """Turned by 90 degrees without a logged yaw: a push along the world's y axis is one along the body's x axis."""
+    n = 800
+    turn = np.where((np.arange(n) - 0.5) % n < 100, 0.5 * np.pi / (100 * PERIOD_S), 0.0)
+    force = {"acc_world_x_mps2": np.zeros(n), "acc_world_y_mps2": np.full(n, 1.0), "acc_world_z_mps2": np.full(n, 9.81)}
+    angles = attitude(log_of(**force, gyro_x_radps=np.zeros(n), gyro_y_radps=np.zeros(n), gyro_z_radps=turn))
+    np.testing.assert_allclose(angles[400:-200], [[0.0, np.arctan(1.0 / 9.81), 0.5 * np.pi]] * (n - 600), atol=0.01)
+
+
+@pytest.mark.parametrize("gravity", [0.0, GRAVITY])
+def test_world_axes_with_and_without_gravity_give_the_same_tilt(gravity):
+    n = 800
+    force = {f"acc_{a}_mps2": np.full(n, v) for a, v in zip("xyz", (1.0, 0.0, gravity), strict=True)}
+    log = FlightLog(log_of(**force, **{f"gyro_{a}_radps": np.zeros(n) for a in "xyz"}).columns, {"acc_frame": "world"})
+    np.testing.assert_allclose(attitude(log)[200:-200, 1], np.arctan(1.0 / GRAVITY), rtol=0.01)
+
+
+def test_a_hole_in_a_heading_that_passes_half_a_turn_is_bridged_the_short_way():
+    yaw = np.linspace(np.pi - 0.2, np.pi + 0.2, 41)
+    logged = np.angle(np.exp(1j * yaw))
+    logged[18:23] = np.nan
+    np.testing.assert_allclose(attitude(log_of(yaw_rad=logged))[:, 2], yaw, atol=1e-12)

@@ -5,7 +5,7 @@ import pytest
 
 import gap_flights
 from airtouch import vehicle as vehicles
-from airtouch.gap.flights.flight import ready_flights
+from airtouch.gap.flights.flight import ready_flights, with_gyro_if_any
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
@@ -56,3 +56,49 @@ def test_without_a_down_range_the_height_comes_from_the_position(log):
     assert hover.sum() > 100 and log["z_m"][hover].max() < 2.0
     difference = unranged.signals[hover, at.HEIGHT] - ranged.signals[hover, at.HEIGHT]
     assert np.abs(np.median(difference)) < 0.03
+
+
+def at_rate(log, hz):
+    """The log sampled at another rate, by straight lines."""
+    old = log["t_s"]
+    new = np.arange(old[0], old[-1], 1.0 / hz)
+    columns = {k: np.interp(new, old, v) for k, v in log.columns.items()}
+    return FlightLog({**columns, "t_s": new}, {k: v for k, v in log.meta.items() if k != "sample_period_s"})
+
+
+@pytest.mark.parametrize("hz", [101.0, 125.0, 150.0, 250.0])
+def test_a_faster_log_is_as_long_as_it_was(log, hz):
+    assert len(as_flight(at_rate(log, hz))) == pytest.approx(len(log), rel=0.011)
+
+
+@pytest.mark.parametrize("with_clock", [True, False])
+def test_a_slower_log_is_refused(log, with_clock):
+    slow, reasons = at_rate(log, 50.0), []
+    if not with_clock:
+        slow = FlightLog({k: v for k, v in slow.columns.items() if k != "t_s"}, {"sample_period_s": 0.02})
+    assert not list(ready_flights([slow], VEHICLE, reasons))
+    assert "logged at 50 Hz; the diagnosis needs 100 Hz or more" in reasons[0]
+
+
+def test_a_clock_that_counts_from_1970_is_a_clock(log):
+    plain = without(log, 700, 701)
+    unix = as_flight(FlightLog({**plain.columns, "t_s": plain["t_s"] + 1.8e9}, log.meta))
+    assert np.array_equal(unix.lost, as_flight(plain).lost) and not unix.notes
+
+
+def test_a_flight_of_take_off_and_landing_alone_is_refused(log):
+    """Of 3.3 s in the air the 0.3 s after take-off and before touch-down may be touched by the legs."""
+    air, end = np.flatnonzero(as_flight(log).phase != KINDS.index("ground"))[[0, -1]]
+    cut = np.r_[0:air + 165, end - 164:len(log)]
+    hop = FlightLog({k: v[cut] for k, v in log.columns.items()} | {"t_s": np.arange(len(cut)) * 0.01}, log.meta)
+    reasons = []
+    assert not list(ready_flights([hop], VEHICLE, reasons))
+    assert "s in the air without a lost row or contact); at least 3 s are needed" in reasons[0]
+
+
+def test_flights_without_a_gyro_are_left_out_among_others_that_have_one(log):
+    with_gyro = as_flight(log)
+    bare = as_flight(FlightLog({k: v for k, v in log.columns.items() if not k.startswith("gyro")}, log.meta))
+    reasons = []
+    assert with_gyro_if_any([with_gyro, bare], reasons) == [with_gyro] and "no gyro" in reasons[0]
+    assert with_gyro_if_any([bare, bare], reasons) == [bare, bare] and len(reasons) == 1

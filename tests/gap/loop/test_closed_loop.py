@@ -197,3 +197,13 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
                 np.testing.assert_array_equal(now, earlier)
         number[...] = original
     assert different > 50  # else nothing was changed
+
+
+def test_effects_are_told_apart_by_the_names_of_their_values(study):
+    """Not by their order: of one gain of 0.7 and one of 1 each is the other's."""
+    effect = activate({"controller_gain": {"rate": 0.7}})[0].effect
+    f, rest = command_spectra.command_frequencies(), {"position": 1.0, "height": 1.0}
+    rate, attitude, same = (study.loop.torque_change((Active(effect, values),), f).share for values in
+                            (rest | {"rate": 0.7, "attitude": 1.0}, rest | {"attitude": 0.7, "rate": 1.0},
+                             {"attitude": 1.0, "rate": 0.7} | rest))
+    assert np.array_equal(rate, same) and not np.allclose(rate, attitude)

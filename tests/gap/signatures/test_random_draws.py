@@ -55,3 +55,8 @@ def test_an_effect_of_ones_own_is_drawn_in_any_direction_that_its_bounds_allow()
     assert np.all(table[:, 0] >= 0.0) and np.all(table[:, 1] <= 0.0)
     assert 0.3 < np.mean(table[:, 2] > 0.0) < 0.7
     assert "shape" not in values[0]
+
+
+def test_an_effect_without_a_free_parameter_is_drawn_as_it_is():
+    (kind,) = kinds_of(Effect("lamp", "", (Parameter("shape", "m", 2.0, 0.0, 9.0, None, ""),))).values()
+    assert kind.make(2.0, np.random.default_rng(0)) == {}

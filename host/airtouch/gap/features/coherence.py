@@ -52,7 +52,7 @@ def declared_features() -> tuple[Feature, ...]:
 
 
 def coherence(signals: FlightSignals) -> np.ndarray:
-    """Powers and coherences (len(declared_features()),) of a flight in the air.
+    """Powers and coherences (len(declared_features()),) of a flight in the air; NaN for one without a block.
 
     Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the
     logarithm of the share of a signal's power that the others of the group do not predict (1 less the multiple
@@ -60,7 +60,8 @@ def coherence(signals: FlightSignals) -> np.ndarray:
     """
     spectra = short_time_spectra(signals.table, _whole(signals.flight, starts(signals.flight, AIR)), AIR)
     columns_of_groups = [list(columns.values()) for columns in GROUPS.values()]
-    return np.concatenate([part for columns in columns_of_groups for part in _of_group(spectra[:, :, columns])])
+    out = np.concatenate([part for columns in columns_of_groups for part in _of_group(spectra[:, :, columns])])
+    return out if len(spectra) else np.full_like(out, np.nan)
 
 
 def _whole(flight: Flight, first: np.ndarray) -> np.ndarray:

@@ -65,8 +65,8 @@ def signals_of(flight: Flight, vehicle: Vehicle) -> FlightSignals:
     down = np.where(np.abs(down) > JUMP_MPS, 0.0, down) - interpolate_missing(log["vz_mps"])[:, None]
     table = np.column_stack([
         vehicle.thrust(flight.pwm) @ MIX.T, angular_acceleration(flight), flight.acceleration[:, 2],
-        force[:, FORCE], force[:, TORQUE], _rate(velocity) - (flight.acceleration - gravity), _rate(angles) - rates,
-        down])
+        force[:, FORCE], force[:, TORQUE], _rate(velocity) - (flight.acceleration - gravity),
+        _rate(np.unwrap(angles, axis=0)) - rates, down])
     if flight.bridged.any():
         table = interpolate_missing(np.where(flight.bridged[:, None], np.nan, table))
     touched = _touched(flight, vehicle)

@@ -1,5 +1,7 @@
 """The vehicle's attitude: as logged, else estimated from what the log holds."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -13,6 +15,8 @@ CROSSOVER_HZ = 0.4
 SHORTEST = 100  #: samples up to which a log is too short to be filtered: without angles it is taken as level; chosen
 GRAVITY = 9.81  #: m/s^2: standard gravity, rounded
 LEAST_LIFT = 0.5  #: share of gravity that the vertical force has at least where the tilt is its angle; chosen
+#: share of gravity below which the median vertical force has gravity subtracted; chosen, between 0 and 1
+WITHOUT_GRAVITY = 0.5
 PUSH_S = 0.05  #: standard deviation of the Gaussian that smooths velocity before it is differentiated; chosen
 
 
@@ -25,37 +29,62 @@ def attitude(log: FlightLog) -> np.ndarray:
     """
     n = len(log)
     estimate = np.zeros((n, 3))
-    tilt = _tilt(log)
-    if log.has(*GYRO):
-        turned = np.cumsum(interpolate_missing(log.stack(GYRO)), axis=0) * PERIOD_S
-        estimate[:, 2] = turned[:, 2] - turned[0, 2] if not log.has("yaw_rad") else 0.0
+    turned = np.cumsum(interpolate_missing(log.stack(GYRO)), axis=0) * PERIOD_S if log.has(*GYRO) else None
+    if log.has("yaw_rad"):
+        estimate[:, 2] = _logged_angle(log["yaw_rad"])
+    elif turned is not None:
+        estimate[:, 2] = turned[:, 2] - turned[0, 2]
+    tilt = _tilt(log, estimate[:, 2])
+    if turned is not None:
         low = lowpass(CROSSOVER_HZ * 2.0 * PERIOD_S)
         if n > SHORTEST:
             estimate[:, :2] = turned[:, :2] - both_ways(low, turned[:, :2])
             estimate[:, :2] += both_ways(low, tilt)
     else:
         estimate[:, :2] = tilt
-    for i, name in enumerate(ATTITUDE):
+    for i, name in enumerate(ATTITUDE[:2]):
         if log.has(name):
-            estimate[:, i] = interpolate_missing(log[name])
+            estimate[:, i] = _logged_angle(log[name])
     return estimate
 
 
-def _tilt(log: FlightLog) -> np.ndarray:
-    """Roll and pitch (n, 2) of the specific force, in axes that are turned by yaw only."""
+def _logged_angle(values: np.ndarray) -> np.ndarray:
+    """A logged angle (n,), rad, without jumps by a turn, straight lines where it is missing."""
+    known, out = np.isfinite(values), np.array(values)
+    out[known] = np.unwrap(out[known])
+    return interpolate_missing(out)
+
+
+def in_world_axes(log: FlightLog) -> bool:
+    """Whether the log's accelerations are in the axes of the world."""
+    return log.meta.get("acc_frame") == "world" and log.has(*ACC)
+
+
+def world_force(log: FlightLog, columns: Sequence[str], gravity: float = GRAVITY) -> np.ndarray:
+    """Specific force (n, 3) m/s^2 of columns in the axes of the world, from which some logs have gravity subtracted.
+
+    It is added again where the median vertical force is below WITHOUT_GRAVITY of it. gravity: m/s^2.
+    """
+    force = interpolate_missing(log.stack(columns))
+    if np.median(force[:, 2]) < WITHOUT_GRAVITY * gravity:
+        force[:, 2] += gravity
+    return force
+
+
+def _tilt(log: FlightLog, yaw: np.ndarray) -> np.ndarray:
+    """Roll and pitch (n, 2) of the specific force, in axes that are turned by yaw (n,), rad, only."""
     n = len(log)
     if log.has(*VELOCITY[:2]):
         push = np.gradient(smoothed_speed(log, PUSH_S), PERIOD_S, axis=0)
         up = np.full(n, GRAVITY)
     elif log.has(*ACC_WORLD):
-        force = interpolate_missing(log.stack(ACC_WORLD))
+        force = world_force(log, ACC_WORLD)
         push, up = force[:, :2], np.maximum(force[:, 2], LEAST_LIFT * GRAVITY)
-    elif log.meta.get("acc_frame") == "world" and log.has(*ACC):
-        force = interpolate_missing(log.stack(ACC))
+    elif in_world_axes(log):
+        force = world_force(log, ACC)
         push, up = force[:, :2], np.maximum(force[:, 2], LEAST_LIFT * GRAVITY)
     else:
         return np.zeros((n, 2))
-    yaw = interpolate_missing(log["yaw_rad"]) if log.has("yaw_rad") else np.zeros(n)
     forward = np.cos(yaw) * push[:, 0] + np.sin(yaw) * push[:, 1]
     leftward = -np.sin(yaw) * push[:, 0] + np.cos(yaw) * push[:, 1]
     return np.column_stack([-np.arctan2(leftward, up), np.arctan2(forward, up)])

@@ -1,4 +1,7 @@
-"""A log on a regular 10 ms clock: resampled where it is faster, with a row of NaN for each one that was lost."""
+"""A log on a regular 10 ms clock, with a row of NaN for each one that was lost.
+
+A faster log is resampled, a slower one refused.
+"""
 
 from typing import NamedTuple
 
@@ -6,12 +9,13 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
+from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, sample_period, true_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.resample import resample
 
 PERIOD_S = 0.01
-FAST_PERIOD_S = 0.006  #: a log whose period is shorter is resampled; chosen, between those of 100 Hz and of 200 Hz
+#: share by which a log's period may differ from PERIOD_S and count as equal; chosen: CrazyPAD's clocks are off by 1.2 %
+PERIOD_TOLERANCE = 0.02
 BACKWARDS_S = 0.05  #: step back of the clock that is no jitter: such a log is refused; chosen
 #: most rows with the lost ones, else the clock column is at fault: so many for each logged one, and some more; chosen
 MOST_ROWS_EACH, MOST_ROWS_MORE = 3, 1000
@@ -22,19 +26,23 @@ MISSING = 1.5  #: step, in periods, from which a row is missing: nearer to two p
 
 
 def at_100_hz(log: FlightLog, name: str) -> FlightLog:
-    """The log, resampled to 100 Hz where its period is below FAST_PERIOD_S. It has two samples at least.
+    """The log, resampled to 100 Hz where it is faster by more than PERIOD_TOLERANCE. It has two samples at least.
 
-    Raises AirTouchError, with the file `name`, where the clock runs backwards.
+    Raises AirTouchError, with the file `name`, where the clock runs backwards, and for a slower log: what it lacks of
+    the band up to 50 Hz cannot be made up.
     """
     if log.has("t_s"):
         backwards = np.flatnonzero(np.diff(log["t_s"]) < -BACKWARDS_S)
         if len(backwards):
             raise AirTouchError(f"{name}, sample {backwards[0] + 1}: the clock runs backwards by "
                                 f"{-np.diff(log['t_s'])[backwards[0]]:.3f} s; cut the log there")
-        period = true_period(log["t_s"])
-        if period is not None and period < FAST_PERIOD_S:
-            return resample(log, 100.0)
-    return log
+    period = true_period(log["t_s"]) if log.has("t_s") else sample_period(log)
+    if period is None:
+        return log
+    if period > (1.0 + PERIOD_TOLERANCE) * PERIOD_S:
+        raise AirTouchError(f"{name}: logged at {1.0 / period:.3g} Hz; the diagnosis needs 100 Hz or more: log every "
+                            "10 ms")
+    return resample(log, 100.0) if period < (1.0 - PERIOD_TOLERANCE) * PERIOD_S else log
 
 
 class RegularLog(NamedTuple):

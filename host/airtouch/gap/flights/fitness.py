@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.checks.channel_faults import stuck_intervals
+from airtouch.logs.checks.clock import LATEST_S
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM, RANGES, FlightLog
@@ -15,7 +16,8 @@ from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import PLATFORM_STEP_M
 
 LEAST_AIR_S = 3.0  #: seconds in the air that a flight needs to be diagnosed; chosen
-LARGEST = 1e5  #: magnitude above which a value is none, in any column's unit; chosen, beyond what any sensor says
+#: magnitude above which a value is none, in any column's unit but for the clock; chosen, beyond what any sensor says
+LARGEST = 1e5
 PWM_RANGE = (-1.0, 66000.0)  #: of a motor command, which has 16 bits: 0 to 65535; its margins are chosen
 IMU = frozenset({*ACC, *GYRO})  #: channels whose standing still is told; a motor may stand at its limit
 LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the column is left out; chosen
@@ -61,7 +63,7 @@ def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
     """The log without values that cannot be and without columns that have few others; their names."""
     columns, unfit = {}, []
     for key, values in log.columns.items():
-        low, high = PWM_RANGE if key in PWM else (-LARGEST, LARGEST)
+        low, high = PWM_RANGE if key in PWM else (-LATEST_S, LATEST_S) if key == "t_s" else (-LARGEST, LARGEST)
         good = (values >= low) & (values <= high)
         if len(good) and good.mean() < LEAST_GOOD:
             unfit += [key] if key not in RANGES else []

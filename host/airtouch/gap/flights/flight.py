@@ -1,12 +1,12 @@
 """A flight made ready for the diagnosis: a regular clock, what effects see, what was measured."""
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.flights.attitude import attitude
+from airtouch.gap.flights.attitude import attitude, in_world_axes, world_force
 from airtouch.gap.flights.clock import PERIOD_S, at_100_hz, with_lost_rows
 from airtouch.gap.flights.contact import jolts, knocks, near_ground, within
 from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, stamped_at_arrival, without_bad_columns
@@ -24,7 +24,6 @@ from airtouch.vehicle import Vehicle
 GROUND = KINDS.index("ground")
 #: height above standing, m, below which legs may touch in flight, and seconds before and after it; chosen
 TOUCH_M, TOUCH_S = 0.006, 0.05
-WITHOUT_GRAVITY = 0.5  #: share of gravity below which the median vertical force has gravity subtracted: between 0 and 1
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         clock = np.zeros_like(clock)
     cannot, phase = cannot_tell(log), _phases(log)
     ground = phase == GROUND
-    if (~ground).sum() * PERIOD_S < LEAST_AIR_S:
-        raise AirTouchError(f"{name}: no flight in it ({(~ground).sum() * PERIOD_S:.1f} s in the air); "
-                            f"at least {LEAST_AIR_S:g} s are needed")
+    _check_long_enough(~ground, name, "in the air")
     angles = attitude(log)
     body_to_world = as_matrix(*angles.T)
     force = _body_force(log, body_to_world, vehicle.gravity_mps2)
@@ -93,9 +90,17 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     pwm = interpolate_missing(log.stack(PWM))
     running = pwm.max(axis=1) > 0.0
     usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
+    _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
                   notes=notes, cannot=cannot)
+
+
+def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
+    """Raises AirTouchError, with the file `name`, for fewer than LEAST_AIR_S of samples (n,), bool; which: in words."""
+    seconds = samples.sum() * PERIOD_S
+    if seconds < LEAST_AIR_S:
+        raise AirTouchError(f"{name}: no flight in it ({seconds:.1f} s {which}); at least {LEAST_AIR_S:g} s are needed")
 
 
 def ready_flights(logs: Iterable[FlightLog], vehicle: Vehicle, reasons: list[str]) -> Iterator[Flight]:
@@ -105,6 +110,18 @@ def ready_flights(logs: Iterable[FlightLog], vehicle: Vehicle, reasons: list[str
             yield ready(log, vehicle)
         except AirTouchError as error:
             reasons.append(str(error))
+
+
+def with_gyro_if_any(flights: Sequence[Flight], reasons: list[str]) -> list[Flight]:
+    """The flights that have a gyro, or all where none has: one floor, one map, cannot hold for both kinds.
+
+    The reason why others are left out is added to `reasons`.
+    """
+    with_gyro = [f for f in flights if f.rates is not None]
+    if len(with_gyro) in (0, len(flights)):
+        return list(flights)
+    reasons += [f"{f.name}: no gyro, which the other flights have; left out" for f in flights if f.rates is None]
+    return with_gyro
 
 
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
@@ -117,16 +134,10 @@ def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -
 
 
 def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np.ndarray:
-    """Specific force (n, 3) m/s^2 in body axes. body_to_world (n, 3, 3): rotation; gravity: m/s^2.
-
-    Of logs in world axes, some have gravity already subtracted: it is added again.
-    """
-    force = interpolate_missing(log.stack(ACC))
-    if log.meta.get("acc_frame") == "world":
-        force = np.einsum("nji,nj->ni", body_to_world, force)
-        if np.median(force[:, 2]) < WITHOUT_GRAVITY * gravity:
-            force += np.einsum("nji,j->ni", body_to_world, [0.0, 0.0, gravity])
-    return force
+    """Specific force (n, 3) m/s^2 in body axes. body_to_world (n, 3, 3): rotation; gravity: m/s^2."""
+    if in_world_axes(log):
+        return np.einsum("nji,nj->ni", body_to_world, world_force(log, ACC, gravity))
+    return interpolate_missing(log.stack(ACC))
 
 
 def _phases(log: FlightLog) -> np.ndarray:

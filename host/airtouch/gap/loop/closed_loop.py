@@ -156,7 +156,7 @@ class ClosedLoop:
             row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
             return PlantUnderEffects(row, not _same_loop(row, self._nominal_row))
 
-        return self.workspace.cached("plant", tuple((a.effect.name, *a.values.values()) for a in active), make, PLANTS)
+        return self.workspace.cached("plant", tuple(a.key for a in active), make, PLANTS)
 
     def _loops(self, row: PlantRow) -> list[AxisLoop]:
         """The loops of AXES under a plant row; cached."""

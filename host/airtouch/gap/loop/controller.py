@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.axis_plant import PlantRow
 from airtouch.simulation.firmware import battery_compensation, settings
@@ -130,5 +131,8 @@ def _range_gains(period: float, std: float, acceleration: float) -> tuple[float,
 
 
 def _share(part: float, of: float) -> float:
-    """A gain as a share of another, both as the release's settings have them."""
+    """A gain as a share of another, both as the release's settings have them. Raises AirTouchError for none of it."""
+    if not of:
+        raise AirTouchError("the firmware has a loop without a proportional gain (p = 0), which the diagnosis cannot "
+                            "follow; correct the vehicle's firmware settings")
     return float(part) / float(of)

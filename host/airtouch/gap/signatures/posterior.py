@@ -35,17 +35,17 @@ def standard_deviation(x: np.ndarray, error: np.ndarray, prior: float, worths: S
 
 def updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, worth: float, least: float = 0.0,
              ) -> tuple[float, float]:
-    """Mean and standard deviation, from those of a class and from the values (n,) of the baseline.
+    """Mean and standard deviation about it, from those of a class and from the values (n,) of the baseline.
 
-    own: those of the class; worth: number of flights that they count as; least: standard deviation at least, as a few
-    flights without a gust do not make gusts rarer.
+    The mean is that of the class at least, as a few flights without a gust do not make gusts rarer. own: those of the
+    class; worth: number of flights that they count as; least: standard deviation at least.
     """
     class_mean, spread = own
     values = np.minimum(values, class_mean + MOST_STANDARD_DEVIATIONS * spread)
     total = worth + len(values)
-    mean = (worth * class_mean + values.sum()) / total
+    mean = float(max((worth * class_mean + values.sum()) / total, class_mean))
     spread = float(np.sqrt((worth * spread ** 2 + ((values - mean) ** 2).sum()) / total))
-    return float(max(mean, class_mean)), max(spread, least)
+    return mean, max(spread, least)
 
 
 def mean_and_deviation(values: Sequence[float] | np.ndarray) -> tuple[float, float]:

@@ -119,7 +119,7 @@ def _any_direction(effect: Effect) -> Callable[[float, np.random.Generator], Val
 
     def make(s: float, rng: np.random.Generator) -> Values:
         """Values at a strength; of a parameter that lies on one side of neutral alone, on that side."""
-        direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
+        direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(len(free))
         direction /= np.linalg.norm(direction)
         out = {}
         for p, share in zip(free, direction, strict=True):
