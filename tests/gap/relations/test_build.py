@@ -97,18 +97,18 @@ def test_an_effect_that_a_library_was_built_with_is_named_and_sized(infer_new_fl
     answers = infer_new_flights(effects)
     ((name, ((parameter, true),)),) = ((name, values.items()) for name, values in effects.items())
     assert [[c.name for c in one.classes] for one in answers] == [[name]] * JUDGED
-    assert sum(one.against.is_too_much for one in answers) <= 1
+    assert sum(one.counterevidence.is_too_much for one in answers) <= 1
     for value, deviation in (one.readings[name][parameter] for one in answers):
         assert value == pytest.approx(true, rel=0.3) and abs(value - true) < 3.0 * deviation
 
 
 def test_a_library_built_of_few_flights_names_nothing_in_nominal_ones(infer_new_flights):
     answers = infer_new_flights({})
-    assert not any(one.classes for one in answers) and sum(one.against.is_too_much for one in answers) <= 1
+    assert not any(one.classes for one in answers) and sum(one.counterevidence.is_too_much for one in answers) <= 1
 
 
 def test_an_effect_that_a_library_was_built_without_is_left(infer_new_flights):
-    assert all(one.against.is_too_much for one in infer_new_flights({"wind": {}}))
+    assert all(one.counterevidence.is_too_much for one in infer_new_flights({"wind": {}}))
 
 
 def test_a_file_that_is_there_is_refused_before_the_work(tmp_path, monkeypatch, capsys):

@@ -2,7 +2,7 @@
 
 `infer` adds effects one by one while each gains enough (`_likeliest`), a third only where two do not suffice. What
 speaks against effects is measured in two ways, each with its limit: what a nameless disturbance gains beside them
-(`_nameless`), and how far the flight lies from them (`_distance`).
+(`_nameless_gain`), and how far the flight lies from them (`_excess_distance`).
 """
 
 from collections import Counter
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
@@ -54,15 +54,15 @@ TEMPERATURE = 2.0
 class Inference:
     """What the relations of a flight's signals show.
 
-    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; against: what
-    speaks against the likeliest effects, the gain of a nameless disturbance beside them or the flight's distance from
-    them, whichever is the larger part of its limit; readings: parameters of the likeliest effects, of those that the
-    library is calibrated for; without_sign: those of these effects whose sign does not show.
+    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; counterevidence:
+    against the likeliest effects, the gain of a nameless disturbance beside them or the flight's excess distance from
+    them, whichever is larger relative to its limit; readings: parameters of the likeliest effects, of those that the
+    library is calibrated for, by effect and parameter; without_sign: those of these effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
-    against: Against
+    counterevidence: Counterevidence
     readings: Mapping[str, Reading] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
 
@@ -86,9 +86,9 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     many = len(coordinates)
     flight = FlightHypotheses(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
     singles = flight.single_effects()
-    best, against = _likeliest(flight, singles, library)
+    best, counterevidence = _likeliest(flight, singles, library)
     return Inference(
-        classes=best.classes, evidence=_by_effect(singles), against=against,
+        classes=best.classes, evidence=_by_effect(singles), counterevidence=counterevidence,
         readings=_readings(best), without_sign=_without_sign(best))
 
 
@@ -113,25 +113,26 @@ def _calibrated(best: Hypothesis) -> list[tuple[str, Readout, np.ndarray]]:
             if c.calibration.readout is not None]
 
 
-def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
-    """What speaks against effects, by the measure that is nearer to its limit or farther beyond."""
-    return max(_nameless(flight, best), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
+def _counterevidence(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
+    """The evidence against effects, by the measure of the two that is larger relative to its limit."""
+    of_two = _nameless_gain(flight, best), _excess_distance(flight, best, library)
+    return max(of_two, key=lambda c: c.nats / c.limit)
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis) -> Against:
+def _nameless_gain(flight: FlightHypotheses, best: Hypothesis) -> Counterevidence:
     """What a nameless disturbance gains beside effects."""
     of_classes = max((c.calibration.nameless_share for c in best.classes), default=0.0)
     share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
-    return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
-                   of_distance=False)
+    return Counterevidence(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
+                           of_distance=False)
 
 
-def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
+def _excess_distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
     """How much farther a flight lies from effects than nominal flights from none."""
     of_classes = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
     share = float(np.hypot(of_classes, library.pair_distance_scatter * (len(best.fits) > 1)))
     limit = MOST_SCATTERS * library.distance_scatter(share, best.evidence)
-    return Against(library.excess(flight.squared_distance(best)), limit, of_distance=True)
+    return Counterevidence(library.excess(flight.squared_distance(best)), limit, of_distance=True)
 
 
 def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
@@ -145,22 +146,23 @@ def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library) -> tuple[Hypothesis, Against]:
+def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library,
+               ) -> tuple[Hypothesis, Counterevidence]:
     """The likeliest hypothesis, with no more effects than its evidence supports, and what speaks against it.
 
     A second effect is always tried, a third only where too much speaks against the two. A third is tried beside the
     chosen two alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
     """
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
-        return flight.none, _against(flight, flight.none, library)
-    best, beam, against = _by_thing(singles, library), singles[:BEAM], None
-    while len(best.fits) < MOST_EFFECTS and (against is None or against.is_too_much):
+        return flight.none, _counterevidence(flight, flight.none, library)
+    best, beam, counterevidence = _by_thing(singles, library), singles[:BEAM], None
+    while len(best.fits) < MOST_EFFECTS and (counterevidence is None or counterevidence.is_too_much):
         larger = _with_one_more(flight, beam)
         first = _by_thing(larger, library) if larger else None
         if first is None or first.evidence < _required_of_one_more(flight, best):
             break
-        best, beam, against = first, [first], _against(flight, first, library)
-    return best, _against(flight, best, library) if against is None else against
+        best, beam, counterevidence = first, [first], _counterevidence(flight, first, library)
+    return best, _counterevidence(flight, best, library) if counterevidence is None else counterevidence
 
 
 def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
