@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import CORRELATION_S, nominal_jitter_s
+from airtouch.gap.evidence.clock import CORRELATION_S, nominal_time_rms_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import whole_of
@@ -93,7 +93,7 @@ def from_times(data: Data, term: Term) -> Estimate:
         inverse = lost_fraction * samples / (2.0 * length - 1.0)  # of the relative variance
     else:
         independent, (jitter_s,) = samples / (CORRELATION_S / PERIOD_S), (term.values[p] for p in term.free)
-        inverse = 2.0 * independent / (1.0 + (nominal_jitter_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2
+        inverse = 2.0 * independent / (1.0 + (nominal_time_rms_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2
     x = term.scaled(term.values)
     return Estimate(x, np.diag(x ** 2 / max(inverse, 1.0)))
 

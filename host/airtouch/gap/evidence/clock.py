@@ -31,25 +31,31 @@ class TimesFault(NamedTuple):
     gain: float
 
 
-def nominal_jitter_s(study: Study) -> float:
-    """Rms (s) of the logged times around regular ones in nominal flights."""
+def nominal_time_rms_s(study: Study) -> float:
+    """Rms, s, of the logged times minus regular ones in nominal flights; their mean is not removed.
+
+    It is LEAST_JITTER_S at least.
+    """
     return max(study.floor.clock_s, LEAST_JITTER_S)
 
 
 def jitter(data: Data) -> TimesFault:
-    """Jitter of the logged times: its size is their standard deviation (s) beyond the rms of nominal flights.
+    """Jitter of the logged times.
 
-    The gain is that of normal times whose variance is the measured one, over nominal ones: of n independent values
-    n/2 (r - 1 - log r), where r is the ratio of the variances.
+    Its size s is the standard deviation of the times beyond the rms of nominal ones: s^2 = deviation^2 - rms^2.
+    The deviation is about the mean, the rms about 0: a constant offset of the flights' times is no jitter.
+
+    The gain is that of normal times with this deviation, over normal times with the nominal rms: of n independent
+    values n/2 (r - 1 - log r), where r is the ratio of the variances.
     """
-    nominal = nominal_jitter_s(data.study)
-    clock = np.concatenate([f.clock_s for f in data.flights])
-    measured = float(np.std(clock))
-    if measured <= nominal:
+    nominal_rms_s = nominal_time_rms_s(data.study)
+    times = np.concatenate([f.clock_s for f in data.flights])
+    deviation_s = float(np.std(times))
+    if deviation_s <= nominal_rms_s:
         return TimesFault(0.0, 0.0)
-    n = len(clock) * PERIOD_S / CORRELATION_S
-    gain = 0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal))
-    return TimesFault(float(np.sqrt(measured ** 2 - nominal ** 2)), float(gain))
+    n = len(times) * PERIOD_S / CORRELATION_S
+    gain = 0.5 * n * ((deviation_s / nominal_rms_s) ** 2 - 1.0 - 2.0 * np.log(deviation_s / nominal_rms_s))
+    return TimesFault(float(np.sqrt(deviation_s ** 2 - nominal_rms_s ** 2)), float(gain))
 
 
 def loss(data: Data) -> TimesFault:

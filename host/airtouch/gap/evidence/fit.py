@@ -14,7 +14,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.gauss_newton import ITERATIONS, Posterior, gauss_newton, start_of
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, problem_of
-from airtouch.gap.evidence.random_strength import with_strengths
+from airtouch.gap.evidence.random_strength import fit_strengths
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
@@ -68,7 +68,7 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     random_power: np.ndarray | float = 0.0
     # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
-        random = with_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
+        random = fit_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
         random_power = problem.random_power(random)
     best, highest = None, -np.inf
     for _ in range(1 if brief else TURNS):
@@ -77,7 +77,7 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
-        random = with_strengths(problem, random, solution.residual, active)
+        random = fit_strengths(problem, random, solution.residual, active)
         random_power, of_loop = problem.random_power(random), problem.loop_change(active, uncertain_floor=True)
         level = problem.likelihood(solution.residual, random_power + of_loop.extra_power) - of_loop.cost \
             - 0.5 * float(np.sum(np.square(x / prior_std)))

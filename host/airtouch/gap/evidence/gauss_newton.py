@@ -110,8 +110,9 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
-        slopes_are_new = stuck or np.array_equal(now.x, slopes.at)
-        if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
+        gained_too_little = gained and before - now.cost < LEAST_STEP_GAIN
+        failed_with_new_slopes = not gained and (stuck or np.array_equal(now.x, slopes.at))
+        if gained_too_little or failed_with_new_slopes:
             break
         stuck = not gained
     return MeanFit(now.x, covariance, now.residual)

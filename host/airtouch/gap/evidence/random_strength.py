@@ -25,8 +25,8 @@ LEAST_CURVATURE = 1e-6
 CURVATURE_STEP = 0.15
 
 
-def with_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
-                   ) -> list[Term]:
+def fit_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
+                  ) -> list[Term]:
     """Random effects with their likeliest strengths, fitted one after another, the others as they are.
 
     residual (n,): under the mean effects `mean`.
@@ -35,11 +35,11 @@ def with_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarra
     for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
         for i, term in enumerate(fitted):
             others = of_loop + problem.random_power([*fitted[:i], *fitted[i + 1:]])
-            fitted[i] = strongest(problem, term, residual, others)
+            fitted[i] = fit_strength(problem, term, residual, others)
     return fitted
 
 
-def strongest(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
+def fit_strength(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
     """A random effect with its likeliest strength; unchanged where it adds no power.
 
     residual (n,); extra_power (n,): that of the other effects.
