@@ -19,7 +19,7 @@ from airtouch.gap.answer.estimates import (
     with_reading,
 )
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.evidence.clock import CORRELATION_S, clock_gain
+from airtouch.gap.evidence.clock import CORRELATION_S, measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail_scale
@@ -170,7 +170,7 @@ def test_nine_in_ten_intervals_of_a_jitter_hold_the_truth(true_s):
     for _ in range(2000):
         clock_s = rng.normal(0.0, np.hypot(true_s, nominal_s), independent).repeat(each)
         data = SimpleNamespace(flights=[Times(clock_s)], study=study(nominal_s))
-        fitted, _ = clock_gain(data, term)
+        fitted, _ = measured_clock_term(data, term)
         interval = fitted.quantities(*from_times(data, fitted))[fitted.free[0]]
         held.append(interval.low < true_s < interval.high)
     assert np.mean(held) == pytest.approx(0.9, abs=0.03)

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.evidence import fit as fit_module
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import SETTLED, converged, fit
+from airtouch.gap.evidence.fit import LEAST_TURN_GAIN, converged, fit
 from airtouch.gap.evidence.gauss_newton import gauss_newton
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
@@ -67,8 +67,8 @@ def test_a_fit_goes_on_until_it_stands_still(study):
     refit = fit(data, blocks, result.terms, result.scaled)
     level = judge(data, blocks, result.terms)
     assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
-    assert judge(data, blocks, refit.terms) < level + SETTLED
-    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED
+    assert judge(data, blocks, refit.terms) < level + LEAST_TURN_GAIN
+    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - LEAST_TURN_GAIN
 
 
 @pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])

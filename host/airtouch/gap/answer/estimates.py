@@ -14,7 +14,7 @@ overlap of its blocks make it a little too sure; those of the first two hold 94 
 derives and checks both). Real flights scatter beyond that noise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -98,8 +98,10 @@ def from_times(data: Data, term: Term) -> Estimate:
     return Estimate(x, np.diag(x ** 2 / max(inverse, 1.0)))
 
 
-def with_reading(term: Term, estimate: Estimate, reading: Reading) -> Estimate:
+def with_reading(term: Term, estimate: Estimate, reading: Mapping[str, Reading]) -> Estimate:
     """An estimate by the replay and by the relations of signals together; unchanged without a reading.
+
+    reading: by parameter.
 
     Both are weighted by precision (the update of a Kalman filter), so that parameters that the replay knows as a sum or
     a product move together. Where the two differ by more than their errors, chi^2 of k parameters above k, the
@@ -110,8 +112,8 @@ def with_reading(term: Term, estimate: Estimate, reading: Reading) -> Estimate:
     if not read:
         return estimate
     measured = replace(term, free=tuple(term.free[i] for i in read))
-    value = measured.scaled({name: reading[name][0] for name in measured.free})
-    variance = np.diag([(reading[name][1] / term.step(name)) ** 2 for name in measured.free])
+    value = measured.scaled({name: reading[name].value for name in measured.free})
+    variance = np.diag([(reading[name].deviation / term.step(name)) ** 2 for name in measured.free])
     precision = np.linalg.inv(covariance[np.ix_(read, read)] + variance)
     gain, apart = covariance[:, read] @ precision, value - x[read]
     wider = max(1.0, float(apart @ precision @ apart) / len(read))

@@ -14,7 +14,7 @@ from airtouch.gap.study import Study
 
 #: least fraction of lost samples that nominal flights are taken to have, without a model of the loop and with one; both
 #: chosen, as a few flights may have lost none. A larger number overlooks small losses
-LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
+LEAST_LOSS, LEAST_LOSS_WITH_LOOP = 1e-3, 3e-4
 #: samples that count as one independent value of being lost; chosen, as losses come in runs. A larger number gives a
 #: loss less evidence
 SAMPLES_OF_ONE = 2.0
@@ -64,7 +64,7 @@ def loss(data: Data) -> TimesFault:
     The gain is that of samples each lost with the measured fraction, over the nominal one (binomial).
     """
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
-    least = LEAST_LOST if data.study.loop is None else LEAST_LOST_OF_LOOP
+    least = LEAST_LOSS if data.study.loop is None else LEAST_LOSS_WITH_LOOP
     fraction, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if fraction <= nominal:
         return TimesFault(fraction, 0.0)
@@ -80,7 +80,7 @@ class MeasuredTerm(NamedTuple):
     gain: float
 
 
-def clock_gain(data: Data, term: Term) -> MeasuredTerm:
+def measured_clock_term(data: Data, term: Term) -> MeasuredTerm:
     """The effect with the size of the fault that it stands for: of lost rows or of jitter."""
     fault = loss(data) if term.signature.loses_rows else jitter(data)
     return MeasuredTerm(term.fitted(np.array([fault.size / term.step(term.free[0])])), fault.gain)
@@ -88,10 +88,10 @@ def clock_gain(data: Data, term: Term) -> MeasuredTerm:
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
     """Nats that those terms gain together which act on the logged times."""
-    return sum(clock_gain(data, t).gain for t in terms if t.shows_in == CLOCK)
+    return sum(measured_clock_term(data, t).gain for t in terms if t.shows_in == CLOCK)
 
 
-def clock_left(data: Data, terms: Sequence[Term]) -> float:
+def unexplained_clock_gain(data: Data, terms: Sequence[Term]) -> float:
     """Nats that jitter and lost rows gain over nominal ones, without those of the faults that effects explain."""
     of_times = [t for t in terms if t.shows_in == CLOCK]
     loss_explained = any(t.signature.loses_rows for t in of_times)

@@ -21,9 +21,9 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 # Of these three, all chosen, a larger number needs more memory, a smaller one computes more spectra anew.
-KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights of KEPT_SAMPLES or less
-KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached
-LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are
+CACHED_HYPOTHESES = 96  #: hypotheses whose spectra are cached, of flights of CACHED_SAMPLES or less
+CACHED_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached
+LEAST_CACHED_HYPOTHESES = 8  #: hypotheses whose spectra are cached, however long the flights are
 Spectra = dict[str, np.ndarray]  #: of one flight by state (AIR, REST), complex (blocks, bins, COUNT), unit/sqrt(Hz)
 BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
@@ -199,10 +199,10 @@ def _cached(data: Data, name: str, i: int, active: Sequence[Active], make: Calla
     """Spectra of flight i under a hypothesis, made once while it is among the last used; of no effect always.
 
     The key is the flight's index with the names and values of the effects (`Active.key`), never the identity of an
-    object. Those of KEPT_SPECTRA hypotheses are kept, of fewer where all flights have more than KEPT_SAMPLES.
+    object. Those of CACHED_HYPOTHESES hypotheses are kept, of fewer where all flights have more than CACHED_SAMPLES.
     """
     if not active:
         return data.workspace.cached(f"{name} of no effect", i, make)
     samples, n = sum(len(f) for f in data.flights), len(data.flights)
-    hypotheses = max(KEPT_SPECTRA * KEPT_SAMPLES // max(samples, KEPT_SAMPLES), LEAST_KEPT)
+    hypotheses = max(CACHED_HYPOTHESES * CACHED_SAMPLES // max(samples, CACHED_SAMPLES), LEAST_CACHED_HYPOTHESES)
     return data.workspace.cached(name, (i, *(a.key for a in active)), make, hypotheses * n)

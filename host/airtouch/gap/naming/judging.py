@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import clock_gain, clock_gains
+from airtouch.gap.evidence.clock import clock_gains, measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.judge import cell_gains, judge
@@ -99,7 +99,7 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
         gain = _charged_gain(trial, fits, charges, clock_gains(trial.data, before))
-    of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
+    of_clock = [measured_clock_term(trial.data, t).term for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)

@@ -37,17 +37,18 @@ NAMELESS_MARGIN = 30.0
 #: chosen on flights of `learning.SEED`. A larger number answers `unknown` less often
 MODEL_ERROR_SHARE = 0.01
 PAIR_ERROR_SHARE = 0.01  #: share added once more for several effects, as two effects are not their sum; chosen there
-#: standard deviations of the distance of right effects. A flight may lie as far from the effects named; farther ones
-#: are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because they
-#: hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves)
-MOST_SCATTERS = 3.5
+#: standard deviations of the excess distance of right effects. A flight may lie as far from the effects named; farther
+#: ones are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because
+#: they hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves). A larger number
+#: answers `unknown` less often
+MOST_EXCESS_DEVIATIONS = 3.5
 MOST_EFFECTS = 3  #: effects that are named together, at most; chosen. Each more costs a round of fits
 #: hypotheses to which one more effect is added, and additions to each that are fitted in turn; chosen. A larger number
 #: takes more time
-BEAM = 3
+BEAM_WIDTH = 3
 #: divisor of the evidence in probabilities, as the densities' tails are heavier than normal; chosen. A larger number
 #: makes probabilities less certain
-TEMPERATURE = 2.0
+EVIDENCE_TEMPERATURE = 2.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Inference:
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
     counterevidence: Counterevidence
-    readings: Mapping[str, Reading] = field(default_factory=dict)
+    readings: Mapping[str, Mapping[str, Reading]] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
 
     @property
@@ -77,14 +78,14 @@ class Inference:
         `none` counts as an effect of LEAST_EVIDENCE: an effect that has just enough evidence is as likely as none.
         """
         names = [*self.evidence, "none"]
-        score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / TEMPERATURE
+        score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / EVIDENCE_TEMPERATURE
         return dict(zip(names, np.exp(score - logsumexp(score)).tolist(), strict=True))
 
 
 def infer(library: Library, coordinates: np.ndarray) -> Inference:
     """Infer the effects that flights with coordinates (n, Q) have in common."""
-    many = len(coordinates)
-    flight = FlightHypotheses(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
+    count = len(coordinates)
+    flight = FlightHypotheses(np.sqrt(count) * coordinates.mean(axis=0), model_of_mean(library.model, count))
     singles = flight.single_effects()
     best, counterevidence = _likeliest(flight, singles, library)
     return Inference(
@@ -92,8 +93,8 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
         readings=_readings(best), without_sign=_without_sign(best))
 
 
-def _readings(best: Hypothesis) -> Mapping[str, Reading]:
-    """Parameters of the effects of a hypothesis.
+def _readings(best: Hypothesis) -> Mapping[str, Mapping[str, Reading]]:
+    """Parameters of the effects of a hypothesis, by effect and name.
 
     An effect of which several parameters act gives none: each was calibrated acting alone.
     """
@@ -121,28 +122,28 @@ def _counterevidence(flight: FlightHypotheses, best: Hypothesis, library: Librar
 
 def _nameless_gain(flight: FlightHypotheses, best: Hypothesis) -> Counterevidence:
     """What a nameless disturbance gains beside effects."""
-    of_classes = max((c.calibration.nameless_share for c in best.classes), default=0.0)
-    share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
+    largest = max((c.calibration.nameless_share for c in best.classes), default=0.0)
+    share = largest + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
     return Counterevidence(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
                            of_distance=False)
 
 
 def _excess_distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
     """How much farther a flight lies from effects than nominal flights from none."""
-    of_classes = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
-    share = float(np.hypot(of_classes, library.pair_distance_scatter * (len(best.fits) > 1)))
-    limit = MOST_SCATTERS * library.distance_scatter(share, best.evidence)
+    largest = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
+    distance_scatter = float(np.hypot(largest, library.pair_distance_scatter * (len(best.fits) > 1)))
+    limit = MOST_EXCESS_DEVIATIONS * library.excess_deviation(distance_scatter, best.evidence)
     return Counterevidence(library.excess(flight.squared_distance(best)), limit, of_distance=True)
 
 
-def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
-    """The model of the mean of `many` flights times the square root of their number.
+def model_of_mean(model: LearnedModel, count: int) -> LearnedModel:
+    """The model of the mean of `count` flights times the square root of their number.
 
     Nominal scatter stays as it is, shifts are longer by that root, and single flights lie about them as before.
     """
-    if many == 1:
+    if count == 1:
         return model
-    return replace(model, classes=tuple(replace(c, table=np.sqrt(many) * c.table, variances=c.variances / many)
+    return replace(model, classes=tuple(replace(c, table=np.sqrt(count) * c.table, variances=c.variances / count)
                                         for c in model.classes))
 
 
@@ -151,14 +152,15 @@ def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Lib
     """The likeliest hypothesis, with no more effects than its evidence supports, and what speaks against it.
 
     A second effect is always tried, a third only where too much speaks against the two. A third is tried beside the
-    chosen two alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
+    chosen two alone, a second beside each of the BEAM_WIDTH likeliest: which of them is right may show only with the
+    second.
     """
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
-        return flight.none, _counterevidence(flight, flight.none, library)
-    best, beam, counterevidence = _by_thing(singles, library), singles[:BEAM], None
+        return flight.no_effect, _counterevidence(flight, flight.no_effect, library)
+    best, beam, counterevidence = _likeliest_name(singles, library), singles[:BEAM_WIDTH], None
     while len(best.fits) < MOST_EFFECTS and (counterevidence is None or counterevidence.is_too_much):
         larger = _with_one_more(flight, beam)
-        first = _by_thing(larger, library) if larger else None
+        first = _likeliest_name(larger, library) if larger else None
         if first is None or first.evidence < _required_of_one_more(flight, best):
             break
         best, beam, counterevidence = first, [first], _counterevidence(flight, first, library)
@@ -176,8 +178,8 @@ def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
                flight.nameless_evidence(best) + NAMELESS_MARGIN)
 
 
-def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
-    """The likeliest name of the likeliest thing: hypotheses that are names of one thing count together.
+def _likeliest_name(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
+    """The likeliest hypothesis of the likeliest thing: hypotheses that are names of one thing count together.
 
     Each has the weight that the choice among the classes of its effects leaves; evidence counts as in probabilities.
     """
@@ -189,8 +191,9 @@ def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
         else:
             alike.append(h)
     cost = library.choice_cost
-    weights = [logsumexp([h.evidence / TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group])
-               for group in groups]
+    log_weights = [[h.evidence / EVIDENCE_TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group]
+                   for group in groups]
+    weights = [logsumexp(of_group) for of_group in log_weights]
     return max(groups[int(np.argmax(weights))], key=lambda h: h.evidence)
 
 
@@ -199,10 +202,10 @@ def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hyp
 
     Of the same classes, reached from two hypotheses of the beam, the likelier is kept.
     """
-    extended = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM]),
+    extended = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM_WIDTH]),
                       key=lambda h: h.evidence)
     by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in extended}
-    likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
+    likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM_WIDTH]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
 
@@ -211,7 +214,7 @@ def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
 
     It may not be another name of an effect in it; it may be another parameter of one, if each parameter has a class.
     """
-    another = other.of_one_parameter and other.name not in hypothesis.names
+    another = other.own_parameter is not None and other.name not in hypothesis.names
     return all(not interchangeable(other.effect, e) or (another and other.effect == e) for e in hypothesis.effect_names)
 
 
