@@ -55,7 +55,7 @@ class Data:
         return sum(len(f) for f in self.flights) * PERIOD_S
 
     @cached_property
-    def first(self) -> list[BlockStarts]:
+    def block_starts(self) -> list[BlockStarts]:
         """First sample of each block, by flight and state."""
         return [{state: starts(f, state) for state in (AIR, REST)} for f in self.flights]
 
@@ -63,7 +63,7 @@ class Data:
     def measured_torque(self) -> list[np.ndarray]:
         """Spectra (blocks, bins, 3) in the air of the measured angular acceleration, by flight."""
         return [short_time_spectra(angular_acceleration(f), first[AIR], AIR)
-                for f, first in zip(self.flights, self.first, strict=True)]
+                for f, first in zip(self.flights, self.block_starts, strict=True)]
 
     @cached_property
     def quiet(self) -> list[np.ndarray]:
@@ -80,7 +80,7 @@ class Data:
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         return [bridging_power(f, study.vehicle, study.calibration, first[AIR], where, study.response)
-                for f, first, where in zip(self.flights, self.first, quiet, strict=True)]
+                for f, first, where in zip(self.flights, self.block_starts, quiet, strict=True)]
 
     @cached_property
     def residual(self) -> list[Spectra]:
@@ -188,7 +188,7 @@ def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
     flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
     bridged = bridged_residual(flight, (*data.study.calibration, *active))
     out = {}
-    for state, begin in data.first[i].items():  # the command view judges the commands: here they stay 0
+    for state, begin in data.block_starts[i].items():  # the command view judges the commands: here they stay 0
         replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, state)
         out[state] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[state][:, :, :COMMAND.start] = replayed

@@ -13,10 +13,13 @@ from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects import Active
 
-STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen for time
+#: rounds in which the strengths of several random effects are fitted in turn; chosen for time. A smaller number ends
+#: fits of effects that trade against each other too early
+STRENGTH_ROUNDS = 4
 GRID_SIZE = 40  #: strengths that are tried before the best is refined; chosen. With fewer a lower peak may be refined
 LEAST_STRENGTH = 0.003  #: least of them, natural steps; chosen. An effect that is not there is given this strength
-LARGEST_STRENGTH = 1e3  #: largest of them, natural steps; chosen, beyond what flights show
+#: largest of them, natural steps; chosen, beyond what flights show. A larger number makes the grid coarser
+LARGEST_STRENGTH = 1e3
 #: least curvature of the likelihood in the logarithm of a strength, nats; chosen: it gives a standard deviation of a
 #: thousand times the strength, which says nothing
 LEAST_CURVATURE = 1e-6

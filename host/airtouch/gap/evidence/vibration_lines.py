@@ -124,7 +124,7 @@ def _search(data: Data) -> Lines:
     """
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
-    powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
+    powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.block_starts, strict=True)]
     speed_known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
     turns = hover / (2.0 * np.pi)
     reach = int(min(np.ceil(SPEED_ERROR * turns * PERIOD_S * BINS), BINS // 2)) if speed_known else BINS // 2

@@ -69,7 +69,7 @@ def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     by_flight = len(data.flights) >= HALVED_BY_FLIGHT
     pieces: tuple[list, list] = ([], [])
-    counts = [(i, state, len(f[state])) for i, f in enumerate(data.first) for state in (AIR, REST)]
+    counts = [(i, state, len(f[state])) for i, f in enumerate(data.block_starts) for state in (AIR, REST)]
     for i, state, n in counts:
         if n and by_flight:
             pieces[i % 2].append((i, state, np.ones(n, bool)))

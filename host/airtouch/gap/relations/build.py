@@ -7,7 +7,7 @@ The flights' seed is no sealed set's (`learning.SEED`), so that the file is the 
 Whitened features (F of them) have the covariance 1 in nominal flights. What is stored is their projection on the Q
 directions in which effects and nameless disturbances move them.
 
-How many flights it takes and how many directions are kept is in `settings`. The thresholds below were chosen with
+How many flights it takes and how many directions are stored is in `settings`. The thresholds below were chosen with
 the library of 2026-11-24, on flights of `learning.SEED` alone (host/docs/looks.md, 12:43 UTC of that day). What other
 values were tried is not recorded.
 """
@@ -91,12 +91,12 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, progress: Progress = 
     progress: called with the name of each step.
     """
     progress("nominal flights")
-    flown = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
-    features = np.array(list(flown.values()))
+    by_number = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
+    features = np.array(list(by_number.values()))
     standard = standard_of(features)
     whitening = Whitening(standard, cholesky_factor(standard(features)))
-    nominal = dict(zip(flown, whitening(features), strict=True))
-    middle = np.mean(list(nominal.values()), axis=0)
+    nominal = dict(zip(by_number, whitening(features), strict=True))
+    nominal_mean = np.mean(list(nominal.values()), axis=0)
     paired = []
     for drawing in all_drawings():
         progress(f"{drawing.name} {drawing.shape or ''}")
@@ -108,7 +108,7 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, progress: Progress = 
                       settings.directions_of_nameless)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(HALF_PRECISION).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(_class_of(p, axes, middle) for p in paired)
+    classes = tuple(_class_of(p, axes, nominal_mean) for p in paired)
     coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
     additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
                             nameless=nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
@@ -121,13 +121,13 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, progress: Progress = 
     return calibrated(scene, read(packed(library)), settings.calibration, progress)  # as it will be read, rounded
 
 
-def _class_of(paired: PairedFlights, axes: np.ndarray, middle: np.ndarray) -> EffectClass:
-    """The class of paired flights in the coordinates along axes (F, Q); middle (F,): mean of nominal flights.
+def _class_of(paired: PairedFlights, axes: np.ndarray, nominal_mean: np.ndarray) -> EffectClass:
+    """The class of paired flights in the coordinates along axes (F, Q); nominal_mean (F,): of whitened features.
 
     Raises AirTouchError where too few of the flights show the effect.
     """
     drawing = paired.drawing
-    flights = ClassFlights(paired.amount, paired.shift @ axes, (paired.whitened - middle) @ axes)
+    flights = ClassFlights(paired.amount, paired.shift @ axes, (paired.whitened - nominal_mean) @ axes)
     learned = learn_class(drawing.name, drawing.kind.effect, drawing.shape, flights)
     if learned is None:
         raise AirTouchError(f"too few flights show {drawing.name}: fly more for each knot")
@@ -142,19 +142,19 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     low = min(weakest_strength(high, partial(_shifts, scene, whitening, few, drawing)), high / KNOT_FACTOR)
     of_direction = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
     count = int(of_direction * settings.flights_per_knot * (np.log(high / low) / KNOT + 1.0))
-    flown = [f for f in drawn_flights(scene, drawing, (low, high), count) if f.number in nominal]
-    amount = np.array([scaled(drawing, f.active) for f in flown])
-    whitened = whitening(np.array([f.features for f in flown]))
-    shift = whitened - np.array([nominal[f.number] for f in flown])
+    flights = [f for f in drawn_flights(scene, drawing, (low, high), count) if f.number in nominal]
+    amount = np.array([scaled(drawing, f.active) for f in flights])
+    whitened = whitening(np.array([f.features for f in flights]))
+    shift = whitened - np.array([nominal[f.number] for f in flights])
     return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
 
 
 def _shifts(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, strength: float,
             ) -> list[np.ndarray]:
     """Whitened shifts (F,) by a class at a strength, of the flights of these numbers that end well."""
-    flown = ((i, fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))]))
+    features = ((i, fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))]))
              for i in nominal)
-    return [whitening(f)[0] - nominal[i] for i, f in flown if f is not None]
+    return [whitening(f)[0] - nominal[i] for i, f in features if f is not None]
 
 
 def nameless_loadings(shift: np.ndarray) -> np.ndarray:
@@ -197,8 +197,8 @@ def loadings_beyond_noise(values: np.ndarray, noise: float) -> np.ndarray:
     """
     samples, dimensions = values.shape
     _, deviation, axes = np.linalg.svd(values / np.sqrt(samples), full_matrices=False)
-    stands = stands_out(deviation ** 2, noise, dimensions, samples)
-    return axes[stands].T * np.sqrt(deviation[stands] ** 2 - noise)
+    beyond = stands_out(deviation ** 2, noise, dimensions, samples)
+    return axes[beyond].T * np.sqrt(deviation[beyond] ** 2 - noise)
 
 
 def _residual_of_two(model: LearnedModel, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:

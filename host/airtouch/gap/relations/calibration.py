@@ -75,35 +75,37 @@ def calibrate_class(scene: Scene, library: Library, place: int, drawing: Drawing
     """Measure the class at a place of the library."""
     flights = _calibration_flights(scene, library, place, drawing, settings)
     return ClassCalibration(
-        readout_of(drawing, flights, settings.least_flights), share_of((f.nameless, f.evidence) for f in flights),
-        share_of((f.second, f.evidence) for f in flights if f.second is not None),
+        readout_of(drawing, flights, settings.least_flights), share_of((f.nameless_gain, f.evidence) for f in flights),
+        share_of((f.second_gain, f.evidence) for f in flights if f.second_gain is not None),
         likeliest_distance_scatter(np.array([f.excess for f in flights]), np.array([f.evidence for f in flights]),
                                    library.nominal_excess_deviation))
 
 
 def nominal_distance(scene: Scene, coordinates: Coordinates, count: int) -> NominalDistance:
-    """The distance of nominal flights by so many of them, the standard deviation from the middle two thirds."""
-    flown = [f for i in range(count) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
-    squared = (coordinates(np.array(flown)) ** 2).sum(axis=1)
-    low, high = np.quantile(squared, MIDDLE_TWO_THIRDS)
-    return NominalDistance(float(np.median(squared)), float(0.5 * (high - low)))
+    """The squared distance of nominal flights: its median, and its standard deviation by the middle two thirds.
+
+    count: of flights that are flown for it.
+    """
+    features = [f for i in range(count) if (f := fly(scene, FIRST_NOMINAL + i)) is not None]
+    squared_distance = (coordinates(np.array(features)) ** 2).sum(axis=1)
+    low, high = np.quantile(squared_distance, MIDDLE_TWO_THIRDS)
+    return NominalDistance(float(np.median(squared_distance)), float(0.5 * (high - low)))
 
 
 @dataclass(frozen=True)
 class CalibrationFlight:
     """A flight that shows an effect, with the class of that effect fitted to it.
 
-    strength (s,): of the class, as fitted; amount (p,): true parameters (`learning.scaled`). In nats: evidence for the
-    class; what a nameless disturbance gains beside it (nameless) and what a second effect gains (second, None
-    where none was tried); excess, by which the flight lies farther from the class than the median nominal flight from
-    none.
+    strength (s,): of the class, as fitted; amount (p,): true parameters (`learning.scaled`). In nats: evidence: for the
+    class; nameless_gain: of a nameless disturbance beside it; second_gain: of a second effect beside it, None where
+    none was tried; excess: the flight's excess distance from the class (`Library.excess`).
     """
 
     strength: np.ndarray
     amount: np.ndarray
     evidence: float
-    nameless: float
-    second: float | None
+    nameless_gain: float
+    second_gain: float | None
     excess: float
 
 
@@ -132,7 +134,7 @@ def _calibration_flights(scene: Scene, library: Library, place: int, drawing: Dr
     def fly_and_fit(strength: float) -> FittedFlight | None:
         """A flight with the effect at a strength, and the class fitted to it; None where it does not end well."""
         active = drawing.active(strength, rng)
-        flight = _flown(scene, library, next(numbers), [active])
+        flight = _hypotheses_on_flight(scene, library, next(numbers), [active])
         return None if flight is None else FittedFlight(active, flight, flight.with_class(own))
 
     low = min(weakest_detected_strength(fly_and_fit, high, settings.flights_per_strength), HIGHEST_START * high)
@@ -154,8 +156,8 @@ def weakest_detected_strength(fly_and_fit: Callable[[float], FittedFlight | None
     """
     def hides(strength: float) -> bool:
         """Whether fewer than DETECTION_RATE of the flights at a strength show the class."""
-        ended = [f for f in (fly_and_fit(strength) for _ in range(count)) if f is not None]
-        return bool(ended) and float(np.mean([f.shows for f in ended])) < DETECTION_RATE
+        flights = [f for f in (fly_and_fit(strength) for _ in range(count)) if f is not None]
+        return bool(flights) and float(np.mean([f.shows for f in flights])) < DETECTION_RATE
 
     return halved(highest, CALIBRATION_HALVINGS, hides)
 
@@ -163,21 +165,22 @@ def weakest_detected_strength(fly_and_fit: Callable[[float], FittedFlight | None
 def _calibration_flight(library: Library, drawing: Drawing, fitted: FittedFlight, with_second: bool,
                         ) -> CalibrationFlight:
     """The evidence for the class of a flight and beside it; with_second: whether a second effect is tried."""
-    flight, here, effect = fitted.flight, fitted.hypothesis, drawing.kind.effect
+    flight, hypothesis, effect = fitted.flight, fitted.hypothesis, drawing.kind.effect
     second = None
     if with_second:
-        two = flight.with_one_more(here, lambda c, _: not interchangeable(c.effect, effect))[0]
-        second = two.evidence - here.evidence
-    return CalibrationFlight(here.fits[0].strength, scaled(drawing, fitted.active), here.evidence,
-                             flight.nameless_evidence(here) - here.evidence, second,
-                             library.excess(flight.squared_distance(here)))
+        two = flight.with_one_more(hypothesis, lambda c, _: not interchangeable(c.effect, effect))[0]
+        second = two.evidence - hypothesis.evidence
+    return CalibrationFlight(hypothesis.fits[0].strength, scaled(drawing, fitted.active), hypothesis.evidence,
+                             flight.nameless_evidence(hypothesis) - hypothesis.evidence, second,
+                             library.excess(flight.squared_distance(hypothesis)))
 
 
 def share_of(gains: Iterable[tuple[float, float]]) -> float:
     """The share of a class's evidence that something beside it gains in most of its flights.
 
-    gains: for each flight what is gained and the evidence, nats. Chance gains NAMELESS_ALLOWANCE; one share of 0 is
-    always among those of which the quantile is taken, so that a class without flights has none.
+    gains: for each flight the gain beside the class and the evidence for the class, nats. Chance gains
+    NAMELESS_ALLOWANCE; one share of 0 is always among those of which the quantile is taken, so that a class without
+    flights has none.
     """
     shares = [max(gain - NAMELESS_ALLOWANCE, 0.0) / evidence for gain, evidence in gains]
     return float(np.quantile([0.0, *shares], QUANTILE_OF_SHARES))
@@ -222,7 +225,7 @@ def _pair_distance_scatter(scene: Scene, library: Library, drawings: Sequence[Dr
         a, b = two_of(drawings, rng)
         active = [d.active(log_uniform(d.kind.highest / RANGE_OF_TWO, d.kind.highest, rng), rng)
                   for d in (drawings[a], drawings[b])]
-        flight = _flown(scene, library, FIRST_OF_TWO + i, active)
+        flight = _hypotheses_on_flight(scene, library, FIRST_OF_TWO + i, active)
         if flight is None:
             continue
         one, two = (library.model.classes[j] for j in (a, b))
@@ -245,7 +248,8 @@ def two_of(drawings: Sequence[Drawing], rng: np.random.Generator) -> tuple[int, 
             return a, b
 
 
-def _flown(scene: Scene, library: Library, number: int, active: Sequence[Active]) -> FlightHypotheses | None:
+def _hypotheses_on_flight(scene: Scene, library: Library, number: int, active: Sequence[Active],
+                          ) -> FlightHypotheses | None:
     """A flight with effects, ready for hypotheses; None where it does not end well."""
     features = fly(scene, number, active)
     return None if features is None else FlightHypotheses(library.coordinates(features[None])[0], library.model)

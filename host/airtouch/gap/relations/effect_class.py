@@ -242,9 +242,9 @@ def _scatter(residual: np.ndarray, length: np.ndarray, coefficients: int) -> tup
     noise = float(np.mean(length[clear] ** -2.0))
     freedom = max(samples - coefficients * clear.mean(), 1.0)
     _, deviation, axes = np.linalg.svd(relative / np.sqrt(freedom), full_matrices=False)
-    stands = stands_out(deviation ** 2, noise, residual.shape[1], samples)
-    stands[MOST_AXES:] = False
-    return axes[stands].T, deviation[stands] ** 2 - noise
+    beyond = stands_out(deviation ** 2, noise, residual.shape[1], samples)
+    beyond[MOST_AXES:] = False
+    return axes[beyond].T, deviation[beyond] ** 2 - noise
 
 
 def stands_out(variance: np.ndarray, noise: float, dimensions: int, samples: int) -> np.ndarray:

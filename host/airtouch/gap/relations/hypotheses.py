@@ -115,10 +115,10 @@ class FlightHypotheses:
                 others = tuple(fits[:i] + fits[i + 1:])
                 rescaling, beside = self.rescaling(others), np.sum([o.shift for o in others], axis=0)
                 fits[i] = fit(f.effect_class, rescaling(self.values - beside), rescaling)
-            tried = self.at_fits(tuple(fits))
-            if tried.log_likelihood_ratio <= best.log_likelihood_ratio:
+            trial = self.at_fits(tuple(fits))
+            if trial.log_likelihood_ratio <= best.log_likelihood_ratio:
                 break
-            best = tried
+            best = trial
         return best
 
     def squared_distance(self, hypothesis: Hypothesis) -> float:

@@ -1,7 +1,7 @@
 """Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect.
 
-`infer` adds effects one by one while each gains enough (`_likeliest`), a third only where two do not suffice. What
-speaks against effects is measured in two ways, each with its limit: what a nameless disturbance gains beside them
+`infer` adds effects one by one while each gains enough (`_search`), a third only where two do not suffice. The
+counterevidence is measured in two ways, each with its limit: what a nameless disturbance gains beside the effects
 (`_nameless_gain`), and how far the flight lies from them (`_excess_distance`).
 """
 
@@ -36,7 +36,9 @@ NAMELESS_MARGIN = 30.0
 #: share that a nameless disturbance may gain beside the effects, added to that of their classes, as no curve is exact;
 #: chosen on flights of `learning.SEED`. A larger number answers `unknown` less often
 MODEL_ERROR_SHARE = 0.01
-PAIR_ERROR_SHARE = 0.01  #: share added once more for several effects, as two effects are not their sum; chosen there
+#: share that is added once more for several effects, as two effects are not their sum; chosen there. A larger number
+#: answers `unknown` less often
+PAIR_ERROR_SHARE = 0.01
 #: standard deviations of the excess distance of right effects. A flight may lie as far from the effects named; farther
 #: ones are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because
 #: they hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves). A larger number
@@ -87,7 +89,7 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     count = len(coordinates)
     flight = FlightHypotheses(np.sqrt(count) * coordinates.mean(axis=0), model_of_mean(library.model, count))
     singles = flight.single_effects()
-    best, counterevidence = _likeliest(flight, singles, library)
+    best, counterevidence = _search(flight, singles, library)
     return Inference(
         classes=best.classes, evidence=_by_effect(singles), counterevidence=counterevidence,
         readings=_readings(best), without_sign=_without_sign(best))
@@ -147,13 +149,13 @@ def model_of_mean(model: LearnedModel, count: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library,
-               ) -> tuple[Hypothesis, Counterevidence]:
-    """The likeliest hypothesis, with no more effects than its evidence supports, and what speaks against it.
+def _search(flight: FlightHypotheses, singles: list[Hypothesis], library: Library,
+            ) -> tuple[Hypothesis, Counterevidence]:
+    """The likeliest hypothesis, with no more effects than its evidence supports, and the counterevidence.
 
-    A second effect is always tried, a third only where too much speaks against the two. A third is tried beside the
-    chosen two alone, a second beside each of the BEAM_WIDTH likeliest: which of them is right may show only with the
-    second.
+    A second effect is always tried, a third only where the counterevidence to the two is too much. A third is tried
+    beside the chosen two alone, a second beside each of the BEAM_WIDTH likeliest: which of them is right may show only
+    with the second.
     """
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
         return flight.no_effect, _counterevidence(flight, flight.no_effect, library)
@@ -185,11 +187,11 @@ def _likeliest_name(hypotheses: Sequence[Hypothesis], library: Library) -> Hypot
     """
     groups: list[list[Hypothesis]] = []
     for h in hypotheses:
-        alike = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
-        if alike is None:
+        group = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
+        if group is None:
             groups.append([h])
         else:
-            alike.append(h)
+            group.append(h)
     cost = library.choice_cost
     log_weights = [[h.evidence / EVIDENCE_TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group]
                    for group in groups]
@@ -202,9 +204,9 @@ def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hyp
 
     Of the same classes, reached from two hypotheses of the beam, the likelier is kept.
     """
-    extended = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM_WIDTH]),
+    additions = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM_WIDTH]),
                       key=lambda h: h.evidence)
-    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in extended}
+    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in additions}
     likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM_WIDTH]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
@@ -219,8 +221,8 @@ def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
 
 
 def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
-    """Evidence for each effect, the mean of its classes' likelihoods."""
-    own: dict[str, list[float]] = {}
+    """Evidence for each effect, nats: the log of the mean of its classes' Bayes factors."""
+    by_effect: dict[str, list[float]] = {}
     for h in singles:
-        own.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
-    return {name: float(logsumexp(v) - np.log(len(v))) for name, v in own.items()}
+        by_effect.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
+    return {name: float(logsumexp(v) - np.log(len(v))) for name, v in by_effect.items()}

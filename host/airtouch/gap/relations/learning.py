@@ -15,7 +15,7 @@ from airtouch.gap.relations.readout import amount_of
 from airtouch.gap.signatures.random_draws import Kind, kinds_of, log_uniform, own_parameter
 from airtouch.gap.signatures.signature import free_of, signature_of
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.batch import flights as flown
+from airtouch.simulation.batch import flights as simulated_flights
 from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
 from airtouch.vehicle import Vehicle
 
@@ -54,7 +54,8 @@ class Scene:
 
 def fly(scene: Scene, number: int, active: Sequence[Active] = ()) -> np.ndarray | None:
     """Features (features,) of flight number `number` with effects; None where it does not end well."""
-    log = next(iter(flown(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED, workers=1)))
+    log = next(iter(simulated_flights(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED,
+                                      workers=1)))
     if not isinstance(log, FlightLog):
         return None
     try:
@@ -76,9 +77,9 @@ class Drawing:
 
     def active(self, strength: float, rng: np.random.Generator) -> Active:
         """The effect at a strength, its direction drawn."""
-        drawn = self.kind.active(strength, rng)
-        parameter = signature_of(drawn.effect).class_by
-        return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, parameter: self.shape})
+        active = self.kind.active(strength, rng)
+        parameter = signature_of(active.effect).class_by
+        return active if self.shape is None else Active(active.effect, {**active.values, parameter: self.shape})
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -136,18 +137,18 @@ def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float]
         shape = int(SEED_PER_SHAPE * (drawing.shape or 0.0))
         rng = np.random.default_rng([SEED, number, *drawing.name.encode(), shape])
         active = drawing.active(log_uniform(*strengths, rng), rng)
-        made = fly(scene, number, [active])
-        if made is not None:
-            yield DrawnFlight(number, active, made)
+        measured_features = fly(scene, number, [active])
+        if measured_features is not None:
+            yield DrawnFlight(number, active, measured_features)
 
 
 def disturbed_flights(scene: Scene, count: int) -> Iterator[DrawnFlight]:
     """Flights with a nameless disturbance, without those that do not end well."""
     for number in range(count):
         active = exposure.draw(np.random.default_rng([SEED, number, 1]))
-        made = fly(scene, number, [active])
-        if made is not None:
-            yield DrawnFlight(number, active, made)
+        measured_features = fly(scene, number, [active])
+        if measured_features is not None:
+            yield DrawnFlight(number, active, measured_features)
 
 
 def scaled(drawing: Drawing, active: Active) -> np.ndarray:

@@ -109,8 +109,8 @@ class Library:
 
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
-        middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_excess_deviation
+        median = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
+        return self.excess(median) < FARTHEST_NOMINAL * self.nominal_excess_deviation
 
     @property
     def effects(self) -> frozenset[str]:
@@ -124,8 +124,8 @@ class Library:
 
     def without(self, names: Iterable[str]) -> "Library":
         """The library without the classes of some effects."""
-        left_out = frozenset(names)
-        return self.with_classes(c for c in self.model.classes if c.effect not in left_out)
+        excluded = frozenset(names)
+        return self.with_classes(c for c in self.model.classes if c.effect not in excluded)
 
     def with_classes(self, classes: Iterable[EffectClass]) -> "Library":
         """The library with these classes in place of its own."""
@@ -197,9 +197,9 @@ def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Libra
     vehicle: as declared; nominal: features (features,) of its nominal flights, None of one whose log lacks columns.
     """
     library = shipped()
-    known = [f for f in nominal if f is not None]
-    if not known or len(known) < len(nominal):
+    features = [f for f in nominal if f is not None]
+    if not features or len(features) < len(nominal):
         return None
     if replace(load(library.vehicle), name=vehicle.name) != vehicle:
         return None
-    return library if library.lies_as_nominal(library.coordinates(np.array(known))) else None
+    return library if library.lies_as_nominal(library.coordinates(np.array(features))) else None
