@@ -1,8 +1,8 @@
 """The effects that the relations of signals name: which variants are fitted, and when the replay is asked instead."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from airtouch.gap.evidence.counterevidence import Counterevidence
@@ -12,6 +12,7 @@ from airtouch.gap.naming.by_relations import matching, selection_by_relations
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.unknown import is_explained
+from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import all_candidates
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, with_a_push
@@ -20,8 +21,9 @@ EXPLAINED, OPEN = Counterevidence(1.0, 30.0, of_distance=False), Counterevidence
 
 
 def effect_class(effect, name=None, shape=None):
-    """As much of a class as is asked for here."""
-    return SimpleNamespace(effect=effect, name=name or effect, shape=shape)
+    """A class whose curve is not asked for here."""
+    none = np.zeros((1, 0))
+    return EffectClass(name or effect, effect, shape, 1, False, np.zeros(2), np.zeros((1, 2, 1)), none, none[0])
 
 
 def inference(classes=(), counterevidence=EXPLAINED, likeliest="mass"):
