@@ -49,7 +49,7 @@ def row(flight: Flight, study: Study, vehicle: vehicles.Vehicle) -> str:
     power = np.abs(data.residual[0][AIR][:, inside, 3:6]) ** 2 / study.floor.power[AIR][inside, 3:6]
     ratio = np.nanmean(power, axis=1)
     far = (ratio[:, [ROLL, YAW]] > FAR).any(axis=1)
-    when = ", ".join(f"{s:.0f}" for s in data.first[0][AIR][far] * PERIOD_S)
+    when = ", ".join(f"{s:.0f}" for s in data.block_starts[0][AIR][far] * PERIOD_S)
     roll, yaw = angular_accelerations(vehicle.thrust(flight.pwm[flight.phase != GROUND]).mean(axis=0), vehicle)
     return (f"| {Path(flight.name).name} | {roll:.1f}, {yaw:.1f} | {far.sum()} of {len(far)} | {when} | "
             f"{ratio[:, ROLL].max():.0f}, {ratio[:, YAW].max():.0f} |")

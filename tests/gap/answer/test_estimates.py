@@ -19,7 +19,7 @@ from airtouch.gap.answer.estimates import (
     with_reading,
 )
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.evidence.clock import CORRELATION_S, clock_gain
+from airtouch.gap.evidence.clock import CORRELATION_S, measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, tail_scale
@@ -29,6 +29,7 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.relations.readout import Reading
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR, hover
 
@@ -170,7 +171,7 @@ def test_nine_in_ten_intervals_of_a_jitter_hold_the_truth(true_s):
     for _ in range(2000):
         clock_s = rng.normal(0.0, np.hypot(true_s, nominal_s), independent).repeat(each)
         data = SimpleNamespace(flights=[Times(clock_s)], study=study(nominal_s))
-        fitted, _ = clock_gain(data, term)
+        fitted, _ = measured_clock_term(data, term)
         interval = fitted.quantities(*from_times(data, fitted))[fitted.free[0]]
         held.append(interval.low < true_s < interval.high)
     assert np.mean(held) == pytest.approx(0.9, abs=0.03)
@@ -210,13 +211,13 @@ def mass(value, deviation, reading):
 
 def test_a_reading_is_weighted_by_its_precision():
     """Two measurements of one number: the closed form of the weighted mean and its error."""
-    both = mass(0.10, 0.01, {"fraction": (0.11, 0.02)})
+    both = mass(0.10, 0.01, {"fraction": Reading(0.11, 0.02)})
     assert both.value == pytest.approx((4.0 * 0.10 + 0.11) / 5.0)
     assert both.high - both.low == pytest.approx(2.0 * 1.645 * 0.01 * np.sqrt(0.8), rel=1e-6)
 
 
 def test_an_interval_is_wider_where_replay_and_reading_disagree():
-    both = mass(0.10, 0.01, {"fraction": (0.20, 0.01)})
+    both = mass(0.10, 0.01, {"fraction": Reading(0.20, 0.01)})
     assert both.value == pytest.approx(0.15)
     assert both.low < 0.10 < 0.20 < both.high
 
@@ -225,7 +226,7 @@ def test_what_the_replay_knows_as_a_sum_stays_a_sum():
     """Of x + y the replay is sure, of either alone it is not: a reading of x moves y by as much the other way."""
     term = terms("com_offset")[0]
     both = combined("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
-                    {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
+                    {"x": Reading(0.5 * term.step("x"), 0.01 * term.step("x"))})
     assert both["x"].value == pytest.approx(0.5 * term.step("x"), rel=0.01)
     assert both["y"].value == pytest.approx(1.5 * term.step("y"), rel=0.01)
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.ranking import AT_FLOOR, LEAST_DIFFERENCE, alike_of, ranking_of, verdict_of
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step, Unsteadiness
 from airtouch.gap.relations.inference import Inference
@@ -28,7 +28,7 @@ def candidate(name, gate=()):
 def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0.0):
     """A selection that names effects, beside which a nameless model or disturbance gains so many nats."""
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
-    inferred = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
+    inferred = Inference((), GAINS, Counterevidence(left, 30.0, of_distance=False)) if by_relations else None
     return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
                      dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=inferred)
 

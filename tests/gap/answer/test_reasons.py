@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.reasons import nearest, shortfall, why_not
-from airtouch.gap.evidence.against import Against
 from airtouch.gap.evidence.cells import REST_VIEW, cell_numbers
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
     Candidate,
@@ -42,7 +42,8 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
     for n in named:
         total += EVIDENCE[n]
         steps.append(replace(Step.of(judged(n, total)), leave_one_out_gain=0.25 * EVIDENCE[n]))
-    related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
+    related = SimpleNamespace(evidence=EVIDENCE,
+                              counterevidence=Counterevidence(beside, 30.0, of_distance)) if inference else None
     return Selection(single_effects, tuple(steps), NamelessGain(150.0, beside), (None, None),
                      dict.fromkeys(EVIDENCE, 8.0), POLICY, assumed=False, over_prediction=OverPrediction(*lost),
                      inference=related)

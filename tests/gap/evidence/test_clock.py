@@ -59,6 +59,6 @@ def test_clock_and_losses_count_as_unknown_only_where_they_are_not_named():
     np.testing.assert_allclose(extra, np.sqrt(4.0 ** 2 - 1.0) * 1e-3, rtol=0.05)
     share, loss_gain = clock.loss(data)
     np.testing.assert_allclose(share, 0.05, rtol=0.3)
-    assert clock.clock_left(data, ()) == gain + loss_gain
-    assert clock.clock_left(data, terms("time_jitter")) == loss_gain
-    assert clock.clock_left(data, [*terms("time_jitter"), *terms("packet_loss")]) == 0.0
+    assert clock.unexplained_clock_gain(data, ()) == gain + loss_gain
+    assert clock.unexplained_clock_gain(data, terms("time_jitter")) == loss_gain
+    assert clock.unexplained_clock_gain(data, [*terms("time_jitter"), *terms("packet_loss")]) == 0.0

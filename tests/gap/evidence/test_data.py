@@ -48,7 +48,7 @@ def with_response(quiet, stepped_law=True, change=None):
 
 def torque_of(flight, effects, data):
     """Spectra (blocks, bins, 3) of measured minus modelled torque, the whole flight replayed once."""
-    return short_time_spectra(residual(flight, VEHICLE, effects), data.first[0][AIR], AIR)[:, :, TORQUE]
+    return short_time_spectra(residual(flight, VEHICLE, effects), data.block_starts[0][AIR], AIR)[:, :, TORQUE]
 
 
 @pytest.mark.parametrize(("effects", "by_command", "outside"), [
@@ -77,7 +77,8 @@ def test_without_a_response_what_only_scales_the_torque_leaves_it_alone():
     np.testing.assert_array_equal(beside[:, :, TORQUE], weak[:, :, TORQUE])
     scaled = torque_of(flown(), [INERTIA, WEAK], data)
     assert np.abs(scaled - weak[:, :, TORQUE]).max() > 0.1, "it would scale it"
-    expected = short_time_spectra(residual(flown(), VEHICLE, [INERTIA, WEAK]), data.first[0][AIR], AIR)[:, :, FORCE]
+    begin = data.block_starts[0][AIR]
+    expected = short_time_spectra(residual(flown(), VEHICLE, [INERTIA, WEAK]), begin, AIR)[:, :, FORCE]
     np.testing.assert_allclose(beside[:, :, FORCE], expected, atol=1e-8)
 
 

@@ -7,12 +7,12 @@ import pytest
 
 from airtouch.gap.evidence import fit as fit_module
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import SETTLED, converged, fit
+from airtouch.gap.evidence.fit import LEAST_TURN_GAIN, converged, fit
 from airtouch.gap.evidence.gauss_newton import gauss_newton
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.random_strength import LEAST_STRENGTH, strength_variance, strongest
+from airtouch.gap.evidence.random_strength import LEAST_STRENGTH, fit_strength, strength_variance
 from airtouch.gap.flights.flight import without_columns
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.signatures import candidates
@@ -67,8 +67,8 @@ def test_a_fit_goes_on_until_it_stands_still(study):
     refit = fit(data, blocks, result.terms, result.scaled)
     level = judge(data, blocks, result.terms)
     assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
-    assert judge(data, blocks, refit.terms) < level + SETTLED
-    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED
+    assert judge(data, blocks, refit.terms) < level + LEAST_TURN_GAIN
+    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - LEAST_TURN_GAIN
 
 
 @pytest.mark.parametrize(("louder", "beside"), [(1.5, 0.0), (1.02, 0.0), (1.5, 0.5), (0.7, 0.0)])
@@ -78,7 +78,7 @@ def test_strength_of_a_random_effect_is_the_likeliest(louder, beside):
     problem = problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
     residual, other = problem.elements.residual, beside * problem.elements.floor_power
-    likeliest = strongest(problem, noise, residual, other)
+    likeliest = fit_strength(problem, noise, residual, other)
     strengths = np.geomspace(LEAST_STRENGTH, 5.0, 1000)
     terms = [noise.fitted(np.full(1, x)) for x in strengths]
     levels = [problem.likelihood(residual, other + problem.random_power([t])) for t in terms]
@@ -94,7 +94,7 @@ def test_a_random_effect_that_adds_no_power_stays_as_it_is():
     (noise,) = candidates.terms("imu_noise")
     elsewhere = replace(noise, gate=(("another flight", 0.0, 12.0),))
     residual = problem.elements.residual
-    assert strongest(problem, elsewhere, residual, np.zeros(len(residual))) is elsewhere
+    assert fit_strength(problem, elsewhere, residual, np.zeros(len(residual))) is elsewhere
 
 
 def test_variance_is_the_inverse_of_the_information_of_the_strength():
@@ -105,7 +105,7 @@ def test_variance_is_the_inverse_of_the_information_of_the_strength():
     data = Data(FLOOR, [hover(3, louder=1.5, length_s=20.0)])
     blocks, problem = whole_of(data), problem_of(data, whole_of(data))
     (noise,) = candidates.terms("imu_noise")
-    likeliest = strongest(problem, noise, problem.elements.residual, np.zeros(len(problem.elements.residual)))
+    likeliest = fit_strength(problem, noise, problem.elements.residual, np.zeros(len(problem.elements.residual)))
     x, step = likeliest.scaled(likeliest.values), 1e-3
     up, down = (np.log(problem.elements.floor_power + problem.random_power([noise.fitted(x * np.exp(h))]))
                 for h in (step, -step))

@@ -11,10 +11,10 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import PRIOR_STD
 from airtouch.gap.evidence.gauss_newton import (
     COMMAND_PRIOR_STD,
-    GRID,
     LEAST_STEP_GAIN,
+    LOOP_STARTS,
+    MOST_ATTEMPTS,
     NEAR_NEUTRAL,
-    TRIES,
     Posterior,
     gauss_newton,
     start_of,
@@ -179,7 +179,7 @@ def test_a_linear_problem_is_solved_by_one_step_and_ends_with_the_next():
     result = gauss_newton(posterior, np.full(3, NEAR_NEUTRAL), most=100)
     np.testing.assert_allclose(result.x, np.linalg.lstsq(rows, aim, rcond=None)[0], rtol=1e-5)
     np.testing.assert_allclose(result.covariance, np.linalg.inv(rows.T @ rows), rtol=1e-5)
-    assert posterior.points <= 2 + 2 * TRIES
+    assert posterior.points <= 2 + 2 * MOST_ATTEMPTS
 
 
 def test_a_prior_draws_the_minimum_to_neutral_as_in_ridge_regression():
@@ -234,11 +234,11 @@ def loop_problem(likeliest, k=1):
 
 
 @pytest.mark.parametrize(("likeliest", "begin"), [
-    (GRID[1], GRID[1]), (-1.3, -1.0), (0.6, 0.5), (9.0, 3.0), (-9.0, -2.0), (NEAR_NEUTRAL, NEAR_NEUTRAL)])
+    (LOOP_STARTS[1], LOOP_STARTS[1]), (-1.3, -1.0), (0.6, 0.5), (9.0, 3.0), (-9.0, -2.0), (NEAR_NEUTRAL, NEAR_NEUTRAL)])
 def test_an_effect_of_the_loop_begins_at_the_likeliest_point_of_the_grid(likeliest, begin):
     """The log likelihood falls by d + exp(-d) - 1 on either side, d = x - likeliest."""
-    d = np.array(GRID) - likeliest
-    assert GRID[int(np.argmin(d + np.exp(-d)))] == begin
+    d = np.array(LOOP_STARTS) - likeliest
+    assert LOOP_STARTS[int(np.argmin(d + np.exp(-d)))] == begin
     assert start_of(loop_problem(likeliest), [effect(1, loop_only=True)], None) == [begin]
 
 

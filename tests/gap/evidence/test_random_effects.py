@@ -127,7 +127,7 @@ def test_within_a_gate_a_block_has_that_share_of_the_power(steady):
     window = get_window("hann", LENGTH[AIR]) ** 2
     t = 0.01 * np.arange(1200)
     acts = (t >= 3.0 - 1e-9) & (t < 5.5 - 1e-9)
-    share = np.array([(window * acts[k:k + LENGTH[AIR]]).sum() for k in steady.first[0][AIR]]) / window.sum()
+    share = np.array([(window * acts[k:k + LENGTH[AIR]]).sum() for k in steady.block_starts[0][AIR]]) / window.sum()
     assert share.min() == 0.0 and share.max() > 0.9 and len(set(share)) > 3
     np.testing.assert_allclose(gated, share[:, None, None] * whole, atol=1e-12 * whole.max())
 

@@ -5,7 +5,7 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.evidence.slopes import FAR, active_at, slopes_at
+from airtouch.gap.evidence.slopes import LARGEST_MOVE, active_at, slopes_at
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import fly
 from hovers import FLOOR, hover
@@ -92,7 +92,7 @@ def test_slopes_of_a_linear_effect_are_its_differences(still):
 
 def test_slopes_of_a_linear_effect_are_kept_until_the_fit_has_moved_far(still):
     begun = slopes_at(still, [BIAS], np.zeros(len(BIAS.free)))
-    for distance, anew in ((0.9 * FAR, False), (1.1 * FAR, True)):
+    for distance, anew in ((0.9 * LARGEST_MOVE, False), (1.1 * LARGEST_MOVE, True)):
         moved = begun.moved_to(np.full(len(BIAS.free), distance))
         assert (moved.by_parameter[0] is not begun.by_parameter[0]) is anew and np.all(moved.at == distance * anew)
     assert begun.moved_to(begun.at, anew=True).by_parameter[0] is not begun.by_parameter[0]

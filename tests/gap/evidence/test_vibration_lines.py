@@ -74,6 +74,6 @@ def test_the_strength_of_lines_is_the_likeliest(strength):
 
     best = minimize_scalar(lambda log_x: -gain(np.exp(log_x)), bounds=(-6.0, 3.0), method="bounded")
     gained, likeliest = vibration_lines.best_strength(over, shape)
-    finest = vibration_lines.FINER[1] / vibration_lines.FINER[0]
+    finest = vibration_lines.FINER_FACTORS[1] / vibration_lines.FINER_FACTORS[0]
     assert abs(np.log(likeliest) - best.x) < np.log(finest), "the next of the strengths that are tried"
     assert gained == pytest.approx(gain(likeliest), rel=1e-9)

@@ -1,33 +1,35 @@
 """The effects that the relations of signals name: which variants are fitted, and when the replay is asked instead."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import select
 from airtouch.gap.naming.by_relations import matching, selection_by_relations
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.unknown import is_explained
+from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import all_candidates
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, with_a_push
 
-EXPLAINED, OPEN = Against(1.0, 30.0, of_distance=False), Against(90.0, 30.0, of_distance=False)
+EXPLAINED, OPEN = Counterevidence(1.0, 30.0, of_distance=False), Counterevidence(90.0, 30.0, of_distance=False)
 
 
 def effect_class(effect, name=None, shape=None):
-    """As much of a class as is asked for here."""
-    return SimpleNamespace(effect=effect, name=name or effect, shape=shape)
+    """A class whose curve is not asked for here."""
+    none = np.zeros((1, 0))
+    return EffectClass(name or effect, effect, shape, 1, False, np.zeros(2), np.zeros((1, 2, 1)), none, none[0])
 
 
-def inference(classes=(), against=EXPLAINED, likeliest="mass"):
+def inference(classes=(), counterevidence=EXPLAINED, likeliest="mass"):
     """An inference with most evidence for one effect."""
     evidence = {c.effect: 20.0 for c in classes} | {likeliest: 100.0}
-    return Inference(tuple(classes), evidence, against)
+    return Inference(tuple(classes), evidence, counterevidence)
 
 
 def test_matching_by_parameter():
@@ -66,10 +68,10 @@ def relations(monkeypatch):
 PUSHED = Data(scattered(), [with_a_push(9.0, 15.0)])  #: a push of some seconds, which a wake explains
 
 
-@pytest.mark.parametrize("against", [EXPLAINED, OPEN])
-def test_relations_name_what_always_acts(relations, against):
+@pytest.mark.parametrize("counterevidence", [EXPLAINED, OPEN])
+def test_relations_name_what_always_acts(relations, counterevidence):
     """The replay is not asked where no effect passes, explained or not."""
-    inferred = inference([effect_class("mass")], against)
+    inferred = inference([effect_class("mass")], counterevidence)
     relations(inferred)
     selection = select.select(Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))]), candidates_of(["mass"]))
     assert selection.inference is inferred and [s.name for s in selection.named_steps] == ["mass"]
@@ -87,10 +89,10 @@ def test_without_a_whole_ranking_no_candidate_is_judged_alone(relations):
     assert not any(c.full for c in short.single_effects.values())
 
 
-@pytest.mark.parametrize(("against", "likeliest", "by_replay"), [
+@pytest.mark.parametrize(("counterevidence", "likeliest", "by_replay"), [
     (EXPLAINED, "downwash", False), (OPEN, "downwash", True), (OPEN, "mass", True)])
-def test_replay_names_a_wake_that_relations_leave_open(relations, against, likeliest, by_replay):
-    relations(inference([effect_class("mass")], against, likeliest))
+def test_replay_names_a_wake_that_relations_leave_open(relations, counterevidence, likeliest, by_replay):
+    relations(inference([effect_class("mass")], counterevidence, likeliest))
     selection = select.select(PUSHED, candidates_of(["mass"]))
     assert (selection.inference is None) is by_replay
     assert [s.name for s in selection.named_steps] == (["downwash"] if by_replay else ["mass"])

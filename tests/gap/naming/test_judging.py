@@ -30,7 +30,7 @@ def test_halves_share_no_block_and_leave_none_out():
     three = Data(FLOOR, [hover(8), hover(9), hover(10, length_s=3.0)])
     first, second = judging.halves(three)
     for (i, state, blocks), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
-        assert (i, state) == (j, of) and len(blocks) == len(three.first[i][state]) and (blocks ^ other).all()
+        assert (i, state) == (j, of) and len(blocks) == len(three.block_starts[i][state]) and (blocks ^ other).all()
     (_, _, blocks), *_, (_, _, short) = first.pieces
     assert blocks[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
     assert 0 < short.sum() <= len(short), "a short flight is in both halves where it can be"

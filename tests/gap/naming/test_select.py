@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from airtouch.gap.evidence.clock import clock_gain, loss
+from airtouch.gap.evidence.clock import loss, measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, policy, rounds
 from airtouch.gap.naming.select import nameless_nats, select
@@ -105,7 +105,7 @@ def test_three_effects_are_named_with_their_gains():
     share = next(t for t in selection.last_step.terms if t.name == "packet_loss").values["share"]
     assert share == pytest.approx(lost.mean(), rel=0.1)
     by_name = {s.name: s.leave_one_out_gain for s in selection.named_steps}
-    lost_alone = clock_gain(data, candidates_of(["packet_loss"])["packet_loss"][0][0])[1]
+    lost_alone = measured_clock_term(data, candidates_of(["packet_loss"])["packet_loss"][0][0]).gain
     assert by_name["packet_loss"] == pytest.approx(lost_alone, rel=1e-3)
     gains = [s.gain for s in selection.steps]
     assert gains == sorted(gains)

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import UnknownLimit, policy_of
 from airtouch.gap.naming.records import Candidate, NamelessGain, OverPrediction, Selection, Step, Unsteadiness
 from airtouch.gap.naming.unknown import (
-    against,
     against_over_limit,
+    counterevidence,
     is_explained,
     over_prediction_ratio,
     unsteadiness_ratio,
@@ -27,7 +27,7 @@ POLICY = replace(policy_of(FLOOR, 30.0), unknown=LIMIT)
 def selection(left=0.0, gain=None, over_none=0.0, assumed=False, lost=0.0, by_relations=None):
     """A selection whose effects gain so many nats (None: no effect), beside which the nameless model gains `left`."""
     steps = () if gain is None else (Step.of(Candidate("mass", (), gain)),)
-    inference = None if by_relations is None else SimpleNamespace(against=by_relations)
+    inference = None if by_relations is None else SimpleNamespace(counterevidence=by_relations)
     return Selection({}, steps, NamelessGain(over_none, left), (None, None), {}, POLICY, assumed,
                      OverPrediction(lost, 0), inference)
 
@@ -36,12 +36,12 @@ def selection(left=0.0, gain=None, over_none=0.0, assumed=False, lost=0.0, by_re
     ({}, LEAST), ({"gain": 100.0}, LEAST), ({"gain": 1000.0}, 100.0), ({"gain": 1000.0, "assumed": True}, 200.0),
     ({"gain": 100.0, "over_none": 5000.0}, 250.0)])
 def test_the_nameless_model_may_gain_a_share_of_what_the_last_step_gains(options, limit):
-    assert against(selection(left=7.0, **options)) == (7.0, limit, False)
+    assert counterevidence(selection(left=7.0, **options)) == (7.0, limit, False)
 
 
 def test_where_the_relations_decide_their_number_and_limit_count():
-    of_relations = Against(70.0, 30.0, of_distance=True)
-    assert against(selection(left=7.0, gain=1000.0, by_relations=of_relations)) == of_relations
+    of_relations = Counterevidence(70.0, 30.0, of_distance=True)
+    assert counterevidence(selection(left=7.0, gain=1000.0, by_relations=of_relations)) == of_relations
 
 
 def test_over_prediction_is_held_against_the_least_limit():

@@ -12,8 +12,8 @@ from airtouch.gap.relations.build import (
     LEAST_NAMELESS_LENGTH,
     PairedFlights,
     Whitening,
-    _beyond_noise,
-    _nameless_loadings,
+    loadings_beyond_noise,
+    nameless_loadings,
 )
 from airtouch.gap.relations.inference import infer
 from airtouch.gap.relations.learning import Scene, drawings, fly
@@ -27,8 +27,8 @@ FEW_FEATURES = ("roll power force", "climb power force", "force x follows one", 
                 "force z follows one", "force z follows thrust")
 FEW_FLIGHTS = BuildSettings(
     nominal_flights=50, nameless_flights=10, flights_of_two=4, flights_per_knot=4, weakest_flights=1,
-    calibration=CalibrationSettings(nominal_flights=12, class_flights=10, with_second=2, flights_of_two=3, tried=1,
-                                    least_flights=4))
+    calibration=CalibrationSettings(nominal_flights=12, class_flights=10, flights_with_second=2, flights_of_two=3,
+                                    flights_per_strength=1, least_flights=4))
 SCENE = Scene("hover", VEHICLE)
 NOT_LEARNED_FROM = 7_000_000  #: number of the first flight that is judged
 JUDGED = 6  #: flights with each effect
@@ -46,9 +46,9 @@ def test_whitened_flights_have_covariance_one():
 def test_two_effects_interact_in_the_direction_that_stands_over_noise():
     rng = np.random.default_rng(2)
     noise = 0.05 * rng.normal(size=(300, 40))
-    assert _beyond_noise(noise, 0.05 ** 2).shape == (40, 0)
+    assert loadings_beyond_noise(noise, 0.05 ** 2).shape == (40, 0)
     direction = np.eye(40)[3]
-    loadings = _beyond_noise(noise + 0.3 * rng.normal(size=(300, 1)) * direction, 0.05 ** 2)
+    loadings = loadings_beyond_noise(noise + 0.3 * rng.normal(size=(300, 1)) * direction, 0.05 ** 2)
     assert loadings.shape == (40, 1)
     assert abs(loadings[3, 0]) == pytest.approx(0.3, rel=0.1)
 
@@ -58,7 +58,7 @@ def test_nameless_disturbances_scatter_by_their_directions_not_their_lengths():
     length = np.exp(rng.uniform(2.0, 8.0, (500, 1)))
     shift = length * np.where(rng.random((500, 1)) < 0.8, np.eye(5)[0], np.eye(5)[1])
     weak = 0.9 * LEAST_NAMELESS_LENGTH * np.tile(np.eye(5)[4], (500, 1))
-    loadings = _nameless_loadings(np.concatenate([shift, weak]))
+    loadings = nameless_loadings(np.concatenate([shift, weak]))
     assert np.diag(loadings @ loadings.T) == pytest.approx([0.8, 0.2, 0.0, 0.0, 0.0], abs=0.05)
 
 
@@ -97,18 +97,18 @@ def test_an_effect_that_a_library_was_built_with_is_named_and_sized(infer_new_fl
     answers = infer_new_flights(effects)
     ((name, ((parameter, true),)),) = ((name, values.items()) for name, values in effects.items())
     assert [[c.name for c in one.classes] for one in answers] == [[name]] * JUDGED
-    assert sum(one.against.is_too_much for one in answers) <= 1
+    assert sum(one.counterevidence.is_too_much for one in answers) <= 1
     for value, deviation in (one.readings[name][parameter] for one in answers):
         assert value == pytest.approx(true, rel=0.3) and abs(value - true) < 3.0 * deviation
 
 
 def test_a_library_built_of_few_flights_names_nothing_in_nominal_ones(infer_new_flights):
     answers = infer_new_flights({})
-    assert not any(one.classes for one in answers) and sum(one.against.is_too_much for one in answers) <= 1
+    assert not any(one.classes for one in answers) and sum(one.counterevidence.is_too_much for one in answers) <= 1
 
 
 def test_an_effect_that_a_library_was_built_without_is_left(infer_new_flights):
-    assert all(one.against.is_too_much for one in infer_new_flights({"wind": {}}))
+    assert all(one.counterevidence.is_too_much for one in infer_new_flights({"wind": {}}))
 
 
 def test_a_file_that_is_there_is_refused_before_the_work(tmp_path, monkeypatch, capsys):

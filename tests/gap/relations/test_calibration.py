@@ -33,12 +33,12 @@ def test_a_class_is_calibrated_down_to_where_half_of_its_flights_show_it(limit):
     def fitted(strength):
         return SimpleNamespace(shows=strength > limit)
 
-    weakest = calibration._weakest_shown(fitted, 1.0, 3)
+    weakest = calibration.weakest_detected_strength(fitted, 1.0, 3)
     assert weakest <= limit < 2.0 * weakest
 
 
 def test_flights_that_do_not_end_well_say_nothing_of_the_weakest_strength():
-    assert calibration._weakest_shown(lambda _: None, 1.0, 3) == 2.0 ** -calibration.HALVINGS
+    assert calibration.weakest_detected_strength(lambda _: None, 1.0, 3) == 2.0 ** -calibration.CALIBRATION_HALVINGS
 
 
 def test_a_pair_is_never_two_names_of_one_thing():
@@ -51,7 +51,7 @@ def test_parameters_are_those_that_vary_and_need_enough_flights():
     (drawing,) = drawings("rotor_drag")
     shown = [CalibrationFlight(np.array([float(i)]), np.array([float(i), 0.0]), 50.0, 0.0, None, 0.0)
              for i in range(1, 13)]
-    readout = calibration._readout(drawing, shown, 12)
+    readout = calibration.readout_of(drawing, shown, 12)
     assert readout is not None and readout.parameters == ("horizontal",)
     assert readout.amount.shape == readout.strength.shape == (len(shown), 1)
-    assert calibration._readout(drawing, shown[1:], 12) is None
+    assert calibration.readout_of(drawing, shown[1:], 12) is None

@@ -31,11 +31,11 @@ def test_the_likeliest_strength_of_a_straight_line_is_the_projection(way):
     values = 2.0 * way + np.random.default_rng(4).normal(size=Q)
     result = fit(straight(way), values, unchanged(Q))
     assert result.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
-    assert result.peak == pytest.approx(-0.5 * np.sum((values - result.strength * way) ** 2), rel=1e-6)
+    assert result.log_peak == pytest.approx(-0.5 * np.sum((values - result.strength * way) ** 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("signed", [False, True])
-def test_evidence_is_the_likelihood_averaged_over_strengths(way, signed):
+def test_the_marginal_likelihood_is_the_likelihood_averaged_over_strengths(way, signed):
     """Laplace's method against the integral: any strength as likely on a logarithmic scale, either sign too."""
     values = 3.0 * way
 
@@ -44,7 +44,7 @@ def test_evidence_is_the_likelihood_averaged_over_strengths(way, signed):
         return np.mean([np.exp(log_density(values - s * np.exp(log_strength) * way)) for s in signs])
 
     exact = np.log(quad(density, KNOTS[0], KNOTS[-1], points=[np.log(3.0)], limit=200)[0] / (KNOTS[-1] - KNOTS[0]))
-    assert fit(straight(way, signed=signed), values, unchanged(Q)).evidence == pytest.approx(exact, abs=0.05)
+    assert fit(straight(way, signed=signed), values, unchanged(Q)).log_marginal == pytest.approx(exact, abs=0.05)
 
 
 def test_scatter_about_the_curve_widens_the_density(way):
@@ -56,7 +56,7 @@ def test_scatter_about_the_curve_widens_the_density(way):
     shift = result.strength * way
     covariance = np.eye(Q) + (shift @ shift) * (axes * variances) @ axes.T
     constant = 0.5 * Q * np.log(2.0 * np.pi)
-    assert result.peak == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
+    assert result.log_peak == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
 
 
 def test_a_rescaling_turns_a_covariance_into_one():
@@ -84,7 +84,7 @@ def test_several_parameters_of_a_flight_without_a_shift_are_of_the_least_magnitu
                      np.zeros((Q, 0)), np.zeros(0))
     result = fit(of, np.zeros(Q), unchanged(Q))
     assert np.linalg.norm(result.strength) == pytest.approx(of.least)
-    assert np.isfinite(result.evidence)
+    assert np.isfinite(result.log_marginal)
 
 
 def test_principal_axes_are_those_of_a_singular_value_decomposition():

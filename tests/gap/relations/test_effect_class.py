@@ -76,13 +76,13 @@ def test_noise_alone_stands_out_in_no_direction():
     assert stands_out(np.append(1.5 * variance[0], variance), 0.3 ** 2, 100, N).sum() == 1
 
 
-def test_a_class_of_one_parameter_of_several_says_so():
+def test_a_class_of_one_parameter_of_several_says_which():
     def named(name, effect):
         return EffectClass(name, effect, None, 1, False, np.zeros(2), np.zeros((1, 2, Q)), np.zeros((Q, 0)),
                            np.zeros(0))
 
-    assert named("controller_gain rate", "controller_gain").of_one_parameter
-    assert not named("mass", "mass").of_one_parameter
+    assert named("controller_gain rate", "controller_gain").own_parameter == "rate"
+    assert named("mass", "mass").own_parameter is None
 
 
 def test_scatter_is_that_beyond_nominal_flights():

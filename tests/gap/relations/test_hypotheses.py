@@ -24,12 +24,12 @@ def test_no_effect_is_a_hypothesis_as_any(size):
     flight = FlightHypotheses(noise() + size, library().model)
     none = flight.at_fits(())
     np.testing.assert_array_equal(flight.rescaling(())(flight.values), flight.values)
-    assert (none.peak, none.evidence) == (0.0, 0.0) and flight.rescaling(()).log_determinant == 0.0
+    assert (none.log_likelihood_ratio, none.evidence) == (0.0, 0.0) and flight.rescaling(()).log_determinant == 0.0
     assert flight.squared_distance(none) == pytest.approx(np.sum(flight.values ** 2))
     alone, added = flight.single_effects(), flight.with_one_more(none, lambda c, h: True)
     assert [h.names for h in added] == [h.names for h in alone]
     assert [h.evidence for h in added] == pytest.approx([h.evidence for h in alone])
-    assert flight.refitted(alone[0]).peak == pytest.approx(alone[0].peak)
+    assert flight.refitted(alone[0]).log_likelihood_ratio == pytest.approx(alone[0].log_likelihood_ratio)
 
 
 def test_something_without_a_name_is_a_mixture_of_normal_densities():
@@ -38,7 +38,7 @@ def test_something_without_a_name_is_a_mixture_of_normal_densities():
                        for s in NAMELESS_LENGTHS]) - np.log(len(NAMELESS_LENGTHS))
     features = FlightHypotheses(values, of)
     none = multivariate_normal(np.zeros(Q), np.eye(Q)).logpdf(values)
-    assert features.nameless_evidence(features.none) == pytest.approx(exact - none)
+    assert features.nameless_evidence(features.no_effect) == pytest.approx(exact - none)
 
 
 def test_two_effects_are_no_sum_by_a_share_of_the_smaller_one():
@@ -78,4 +78,5 @@ def test_effects_are_not_refitted_to_something_less_likely():
     whole = flight.at_fits([replace(flight.with_class(c).fits[0], strength=np.array([s]))
                             for c, s in zip(model.classes, (60.0, 40.0), strict=True)])
     assert flight.refitted(whole) is whole
-    assert flight.with_two(*model.classes).peak == pytest.approx(whole.peak - 0.5 * 10.0 ** 2, abs=0.5)
+    nearest = flight.with_two(*model.classes).log_likelihood_ratio
+    assert nearest == pytest.approx(whole.log_likelihood_ratio - 0.5 * 10.0 ** 2, abs=0.5)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.effect_class import ClassCalibration
 from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
@@ -22,7 +22,7 @@ def test_inference_names_what_is_there(true):
     values = noise() + sum(size * np.eye(Q)[NAMES.index(n)] for size, n in zip(SIZE, true, strict=False))
     inference = infer(library(), values[None])
     assert {c.name for c in inference.classes} == set(true)
-    assert inference.against.nats < inference.against.limit
+    assert inference.counterevidence.nats < inference.counterevidence.limit
     chance = inference.probabilities()
     assert sum(chance.values()) == pytest.approx(1.0)
     assert max(chance, key=chance.__getitem__) == (true[0] if true else "none")
@@ -31,7 +31,7 @@ def test_inference_names_what_is_there(true):
 def test_a_withheld_effect_is_left():
     values = (noise() + 45.0 * np.eye(Q)[0])[None]
     inference = infer(library().without(["mass"]), values)
-    assert not inference.classes and inference.against.nats > 10.0 * inference.against.limit
+    assert not inference.classes and inference.counterevidence.nats > 10.0 * inference.counterevidence.limit
     assert inference.evidence.keys() == set(NAMES[1:])
 
 
@@ -43,7 +43,7 @@ def test_a_name_fails_where_the_flight_lies_off_it_by_more_than_right_names_do(o
     values[60:] = np.sqrt((Q + 2.0 * off * scatter) / 40.0)  # as far from the effect as nominal flights, and more
     inference = infer(library(), values[None])
     assert [c.name for c in inference.classes] == ["mass"]
-    assert (inference.against.nats < inference.against.limit) is (off < 3.5)
+    assert (inference.counterevidence.nats < inference.counterevidence.limit) is (off < 3.5)
 
 
 def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
@@ -52,10 +52,10 @@ def test_a_name_that_is_known_to_be_inexact_may_be_farther_off():
     exact = each_calibrated(library(), nameless_share=1.0)  # so that the distance alone speaks
     inexact = each_calibrated(exact, distance_scatter=0.1)
     far, near = (infer(of, values[None]) for of in (exact, inexact))
-    assert far.against.nats == pytest.approx(near.against.nats)
-    assert far.against.limit < far.against.nats < near.against.limit
+    assert far.counterevidence.nats == pytest.approx(near.counterevidence.nats)
+    assert far.counterevidence.limit < far.counterevidence.nats < near.counterevidence.limit
     evidence = near.evidence["mass"]
-    assert near.against.limit == pytest.approx(3.5 * np.hypot(0.5 * np.sqrt(2.0 * Q), 0.1 * evidence))
+    assert near.counterevidence.limit == pytest.approx(3.5 * np.hypot(0.5 * np.sqrt(2.0 * Q), 0.1 * evidence))
 
 
 def test_two_effects_must_be_likelier_than_one_with_something_without_a_name(monkeypatch):
@@ -120,8 +120,8 @@ def test_what_a_disturbance_may_gain_grows_with_the_evidence_and_once_more_for_t
             best = flight.with_two(*wide.model.classes[:2])
         result = infer(wide, values[None])
         assert len(result.classes) == len(true)
-        assert result.against.limit == pytest.approx(10.0 + share * best.evidence, rel=1e-3)
-        assert result.against.nats == pytest.approx(flight.nameless_evidence(best) - best.evidence, rel=1e-2)
+        assert result.counterevidence.limit == pytest.approx(10.0 + share * best.evidence, rel=1e-3)
+        assert result.counterevidence.nats == pytest.approx(flight.nameless_evidence(best) - best.evidence, rel=1e-2)
 
 
 def test_two_parameters_of_one_effect_have_no_readings():
@@ -149,7 +149,7 @@ def test_an_effect_in_several_shapes_has_the_mean_of_their_likelihoods():
 def test_probabilities_are_those_of_half_the_evidence():
     """Tails are heavier than normal ones; what has the least evidence of an effect is as likely as none."""
     evidence = {"mass": inference.LEAST_EVIDENCE, "wind": inference.LEAST_EVIDENCE - 4.0}
-    chance = inference.Inference((), evidence, Against(0.0, 1.0, False)).probabilities()
+    chance = inference.Inference((), evidence, Counterevidence(0.0, 1.0, False)).probabilities()
     assert chance["mass"] == pytest.approx(chance["none"])
     assert chance["wind"] == pytest.approx(chance["mass"] * np.exp(-2.0))
 
@@ -169,7 +169,7 @@ def test_a_third_effect_is_added_only_where_two_do_not_suffice(monkeypatch):
         wide = each_calibrated(library(), nameless_share=0.05)
         result = infer(wide, values[None])
         assert len(result.classes) == count
-        assert not result.against.is_too_much
+        assert not result.counterevidence.is_too_much
 
 
 def test_names_of_one_thing_count_together():

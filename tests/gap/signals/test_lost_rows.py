@@ -33,7 +33,7 @@ def test_what_lost_rows_add_is_what_the_same_flights_with_every_row_lack(pairs, 
     power, expected = [], []
     for k, lossy in enumerate(poor.flights):
         assert 20 < lossy.lost.sum() < 100
-        _, mine, theirs = np.intersect1d(poor.first[k][AIR], rich.first[k][AIR], return_indices=True)
+        _, mine, theirs = np.intersect1d(poor.block_starts[k][AIR], rich.block_starts[k][AIR], return_indices=True)
         power.append(np.abs(poor.residual[k][AIR][mine] - rich.residual[k][AIR][theirs]) ** 2)
         expected.append(poor.bridging[k][mine])
     band = frequencies(AIR) > 2.0

@@ -14,13 +14,13 @@ overlap of its blocks make it a little too sure; those of the first two hold 94 
 derives and checks both). Real flights scatter beyond that noise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import CORRELATION_S, nominal_jitter_s
+from airtouch.gap.evidence.clock import CORRELATION_S, nominal_time_rms_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import whole_of
@@ -93,13 +93,15 @@ def from_times(data: Data, term: Term) -> Estimate:
         inverse = lost_fraction * samples / (2.0 * length - 1.0)  # of the relative variance
     else:
         independent, (jitter_s,) = samples / (CORRELATION_S / PERIOD_S), (term.values[p] for p in term.free)
-        inverse = 2.0 * independent / (1.0 + (nominal_jitter_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2
+        inverse = 2.0 * independent / (1.0 + (nominal_time_rms_s(data.study) / max(jitter_s, LEAST_JITTER_S)) ** 2) ** 2
     x = term.scaled(term.values)
     return Estimate(x, np.diag(x ** 2 / max(inverse, 1.0)))
 
 
-def with_reading(term: Term, estimate: Estimate, reading: Reading) -> Estimate:
+def with_reading(term: Term, estimate: Estimate, reading: Mapping[str, Reading]) -> Estimate:
     """An estimate by the replay and by the relations of signals together; unchanged without a reading.
+
+    reading: by parameter.
 
     Both are weighted by precision (the update of a Kalman filter), so that parameters that the replay knows as a sum or
     a product move together. Where the two differ by more than their errors, chi^2 of k parameters above k, the
@@ -110,8 +112,8 @@ def with_reading(term: Term, estimate: Estimate, reading: Reading) -> Estimate:
     if not read:
         return estimate
     measured = replace(term, free=tuple(term.free[i] for i in read))
-    value = measured.scaled({name: reading[name][0] for name in measured.free})
-    variance = np.diag([(reading[name][1] / term.step(name)) ** 2 for name in measured.free])
+    value = measured.scaled({name: reading[name].value for name in measured.free})
+    variance = np.diag([(reading[name].deviation / term.step(name)) ** 2 for name in measured.free])
     precision = np.linalg.inv(covariance[np.ix_(read, read)] + variance)
     gain, apart = covariance[:, read] @ precision, value - x[read]
     wider = max(1.0, float(apart @ precision @ apart) / len(read))

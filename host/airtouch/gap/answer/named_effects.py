@@ -44,7 +44,7 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     return sorted(effects, key=lambda e: order.index(e.name))
 
 
-def _named(term: Term, estimate: Estimate, readings: Mapping[str, Reading]) -> NamedEffect:
+def _named(term: Term, estimate: Estimate, readings: Mapping[str, Mapping[str, Reading]]) -> NamedEffect:
     """An effect with an estimate of its parameters, and with its reading where there is one."""
     x, covariance = with_reading(term, estimate, readings.get(term.name, {}))
     return NamedEffect(term.name, term.quantities(x, covariance), term.gate)

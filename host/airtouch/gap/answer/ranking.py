@@ -6,7 +6,7 @@ from airtouch.gap.answer.shrink import Gap, closure_of, nearer
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
-from airtouch.gap.naming.unknown import against, is_explained, unsteadiness_ratio
+from airtouch.gap.naming.unknown import counterevidence, is_explained, unsteadiness_ratio
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.signatures.signature import CLOCK
@@ -50,7 +50,7 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
         return True
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
-    irregular_times = selection.nameless.of_times > against(selection).limit
+    irregular_times = selection.nameless.of_times > counterevidence(selection).limit
     return irregular_times or nearer(data, selection.halves, hypothesis, gap)
 
 

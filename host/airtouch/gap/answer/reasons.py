@@ -4,7 +4,7 @@ from airtouch.gap.answer.words import joined
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
 from airtouch.gap.naming.records import Candidate, Selection, Step
 from airtouch.gap.naming.unknown import (
-    against,
+    counterevidence,
     is_explained,
     over_prediction_ratio,
     remainder_ratio,
@@ -97,7 +97,7 @@ def _remainder_in_words(selection: Selection, name: str) -> str:
     if unsteadiness_ratio(selection) > remainder_ratio(selection):
         most = f"{'but only' if unsteady_nats > may_be_chance else 'and'} up to {may_be_chance:.1f} may be chance"
         return f"torque and lift are less steady than in nominal flights by {unsteady_nats:.1f} nats, {most}"
-    remainder = against(selection)
+    remainder = counterevidence(selection)
     nats = f"{max(remainder.nats, 0.0):.0f} nats"
     most = f"{'but only' if remainder.is_too_much else 'and'} up to {remainder.limit:.0f}"
     if remainder.of_distance:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS
-from airtouch.gap.evidence.clock import nominal_jitter_s
+from airtouch.gap.evidence.clock import nominal_time_rms_s
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN, JudgedBlocks, cell_gains, judged_blocks
 from airtouch.gap.evidence.problem import BlockSet
@@ -103,7 +103,7 @@ def closure_of_jitter(data: Data) -> Closure:
     After an effect is in the model, what is left is the floor and what the halves differ by. Two numbers give no
     interval.
     """
-    floor = nominal_jitter_s(data.study)
+    floor = nominal_time_rms_s(data.study)
     rms = [float(np.sqrt(np.mean(np.concatenate([piece for f in data.flights for piece in
                                                  np.array_split(f.clock_s, JITTER_PIECES)[half::2]]) ** 2)))
            for half in (0, 1)]

@@ -34,5 +34,5 @@ beside the sum (`signals.command_view`).
 is `flattened` to one array of values (`layout`, by `cells` of channel and band). A `problem` is these values under
 hypotheses. `fit` finds the parameters: of mean effects by `gauss_newton` (`slopes`, `least_squares`), of random ones by
 their strength (`random_strength`). `judge` says how likely other blocks are under them. `clock` judges what shows in
-the log's times alone. `against` is the evidence against the named effects, whoever measures it.
+the log's times alone. `counterevidence` is the evidence against the named effects, whoever measures it.
 """

@@ -14,7 +14,7 @@ from airtouch.gap.study import Study
 
 #: least fraction of lost samples that nominal flights are taken to have, without a model of the loop and with one; both
 #: chosen, as a few flights may have lost none. A larger number overlooks small losses
-LEAST_LOST, LEAST_LOST_OF_LOOP = 1e-3, 3e-4
+LEAST_LOSS, LEAST_LOSS_WITH_LOOP = 1e-3, 3e-4
 #: samples that count as one independent value of being lost; chosen, as losses come in runs. A larger number gives a
 #: loss less evidence
 SAMPLES_OF_ONE = 2.0
@@ -31,25 +31,31 @@ class TimesFault(NamedTuple):
     gain: float
 
 
-def nominal_jitter_s(study: Study) -> float:
-    """Rms (s) of the logged times around regular ones in nominal flights."""
+def nominal_time_rms_s(study: Study) -> float:
+    """Rms, s, of the logged times minus regular ones in nominal flights; their mean is not removed.
+
+    It is LEAST_JITTER_S at least.
+    """
     return max(study.floor.clock_s, LEAST_JITTER_S)
 
 
 def jitter(data: Data) -> TimesFault:
-    """Jitter of the logged times: its size is their standard deviation (s) beyond the rms of nominal flights.
+    """Jitter of the logged times.
 
-    The gain is that of normal times whose variance is the measured one, over nominal ones: of n independent values
-    n/2 (r - 1 - log r), where r is the ratio of the variances.
+    Its size s is the standard deviation of the times beyond the rms of nominal ones: s^2 = deviation^2 - rms^2.
+    The deviation is about the mean, the rms about 0: a constant offset of the flights' times is no jitter.
+
+    The gain is that of normal times with this deviation, over normal times with the nominal rms: of n independent
+    values n/2 (r - 1 - log r), where r is the ratio of the variances.
     """
-    nominal = nominal_jitter_s(data.study)
-    clock = np.concatenate([f.clock_s for f in data.flights])
-    measured = float(np.std(clock))
-    if measured <= nominal:
+    nominal_rms_s = nominal_time_rms_s(data.study)
+    times = np.concatenate([f.clock_s for f in data.flights])
+    deviation_s = float(np.std(times))
+    if deviation_s <= nominal_rms_s:
         return TimesFault(0.0, 0.0)
-    n = len(clock) * PERIOD_S / CORRELATION_S
-    gain = 0.5 * n * ((measured / nominal) ** 2 - 1.0 - 2.0 * np.log(measured / nominal))
-    return TimesFault(float(np.sqrt(measured ** 2 - nominal ** 2)), float(gain))
+    n = len(times) * PERIOD_S / CORRELATION_S
+    gain = 0.5 * n * ((deviation_s / nominal_rms_s) ** 2 - 1.0 - 2.0 * np.log(deviation_s / nominal_rms_s))
+    return TimesFault(float(np.sqrt(deviation_s ** 2 - nominal_rms_s ** 2)), float(gain))
 
 
 def loss(data: Data) -> TimesFault:
@@ -58,7 +64,7 @@ def loss(data: Data) -> TimesFault:
     The gain is that of samples each lost with the measured fraction, over the nominal one (binomial).
     """
     missing = np.concatenate([f.lost for f in data.flights]).astype(float)
-    least = LEAST_LOST if data.study.loop is None else LEAST_LOST_OF_LOOP
+    least = LEAST_LOSS if data.study.loop is None else LEAST_LOSS_WITH_LOOP
     fraction, nominal = float(missing.mean()), max(data.study.floor.lost, least)
     if fraction <= nominal:
         return TimesFault(fraction, 0.0)
@@ -74,7 +80,7 @@ class MeasuredTerm(NamedTuple):
     gain: float
 
 
-def clock_gain(data: Data, term: Term) -> MeasuredTerm:
+def measured_clock_term(data: Data, term: Term) -> MeasuredTerm:
     """The effect with the size of the fault that it stands for: of lost rows or of jitter."""
     fault = loss(data) if term.signature.loses_rows else jitter(data)
     return MeasuredTerm(term.fitted(np.array([fault.size / term.step(term.free[0])])), fault.gain)
@@ -82,10 +88,10 @@ def clock_gain(data: Data, term: Term) -> MeasuredTerm:
 
 def clock_gains(data: Data, terms: Sequence[Term]) -> float:
     """Nats that those terms gain together which act on the logged times."""
-    return sum(clock_gain(data, t).gain for t in terms if t.shows_in == CLOCK)
+    return sum(measured_clock_term(data, t).gain for t in terms if t.shows_in == CLOCK)
 
 
-def clock_left(data: Data, terms: Sequence[Term]) -> float:
+def unexplained_clock_gain(data: Data, terms: Sequence[Term]) -> float:
     """Nats that jitter and lost rows gain over nominal ones, without those of the faults that effects explain."""
     of_times = [t for t in terms if t.shows_in == CLOCK]
     loss_explained = any(t.signature.loses_rows for t in of_times)

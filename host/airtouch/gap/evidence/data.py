@@ -21,9 +21,9 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 # Of these three, all chosen, a larger number needs more memory, a smaller one computes more spectra anew.
-KEPT_SPECTRA = 96  #: hypotheses whose spectra are cached, of flights of KEPT_SAMPLES or less
-KEPT_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached
-LEAST_KEPT = 8  #: hypotheses whose spectra are cached, however long the flights are
+CACHED_HYPOTHESES = 96  #: hypotheses whose spectra are cached, of flights of CACHED_SAMPLES or less
+CACHED_SAMPLES = 20000  #: samples of all flights together, above which fewer hypotheses are cached
+LEAST_CACHED_HYPOTHESES = 8  #: hypotheses whose spectra are cached, however long the flights are
 Spectra = dict[str, np.ndarray]  #: of one flight by state (AIR, REST), complex (blocks, bins, COUNT), unit/sqrt(Hz)
 BlockStarts = dict[str, np.ndarray]  #: first samples of one flight's blocks by state, (blocks,)
 
@@ -55,7 +55,7 @@ class Data:
         return sum(len(f) for f in self.flights) * PERIOD_S
 
     @cached_property
-    def first(self) -> list[BlockStarts]:
+    def block_starts(self) -> list[BlockStarts]:
         """First sample of each block, by flight and state."""
         return [{state: starts(f, state) for state in (AIR, REST)} for f in self.flights]
 
@@ -63,7 +63,7 @@ class Data:
     def measured_torque(self) -> list[np.ndarray]:
         """Spectra (blocks, bins, 3) in the air of the measured angular acceleration, by flight."""
         return [short_time_spectra(angular_acceleration(f), first[AIR], AIR)
-                for f, first in zip(self.flights, self.first, strict=True)]
+                for f, first in zip(self.flights, self.block_starts, strict=True)]
 
     @cached_property
     def quiet(self) -> list[np.ndarray]:
@@ -80,7 +80,7 @@ class Data:
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         return [bridging_power(f, study.vehicle, study.calibration, first[AIR], where, study.response)
-                for f, first, where in zip(self.flights, self.first, quiet, strict=True)]
+                for f, first, where in zip(self.flights, self.block_starts, quiet, strict=True)]
 
     @cached_property
     def residual(self) -> list[Spectra]:
@@ -188,7 +188,7 @@ def _replayed(data: Data, i: int, active: Sequence[Active]) -> Spectra:
     flight = data.workspace.cached("replayed", i, lambda: ReplayedFlight(data.flights[i], data.study.vehicle))
     bridged = bridged_residual(flight, (*data.study.calibration, *active))
     out = {}
-    for state, begin in data.first[i].items():  # the command view judges the commands: here they stay 0
+    for state, begin in data.block_starts[i].items():  # the command view judges the commands: here they stay 0
         replayed = short_time_spectra(bridged[:, :COMMAND.start], begin, state)
         out[state] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[state][:, :, :COMMAND.start] = replayed
@@ -199,10 +199,10 @@ def _cached(data: Data, name: str, i: int, active: Sequence[Active], make: Calla
     """Spectra of flight i under a hypothesis, made once while it is among the last used; of no effect always.
 
     The key is the flight's index with the names and values of the effects (`Active.key`), never the identity of an
-    object. Those of KEPT_SPECTRA hypotheses are kept, of fewer where all flights have more than KEPT_SAMPLES.
+    object. Those of CACHED_HYPOTHESES hypotheses are kept, of fewer where all flights have more than CACHED_SAMPLES.
     """
     if not active:
         return data.workspace.cached(f"{name} of no effect", i, make)
     samples, n = sum(len(f) for f in data.flights), len(data.flights)
-    hypotheses = max(KEPT_SPECTRA * KEPT_SAMPLES // max(samples, KEPT_SAMPLES), LEAST_KEPT)
+    hypotheses = max(CACHED_HYPOTHESES * CACHED_SAMPLES // max(samples, CACHED_SAMPLES), LEAST_CACHED_HYPOTHESES)
     return data.workspace.cached(name, (i, *(a.key for a in active)), make, hypotheses * n)

@@ -11,20 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.gauss_newton import ITERATIONS, Posterior, gauss_newton, start_of
+from airtouch.gap.evidence.gauss_newton import MOST_STEPS, Posterior, gauss_newton, start_of
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, problem_of
-from airtouch.gap.evidence.random_strength import with_strengths
+from airtouch.gap.evidence.random_strength import fit_strengths
 from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term, Terms, mean_slices
 
-TURNS = 6  #: most turns of fitting mean, then random effects; chosen for time
+#: turns, at most, of fitting mean, then random effects; chosen for time. A smaller number ends more fits before the
+#: peak
+MOST_TURNS = 6
 #: nats that a turn must gain for another to follow; chosen for time. A larger number ends fits farther from the peak
-SETTLED = 0.3
-BRIEF = 2  #: steps of a brief fit; chosen for time
-RESTARTS = 12  #: most restarts of a fit of several parameters; chosen for time. A larger number can only gain
+LEAST_TURN_GAIN = 0.3
+BRIEF_STEPS = 2  #: steps of a brief fit; chosen for time. A larger number comes closer to the peak
+#: restarts, at most, of a fit of several parameters; chosen for time. A larger number can only gain
+MOST_RESTARTS = 12
 #: standard deviation of a parameter's prior, natural steps; chosen, so that it says next to nothing. A smaller number
 #: draws strong effects to neutral
 PRIOR_STD = 30.0
@@ -56,11 +59,13 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     """Fit of effects to some blocks.
 
     start (k,): scaled parameters of mean effects at which it begins, NaN for unknown ones; prior_std: standard
-    deviation of these around neutral, natural steps, (k,) or one for all; brief: one turn, BRIEF steps of mean effects.
+    deviation of these around neutral, natural steps, (k,) or one for all; brief: one turn, BRIEF_STEPS steps of mean
+    effects.
 
-    Mean and random effects are fitted in turn, TURNS times at most, until a turn gains less than SETTLED. The turn of
-    the highest posterior is returned: a later one may be worse, as the fit of mean effects begins with the offsets at
-    0. The fit may end before it stands still. Where that matters, `converged` begins it anew and keeps the likelier.
+    Mean and random effects are fitted in turn, MOST_TURNS times at most, until a turn gains less than LEAST_TURN_GAIN.
+    The turn of the highest posterior is returned: a later one may be worse, as the fit of mean effects begins with the
+    offsets at 0. The fit may end before it stands still. Where that matters, `converged` begins it anew and returns the
+    likelier.
     """
     problem = problem_of(data, blocks)
     mean, random = mean_of(terms), random_of(terms)
@@ -68,20 +73,20 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     random_power: np.ndarray | float = 0.0
     # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
-        random = with_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
+        random = fit_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
         random_power = problem.random_power(random)
     best, highest = None, -np.inf
-    for _ in range(1 if brief else TURNS):
+    for _ in range(1 if brief else MOST_TURNS):
         posterior = Posterior(problem, mean, random_power, prior_std, uncertain_floor=bool(random))
-        solution = gauss_newton(posterior, x, BRIEF if brief else ITERATIONS)
+        solution = gauss_newton(posterior, x, BRIEF_STEPS if brief else MOST_STEPS)
         x, active = solution.x, active_at(mean, solution.x)
         if not random:
             return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
-        random = with_strengths(problem, random, solution.residual, active)
+        random = fit_strengths(problem, random, solution.residual, active)
         random_power, of_loop = problem.random_power(random), problem.loop_change(active, uncertain_floor=True)
         level = problem.likelihood(solution.residual, random_power + of_loop.extra_power) - of_loop.cost \
             - 0.5 * float(np.sum(np.square(x / prior_std)))
-        settled = not mean or level < highest + SETTLED
+        settled = not mean or level < highest + LEAST_TURN_GAIN
         if best is None or level > highest:
             best, highest = FittedTerms(_with_values(terms, x, random), x, solution.covariance), level
         if settled:
@@ -91,7 +96,7 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
 
 
 def converged(data: Data, blocks: BlockSet, best: FittedTerms) -> FittedTerms:
-    """The likeliest of fits that begin where the one before ended, until one gains less than SETTLED.
+    """The likeliest of fits that begin where the one before ended, until one gains less than LEAST_TURN_GAIN.
 
     best: the first of them, which is returned as it is where its mean effects have one parameter or none.
 
@@ -99,12 +104,12 @@ def converged(data: Data, blocks: BlockSet, best: FittedTerms) -> FittedTerms:
     leaves off half way: strengths of seven simulated batteries came out up to a third too small.
     """
     level = judge(data, blocks, best.terms)
-    for _ in range(RESTARTS if len(best.scaled) > 1 else 0):
+    for _ in range(MOST_RESTARTS if len(best.scaled) > 1 else 0):
         again = fit(data, blocks, best.terms, best.scaled)
         reached = judge(data, blocks, again.terms)
         if reached > level:
             best = again
-        if reached < level + SETTLED:
+        if reached < level + LEAST_TURN_GAIN:
             break
         level = reached
     return best

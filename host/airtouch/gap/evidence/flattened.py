@@ -120,11 +120,11 @@ class Flattened:
 def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
     """Some blocks of the flights of `data`, flattened."""
     layout = Layout(pieces, _counted(data.means_only))
-    commands = view_of(data.study.loop, data.flights, data.first, pieces)
+    commands = view_of(data.study.loop, data.flights, data.block_starts, pieces)
     noise = layout.gather([{state: data.study.floor.of_blocks(f, b[state], state) for state in b}
-                           for f, b in zip(data.flights, data.first, strict=True)]).real
+                           for f, b in zip(data.flights, data.block_starts, strict=True)]).real
     elements = _of_replay(data, layout, noise).followed_by(_of_commands(commands.elements))
-    return Flattened(layout, commands, elements, noise, _offsets(data, layout), layout.air_blocks(data.first))
+    return Flattened(layout, commands, elements, noise, _offsets(data, layout), layout.air_blocks(data.block_starts))
 
 
 def _counted(means_only: bool) -> dict[str, np.ndarray]:
@@ -171,4 +171,4 @@ def _offset_of_one(data: Data, flight: int, channel: int) -> list[Spectra]:
     ones = np.zeros((len(data.flights[flight]), COUNT))
     ones[~data.flights[flight].on_ground, channel] = 1.0
     return [{state: short_time_spectra(ones, begin, state) if j == flight else np.zeros_like(data.residual[j][state])
-             for state, begin in first.items()} for j, first in enumerate(data.first)]
+             for state, begin in first.items()} for j, first in enumerate(data.block_starts)]

@@ -15,24 +15,25 @@ from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
 from airtouch.gap.signatures.term import Term, mean_slices
 
-ITERATIONS = 8  #: most steps; chosen for time. A smaller number ends more fits before they stand still
+MOST_STEPS = 8  #: steps at most; chosen for time. A smaller number ends more fits before they stand still
 #: nats that a step must gain for the fit to go on; chosen for time. A larger number ends fits too early
 LEAST_STEP_GAIN = 0.02
 #: attempts at a step, each with more damping than the last; chosen for time. With a smaller number more steps fail
-TRIES = 5
-#: factor on the damping after a step that gained; its inverse after an attempt that failed; chosen
+MOST_ATTEMPTS = 5
+#: factor on the damping after a step that gained; its inverse after an attempt that failed; chosen. A smaller one
+#: changes the damping faster
 DAMPING_FACTOR = 0.1
 #: damping, a fraction of the diagonal, from which it grows at least: a first attempt has none, and the second has
 #: LEAST_DAMPING / DAMPING_FACTOR = 0.1, which divides a step in one parameter by 1.1; chosen. A larger number makes
 #: shorter steps
 LEAST_DAMPING = 0.01
-ROUNDING = 1e-9  #: nats that a step must gain at least, above what rounding may gain; chosen
+ROUNDING_GAIN = 1e-9  #: nats that a step must gain at least, above what rounding may gain; chosen
 #: standard deviation, natural steps, of the prior of parameters that only the commands show; chosen. A larger number
 #: holds them back less
 COMMAND_PRIOR_STD = 1.5
 NEAR_NEUTRAL = 0.05  #: scaled parameter at which a new effect begins, as some have no slope at neutral itself; chosen
 #: scaled parameters at which effects of the loop may begin; chosen. With fewer a fit may end at a lower peak
-GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
+LOOP_STARTS = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
@@ -91,7 +92,7 @@ class _Step(NamedTuple):
     gained: bool
 
 
-def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) -> MeanFit:
+def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = MOST_STEPS) -> MeanFit:
     """Mean effects of highest posterior, from scaled parameters x (k,) on, in `most` steps at most.
 
     No step lowers the posterior. The slopes are kept from step to step, as most effects are close to linear. They are
@@ -110,25 +111,26 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = ITERATIONS) ->
         slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
-        slopes_are_new = stuck or np.array_equal(now.x, slopes.at)
-        if slopes_are_new if not gained else before - now.cost < LEAST_STEP_GAIN:
+        gained_too_little = gained and before - now.cost < LEAST_STEP_GAIN
+        failed_with_new_slopes = not gained and (stuck or np.array_equal(now.x, slopes.at))
+        if gained_too_little or failed_with_new_slopes:
             break
         stuck = not gained
     return MeanFit(now.x, covariance, now.residual)
 
 
 def _step(posterior: Posterior, slopes: SpectraSlopes, now: _Point, bounds: Bounds, damping: float) -> _Step:
-    """A step from the point `now`, shortened until it gains, in TRIES attempts at most."""
+    """A step from the point `now`, shortened until it gains, in MOST_ATTEMPTS attempts at most."""
     problem, k = posterior.problem, len(now.x)
     weights = weights_of(problem, now.residual, now.extra_power)
     equations = normal_equations([s.column for s in slopes.by_parameter], posterior.prior_stds, now.residual, weights,
                                  np.concatenate([now.x, now.offsets]), problem.offsets)
     by_power = slopes.power_slopes(now.x, now.residual, now.extra_power, posterior.uncertain_floor)
     equations = equations.with_power(by_power)
-    for _ in range(TRIES):
+    for _ in range(MOST_ATTEMPTS):
         change, covariance = bounded_step(equations, now.x, bounds, damping)
         new = posterior.at(np.clip(now.x + change[:k], *bounds), now.offsets + change[k:])
-        if new.cost < now.cost - ROUNDING:
+        if new.cost < now.cost - ROUNDING_GAIN:
             return _Step(new, covariance, damping * DAMPING_FACTOR, True)
         damping = max(damping, LEAST_DAMPING) / DAMPING_FACTOR
     return _Step(now, covariance, damping, False)
@@ -149,13 +151,13 @@ def start_of(problem: Problem, mean: Sequence[Term], start: np.ndarray | None) -
 
 
 def _best_on_grid(problem: Problem, mean: Sequence[Term], x: np.ndarray, own: range) -> np.ndarray:
-    """The parameters (k,) with one of an effect's own moved to an entry of GRID, the best of all such moves.
+    """The parameters (k,) with one of an effect's own moved to an entry of LOOP_STARTS, the best of all such moves.
 
     The residual stays that without effects: a move counts by the expected power and by the cost of the floor alone.
     """
     low, high = bounds_of(mean)
     best, out = -np.inf, x
-    for i, amount in itertools.product(own, GRID):
+    for i, amount in itertools.product(own, LOOP_STARTS):
         trial = x.copy()
         trial[i] = np.clip(amount, low[i], high[i])
         of_loop = problem.loop_change(active_at(mean, trial))

@@ -1,8 +1,8 @@
 """Likelihood of spectra of which some power is expected: Whittle's, with tails for a floor that is not known exactly.
 
-A value's power over the expected one is exponential when a hypothesis holds (Whittle 1953); since the floor is
-estimated from few flights, a Student-like tail stands in for it. The sum that every likelihood is made of is compiled:
-one pass over the values, and one logarithm for many of them.
+A value's power over the expected one is exponential when a hypothesis holds (Whittle 1953). As the floor is estimated
+from few flights, the exponential is replaced by a law with heavier tails, like Student's. The sum that every likelihood
+is made of is compiled: one pass over the values, and one logarithm for many of them.
 """
 
 import functools
@@ -20,10 +20,13 @@ from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 #: most degrees of freedom of the tails in the replay view; chosen: those of four blocks, three each
 #: (`flattened.FREEDOM_OF_BLOCK`). A larger number has lighter tails, so that single loud blocks count as evidence
 REPLAY_FREEDOM = 12.0
-_COLUMN = float64[::1]
-LEAST, MOST = 1e-100, 1e100  #: sizes of a product at which its logarithm is taken; chosen, far from under- and overflow
-#: scales among which `tail_scale` seeks; chosen: they hold that of any freedom in use, and exp does not overflow
-BRACKET = 1e-3, 600.0
+#: bounds of the running products in `minus_log_likelihood`: one that leaves them is replaced by 1, and its logarithm is
+#: added to the sum; chosen. Closer bounds take more logarithms, wider ones let products under- or overflow
+LEAST_PRODUCT, LARGEST_PRODUCT = 1e-100, 1e100
+#: bounds of the root that `tail_scale` looks for; chosen. The root lies between them for all degrees of freedom in use;
+#: above 709 the exponential in it overflows
+LEAST_TAIL_SCALE, LARGEST_TAIL_SCALE = 1e-3, 600.0
+_COLUMN = float64[::1]  #: Numba's type of a contiguous array of numbers
 
 
 class PowerSlopes(NamedTuple):
@@ -125,8 +128,7 @@ def tail_scale(freedom: np.ndarray) -> np.ndarray:
 @functools.cache
 def _tail_scale(nu: float) -> float:
     """`tail_scale` for one number nu of degrees of freedom: the scale a of a e^a E1(a) = nu / (nu + 1)."""
-    low, high = BRACKET
-    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), low, high))
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), LEAST_TAIL_SCALE, LARGEST_TAIL_SCALE))
 
 
 @njit(float64(_COLUMN, _COLUMN, _COLUMN, _COLUMN, boolean[::1]), cache=True, error_model="numpy")
@@ -142,7 +144,8 @@ def minus_log_likelihood(size, power, tail_scale, exponents, valid):
     for i in range(len(size)):
         if not valid[i]:
             continue
-        if exponents[i] != exponent or not (powers > LEAST and powers < MOST and over < MOST):
+        within = powers > LEAST_PRODUCT and powers < LARGEST_PRODUCT and over < LARGEST_PRODUCT
+        if exponents[i] != exponent or not within:
             term = np.log(powers) + exponent * np.log(over) - lost
             new = total + term
             lost = (new - total) - term

@@ -123,8 +123,8 @@ class Problem:
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> BlockSet:
     """Every block of every flight, or of the flights of these numbers."""
     numbers = range(len(data.flights)) if flights is None else flights
-    return BlockSet(tuple((i, state, np.ones(len(data.first[i][state]), bool)) for i in numbers for state in (AIR, REST)
-                          if len(data.first[i][state])))
+    counts = [(i, state, len(data.block_starts[i][state])) for i in numbers for state in (AIR, REST)]
+    return BlockSet(tuple((i, state, np.ones(count, bool)) for i, state, count in counts if count))
 
 
 def problem_of(data: Data, blocks: BlockSet) -> Problem:

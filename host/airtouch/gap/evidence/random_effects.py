@@ -58,7 +58,7 @@ def extra_power(data: Data, term: Term) -> list[Spectra]:
 def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
     """Fraction (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
     acts = inside(gate, data.flights[i]).astype(float)
-    length, first = LENGTH[state], data.first[i][state]
+    length, first = LENGTH[state], data.block_starts[i][state]
     weight = hann_window(length)[0][:, 0] ** 2
     windows = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
     return (windows @ weight / weight.sum())[:, None, None]
@@ -91,7 +91,7 @@ def _by_running(data: Data, i: int, term: Term) -> Spectra:
     runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
             for seed in range(SEEDS)]
     mean, out = np.mean(runs, axis=0), _no_power(data, i)
-    for state, first in data.first[i].items():
+    for state, first in data.block_starts[i].items():
         changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
         total = np.sum([np.abs(short_time_spectra(change, first, state)) ** 2 / (SEEDS - 1) for change in changes],
                        axis=0)
@@ -210,7 +210,7 @@ def _thrust_noise(data: Data, i: int, term: Term) -> Spectra:
     density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
     folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
     folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
-    for b, first in enumerate(data.first[i][AIR]):
+    for b, first in enumerate(data.block_starts[i][AIR]):
         size = (thrust[first:first + LENGTH[AIR]] ** 2).mean(axis=0)
         out[AIR][b, :, LIFT_AND_TORQUE] = folded * (rms ** 2 * (mixing ** 2 @ size))
     return out

@@ -13,10 +13,13 @@ from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.term import Term
 from airtouch.simulation.effects import Active
 
-STRENGTH_ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn; chosen for time
+#: rounds in which the strengths of several random effects are fitted in turn; chosen for time. A smaller number ends
+#: fits of effects that trade against each other too early
+STRENGTH_ROUNDS = 4
 GRID_SIZE = 40  #: strengths that are tried before the best is refined; chosen. With fewer a lower peak may be refined
 LEAST_STRENGTH = 0.003  #: least of them, natural steps; chosen. An effect that is not there is given this strength
-LARGEST_STRENGTH = 1e3  #: largest of them, natural steps; chosen, beyond what flights show
+#: largest of them, natural steps; chosen, beyond what flights show. A larger number makes the grid coarser
+LARGEST_STRENGTH = 1e3
 #: least curvature of the likelihood in the logarithm of a strength, nats; chosen: it gives a standard deviation of a
 #: thousand times the strength, which says nothing
 LEAST_CURVATURE = 1e-6
@@ -25,8 +28,8 @@ LEAST_CURVATURE = 1e-6
 CURVATURE_STEP = 0.15
 
 
-def with_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
-                   ) -> list[Term]:
+def fit_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
+                  ) -> list[Term]:
     """Random effects with their likeliest strengths, fitted one after another, the others as they are.
 
     residual (n,): under the mean effects `mean`.
@@ -35,11 +38,11 @@ def with_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarra
     for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
         for i, term in enumerate(fitted):
             others = of_loop + problem.random_power([*fitted[:i], *fitted[i + 1:]])
-            fitted[i] = strongest(problem, term, residual, others)
+            fitted[i] = fit_strength(problem, term, residual, others)
     return fitted
 
 
-def strongest(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
+def fit_strength(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
     """A random effect with its likeliest strength; unchanged where it adds no power.
 
     residual (n,); extra_power (n,): that of the other effects.

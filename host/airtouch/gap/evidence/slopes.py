@@ -15,10 +15,10 @@ from airtouch.simulation.effects import Active
 
 #: change of a scaled parameter over which slopes are taken; chosen. A larger number sees more of the curvature as
 #: slope, a smaller one more of the rounding
-STEP = 0.02
+SLOPE_STEP = 0.02
 #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew; chosen for time. A larger number
 #: keeps slopes that no longer hold, so that steps fail and the fit takes more of them
-FAR = 0.3
+LARGEST_MOVE = 0.3
 
 
 def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
@@ -56,9 +56,9 @@ class SpectraSlopes:
     def moved_to(self, x: np.ndarray, anew: bool = False) -> "SpectraSlopes":
         """The slopes for scaled parameters x (k,), where those of nonlinear parameters are taken anew.
 
-        All are where x is FAR from `at`, or if `anew`.
+        All are where x is farther than LARGEST_MOVE from `at`, or if `anew`.
         """
-        if anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any()):
+        if anew or bool((np.abs(x - self.at) > LARGEST_MOVE * np.maximum(np.abs(x), 1.0)).any()):
             return slopes_at(self.problem, self.mean, x)
         stale = [i for i, s in enumerate(self.by_parameter) if s.nonlinear]
         newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale), strict=True))
@@ -89,7 +89,10 @@ def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray) -> SpectraS
 
 
 def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int]) -> list[ParameterSlopes]:
-    """The slopes by some of the parameters at scaled parameters x (k,), by differences over STEP within the bounds."""
+    """The slopes by some of the parameters at scaled parameters x (k,).
+
+    They are differences over SLOPE_STEP, within the bounds. which: indices of the parameters.
+    """
     if not which:
         return []
     high = bounds_of(mean).high
@@ -97,7 +100,7 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
     residual, extra_torque_power = problem.residual(before), problem.extra_torque_power(before)
     out = []
     for i in which:
-        step = STEP if x[i] + STEP <= high[i] else -STEP
+        step = SLOPE_STEP if x[i] + SLOPE_STEP <= high[i] else -SLOPE_STEP
         shifted = x.copy()
         shifted[i] += step
         after = active_at(mean, shifted)

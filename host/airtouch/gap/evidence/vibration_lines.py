@@ -29,18 +29,26 @@ from airtouch.simulation.plant import hover_speed
 
 BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
 #: rad^2/s, variance that a rotor's phase gains over the commanded one; chosen. A larger number makes wider lines
-WANDER = 0.3
-SPREADS_HZ = (0.0, 1.0, 3.0)  #: spreads of the single rotors' lines around their mean that are tried; chosen
+PHASE_WANDER = 0.3
+#: Hz, standard deviations of the single rotors' lines around their mean that are tried; chosen. Larger ones fit wider
+#: lines
+SPREADS_HZ = (0.0, 1.0, 3.0)
 #: relative error of a rotor's speed where the vehicle declares thrust over speed squared, or the log has the speed;
 #: chosen. A larger number looks for lines farther from where they should be, and may find others
-KNOWN_SPEED = 0.02
+SPEED_ERROR = 0.02
 #: columns of the rotors' logged speeds, 1/min
 RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: lines are looked for above it, as forces of other origin are strong below; chosen
-STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
-FINER = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)  #: multiples of the best that are tried then, up to its neighbours
-AROUND = 3  #: bins on either side of the rough shift in which it is refined; chosen, more than the rough step of 2
-MOST_BLOCKS = 40  #: most blocks by which the shift is estimated; chosen for time
+STRENGTH_GRID = np.geomspace(1e-3, 1e3, 13)  #: power of lines over the floor's, of which the best is refined; chosen
+#: multiples of the best strength of the grid that are tried then, from its one neighbour to the other; chosen. More
+#: find the strength more exactly
+FINER_FACTORS = np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
+#: bins between the shifts that are tried first; chosen for time. With more the best may lie between two of them
+ROUGH_BINS = 2
+#: bins on either side of the best of these in which every shift is tried then; chosen, more than ROUGH_BINS
+FINER_BINS = 3
+#: blocks, at most, by which the shift is estimated; chosen for time. More find it more exactly
+MOST_BLOCKS = 40
 
 
 @dataclass(frozen=True)
@@ -78,12 +86,12 @@ def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
 
 
 def widened(power: np.ndarray, spread_hz: float) -> np.ndarray:
-    """Two-sided power (blocks, BINS) where phases walk randomly (WANDER) and frequencies are uncertain.
+    """Two-sided power (blocks, BINS) where phases walk randomly (PHASE_WANDER) and frequencies are uncertain.
 
     power: that of `two_sided`; spread_hz: standard deviation of the frequency (Gaussian).
     """
     apart = PERIOD_S * np.minimum(np.arange(BINS), BINS - np.arange(BINS))
-    less = np.exp(-0.5 * WANDER * apart - 0.5 * (2.0 * np.pi * spread_hz * apart) ** 2)
+    less = np.exp(-0.5 * PHASE_WANDER * apart - 0.5 * (2.0 * np.pi * spread_hz * apart) ** 2)
     return np.maximum(np.fft.fft(np.fft.ifft(power, axis=1) * less, axis=1).real, 0.0)
 
 
@@ -112,19 +120,19 @@ def speeds(flight: Flight, study: Study) -> np.ndarray:
 def _search(data: Data) -> Lines:
     """The lines with the likeliest shift and spread, by some blocks of all flights.
 
-    First the shift at one spread, in every other bin, then shift and spread together around it.
+    First the shift at one spread, in every ROUGH_BINS bins, then shift and spread together around it.
     """
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
-    powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
+    powers = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.block_starts, strict=True)]
     speed_known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
     turns = hover / (2.0 * np.pi)
-    reach = int(min(np.ceil(KNOWN_SPEED * turns * PERIOD_S * BINS), BINS // 2)) if speed_known else BINS // 2
+    reach = int(min(np.ceil(SPEED_ERROR * turns * PERIOD_S * BINS), BINS // 2)) if speed_known else BINS // 2
     sample = _Sample(data, powers)
     if not len(sample.over_floor):
         return Lines([folded(widened(z, 0.0)) for z in powers], 0, 0.0)
-    rough = max(range(-reach, reach + 1, 2), key=lambda shift: sample.gain(SPREADS_HZ[1], shift))
-    around = range(max(rough - AROUND, -reach), min(rough + AROUND, reach) + 1)
+    rough = max(range(-reach, reach + 1, ROUGH_BINS), key=lambda shift: sample.gain(SPREADS_HZ[1], shift))
+    around = range(max(rough - FINER_BINS, -reach), min(rough + FINER_BINS, reach) + 1)
     spread, shift = max(itertools.product(SPREADS_HZ, around), key=lambda pair: sample.gain(*pair))
     power = [folded(widened(z, spread), shift) for z in powers]
     return Lines(_scaled_by_flight(data, power), int(shift), spread)
@@ -142,11 +150,11 @@ class _Sample:
 
     def gain(self, spread_hz: float, shift: int) -> float:
         """Log likelihood, without OVERLAP_WEIGHT, that lines of the best strength gain over none."""
-        shape = folded(self.two_sided_power[spread_hz], shift)[:, _judged()] / self.floor
+        shape = folded(self.two_sided_power[spread_hz], shift)[:, _line_bins()] / self.floor
         return best_strength(self.over_floor, shape).gain
 
 
-def _judged() -> np.ndarray:
+def _line_bins() -> np.ndarray:
     """Bins (bins,) in which lines are looked for."""
     f = np.fft.rfftfreq(BINS, PERIOD_S)
     return (f >= LOWEST_HZ) & (f < f[-1])
@@ -163,10 +171,13 @@ class _OverFloor(NamedTuple):
 
 
 def _over_floor(data: Data, blocks: np.ndarray) -> _OverFloor:
-    """The power of blocks over the floor in the bins of `_judged`. blocks: spectra (blocks, bins, 3) of the forces."""
-    floor = data.study.floor.power[AIR][_judged(), FORCE]
+    """The power of blocks over the floor in the bins of `_line_bins`.
+
+    blocks: spectra (blocks, bins, 3) of the forces.
+    """
+    floor = data.study.floor.power[AIR][_line_bins(), FORCE]
     with np.errstate(invalid="ignore"):
-        over = np.nan_to_num(np.abs(blocks[:, _judged()]) ** 2 / floor).mean(axis=2)
+        over = np.nan_to_num(np.abs(blocks[:, _line_bins()]) ** 2 / floor).mean(axis=2)
     return _OverFloor(over, 1.0 / (1.0 / floor).mean(axis=1))
 
 
@@ -183,10 +194,12 @@ class BestStrength(NamedTuple):
 def best_strength(over: np.ndarray, shape: np.ndarray) -> BestStrength:
     """The likeliest strength of lines of a shape, to the nearest that is tried.
 
-    over (blocks, bins): power over the floor, a ratio; shape (blocks, bins): that of lines of strength 1. The tails
-    have the scale nu, not `likelihood.tail_scale` of nu as elsewhere: with that other strengths would be found.
+    over (blocks, bins): power over the floor, a ratio; shape (blocks, bins): that of lines of strength 1.
+
+    The law of the power is Lomax's, whose tails have the scale nu, as that of the commands (`loop.command_spectra`). It
+    is not the one of the replay, of scale `likelihood.tail_scale`, with which other strengths would be found.
     """
-    strengths = STRENGTHS / max(float(shape.mean()), LEAST_POWER)
+    strengths = STRENGTH_GRID / max(float(shape.mean()), LEAST_POWER)
     size, flat = over.ravel(), shape.ravel()
     tail_scale, exponents, valid = (np.full(len(size), x) for x in (REPLAY_FREEDOM, REPLAY_FREEDOM + 1.0, True))
 
@@ -196,7 +209,7 @@ def best_strength(over: np.ndarray, shape: np.ndarray) -> BestStrength:
 
     levels = [likelihood(s) for s in strengths]
     best = int(np.argmax(levels))
-    fine = strengths[best] * FINER
+    fine = strengths[best] * FINER_FACTORS
     fine_levels = [likelihood(s) for s in fine]
     return BestStrength(max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))]))
 
@@ -209,6 +222,6 @@ def _scaled_by_flight(data: Data, power: list[np.ndarray]) -> list[np.ndarray]:
     for i, (lines_of_flight, residual) in enumerate(zip(power, data.residual, strict=True)):
         if len(lines_of_flight):
             over, floor = _over_floor(data, residual[AIR][:, :, FORCE])
-            strength[i] = best_strength(over, lines_of_flight[:, _judged()] / floor).strength
+            strength[i] = best_strength(over, lines_of_flight[:, _line_bins()] / floor).strength
     mean = strength[strength > 0.0].mean() if (strength > 0.0).any() else 1.0
     return [p * s / mean for p, s in zip(power, strength, strict=True)]

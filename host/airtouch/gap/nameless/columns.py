@@ -101,7 +101,7 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
     def make() -> list[list[dict[str, np.ndarray]]]:
         """The spectra, by flight and axis."""
         out = []
-        for flight, first in zip(data.flights, data.first, strict=True):
+        for flight, first in zip(data.flights, data.block_starts, strict=True):
             signals = basis(flight, data.study.vehicle)
             out.append([{state: short_time_spectra(signals[:, :, axis], first[state], state) for state in first}
                         for axis in range(3)])

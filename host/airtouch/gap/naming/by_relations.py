@@ -51,9 +51,8 @@ def selection_by_relations(search: Search, inference: Inference, rank_all: bool 
 
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:
     """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
-    parameter = effect_class.name.partition(" ")[2]
-    if parameter:
-        return [v for v in variants if v[0].free == (parameter,)]
+    if effect_class.own_parameter is not None:
+        return [v for v in variants if v[0].free == (effect_class.own_parameter,)]
     if effect_class.shape is None:
         return list(variants)
     return [v for v in variants if v[0].values[v[0].signature.class_by] == effect_class.shape]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import clock_gain, clock_gains
+from airtouch.gap.evidence.clock import clock_gains, measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.judge import cell_gains, judge
@@ -69,7 +69,7 @@ def halves(data: Data) -> tuple[BlockSet, BlockSet]:
     """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
     by_flight = len(data.flights) >= HALVED_BY_FLIGHT
     pieces: tuple[list, list] = ([], [])
-    counts = [(i, state, len(f[state])) for i, f in enumerate(data.first) for state in (AIR, REST)]
+    counts = [(i, state, len(f[state])) for i, f in enumerate(data.block_starts) for state in (AIR, REST)]
     for i, state, n in counts:
         if n and by_flight:
             pieces[i % 2].append((i, state, np.ones(n, bool)))
@@ -99,7 +99,7 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
         gain = _charged_gain(trial, fits, charges, clock_gains(trial.data, before))
-    of_clock = [clock_gain(trial.data, t)[0] for t in (*before, *terms) if t.shows_in == CLOCK]
+    of_clock = [measured_clock_term(trial.data, t).term for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.evidence.clock import clock_left
+from airtouch.gap.evidence.clock import unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
@@ -118,7 +118,7 @@ def _by_replay(search: Search, partial: PartialSelection) -> Selection:
     over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
     selection = Selection(
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
-        nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
+        nameless=NamelessGain(over_none, over_last_step, unexplained_clock_gain(trial.data, last)),
         policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
     if policy.judges_unsteadiness:
         selection = replace(selection, unsteadiness=unsteadiness_of(trial.data))
@@ -131,5 +131,5 @@ def nameless_nats(trial: Trial, base: Candidate | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.halves, fits)), 0.0)
-    return of_spectra + clock_left(trial.data, base.terms if base else ())
+    return of_spectra + unexplained_clock_gain(trial.data, base.terms if base else ())
 

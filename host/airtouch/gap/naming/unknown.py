@@ -14,21 +14,21 @@ The flights are explained where the largest of the ratios to the limits is below
 
 import numpy as np
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.signatures.signature import MEAN
 
 
-def against(selection: Selection) -> Against:
+def counterevidence(selection: Selection) -> Counterevidence:
     """Nats that speak against the effects named, with those that may where they are right.
 
     By the relations of signals where these decide, else the gain of the nameless model beside the effects.
     """
     if selection.inference is not None:
-        return selection.inference.against
+        return selection.inference.counterevidence
     gain = selection.last_step.gain if selection.last_step else 0.0
     limit = selection.policy.unknown.nats(gain, selection.nameless.over_none, selection.assumed)
-    return Against(selection.nameless.over_last_step, limit, of_distance=False)
+    return Counterevidence(selection.nameless.over_last_step, limit, of_distance=False)
 
 
 def over_prediction_ratio(selection: Selection) -> float:
@@ -39,7 +39,7 @@ def over_prediction_ratio(selection: Selection) -> float:
 
 def remainder_ratio(selection: Selection) -> float:
     """Nats of what the effects named leave over their limit."""
-    remainder = against(selection)
+    remainder = counterevidence(selection)
     never_negative = float(np.logaddexp(remainder.nats, 0.0))  # softplus: the nats where these are many, else above 0
     return never_negative / remainder.limit
 

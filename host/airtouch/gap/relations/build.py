@@ -7,7 +7,7 @@ The flights' seed is no sealed set's (`learning.SEED`), so that the file is the 
 Whitened features (F of them) have the covariance 1 in nominal flights. What is stored is their projection on the Q
 directions in which effects and nameless disturbances move them.
 
-How many flights it takes and how many directions are kept is in `settings`. The thresholds below were chosen with
+How many flights it takes and how many directions are stored is in `settings`. The thresholds below were chosen with
 the library of 2026-11-24, on flights of `learning.SEED` alone (host/docs/looks.md, 12:43 UTC of that day). What other
 values were tried is not recorded.
 """
@@ -29,7 +29,7 @@ from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel
 from airtouch.gap.relations.learning import (
     SEED,
     Drawing,
-    Say,
+    Progress,
     Scene,
     Stream,
     all_drawings,
@@ -45,9 +45,11 @@ from airtouch.logs.files import check_free
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import DEFAULT_VEHICLE, load
 
-#: the direction of a nameless disturbance counts where its shift is longer, nominal standard deviations
+#: nominal standard deviations; the direction of a nameless disturbance counts where its shift is longer. A larger
+#: number takes directions from fewer flights, with less nominal scatter in them
 LEAST_NAMELESS_LENGTH = 3.0
-#: two effects show their interaction where the smaller one's shift is longer, nominal standard deviations
+#: nominal standard deviations; two effects show their interaction where the smaller one's shift is longer. A larger
+#: number takes the interaction from fewer flights, with less nominal scatter in it
 LEAST_PAIR_LENGTH = 12.0
 
 
@@ -83,46 +85,49 @@ class PairedFlights:
         return self.drawing.active(float(np.exp(rng.uniform(0.5 * (low + high), high))), rng)
 
 
-def build(scene: Scene, settings: BuildSettings = SHIPPED, say: Say = lambda _: None) -> Library:
-    """The library of a scene, learned from flights that are simulated there, and calibrated. say: told of each step."""
-    say("nominal flights")
-    flown = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
-    features = np.array(list(flown.values()))
+def build(scene: Scene, settings: BuildSettings = SHIPPED, progress: Progress = lambda _: None) -> Library:
+    """The library of a scene, learned from flights that are simulated there, and calibrated.
+
+    progress: called with the name of each step.
+    """
+    progress("nominal flights")
+    by_number = {i: f for i in range(settings.nominal_flights) if (f := fly(scene, i)) is not None}
+    features = np.array(list(by_number.values()))
     standard = standard_of(features)
     whitening = Whitening(standard, cholesky_factor(standard(features)))
-    nominal = dict(zip(flown, whitening(features), strict=True))
-    middle = np.mean(list(nominal.values()), axis=0)
+    nominal = dict(zip(by_number, whitening(features), strict=True))
+    nominal_mean = np.mean(list(nominal.values()), axis=0)
     paired = []
     for drawing in all_drawings():
-        say(f"{drawing.name} {drawing.shape or ''}")
+        progress(f"{drawing.name} {drawing.shape or ''}")
         paired.append(_paired_flights(scene, whitening, nominal, drawing, settings))
-    say("flights with nameless disturbances")
-    nameless = np.array([whitening(f)[0] - nominal[i]
-                         for i, f in disturbed_flights(scene, settings.nameless_flights) if i in nominal])
+    progress("flights with nameless disturbances")
+    nameless = np.array([whitening(f.features)[0] - nominal[f.number]
+                         for f in disturbed_flights(scene, settings.nameless_flights) if f.number in nominal])
     axes = directions([p.shift for p in paired], settings.directions_of_class, nameless,
                       settings.directions_of_nameless)
     projection = solve_triangular(whitening.lower, axes, lower=True, trans="T").astype(HALF_PRECISION).astype(float)
     axes = whitening.lower.T @ projection  # as they are after the rounding
-    classes = tuple(_class_of(p, axes, middle) for p in paired)
+    classes = tuple(_class_of(p, axes, nominal_mean) for p in paired)
     coordinates = Coordinates(standard, projection, (standard(features) @ projection).mean(axis=0))
     additive = LearnedModel(classes, interaction=np.zeros((projection.shape[1], 0)),
-                            nameless=_nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
-    say("flights of two effects")
+                            nameless=nameless_loadings(nameless @ axes)[:, :settings.rank_of_nameless])
+    progress("flights of two effects")
     interaction = _interaction(scene, coordinates, additive, paired, settings.flights_of_two)
     model = replace(additive, interaction=interaction[:, :settings.rank_of_interaction])
-    say("calibration")
+    progress("calibration")
     distance = nominal_distance(scene, coordinates.rounded(), settings.calibration.nominal_flights)
     library = Library(scene.scenario, scene.vehicle.name, coordinates, model, distance)
-    return calibrated(scene, read(packed(library)), settings.calibration, say)  # as it will be read, rounded
+    return calibrated(scene, read(packed(library)), settings.calibration, progress)  # as it will be read, rounded
 
 
-def _class_of(paired: PairedFlights, axes: np.ndarray, middle: np.ndarray) -> EffectClass:
-    """The class of paired flights in the coordinates along axes (F, Q); middle (F,): mean of nominal flights.
+def _class_of(paired: PairedFlights, axes: np.ndarray, nominal_mean: np.ndarray) -> EffectClass:
+    """The class of paired flights in the coordinates along axes (F, Q); nominal_mean (F,): of whitened features.
 
     Raises AirTouchError where too few of the flights show the effect.
     """
     drawing = paired.drawing
-    flights = ClassFlights(paired.amount, paired.shift @ axes, (paired.whitened - middle) @ axes)
+    flights = ClassFlights(paired.amount, paired.shift @ axes, (paired.whitened - nominal_mean) @ axes)
     learned = learn_class(drawing.name, drawing.kind.effect, drawing.shape, flights)
     if learned is None:
         raise AirTouchError(f"too few flights show {drawing.name}: fly more for each knot")
@@ -137,28 +142,29 @@ def _paired_flights(scene: Scene, whitening: Whitening, nominal: dict[int, np.nd
     low = min(weakest_strength(high, partial(_shifts, scene, whitening, few, drawing)), high / KNOT_FACTOR)
     of_direction = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
     count = int(of_direction * settings.flights_per_knot * (np.log(high / low) / KNOT + 1.0))
-    flown = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
-    amount = np.array([scaled(drawing, a) for _, a, _ in flown])
-    whitened = whitening(np.array([f for *_, f in flown]))
-    shift = whitened - np.array([nominal[i] for i, *_ in flown])
+    flights = [f for f in drawn_flights(scene, drawing, (low, high), count) if f.number in nominal]
+    amount = np.array([scaled(drawing, f.active) for f in flights])
+    whitened = whitening(np.array([f.features for f in flights]))
+    shift = whitened - np.array([nominal[f.number] for f in flights])
     return PairedFlights(drawing, amount[:, np.abs(amount).max(axis=0) > 0.0], shift, whitened, (low, high))
 
 
 def _shifts(scene: Scene, whitening: Whitening, nominal: dict[int, np.ndarray], drawing: Drawing, strength: float,
             ) -> list[np.ndarray]:
     """Whitened shifts (F,) by a class at a strength, of the flights of these numbers that end well."""
-    flown = ((i, fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))]))
+    features = ((i, fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, Stream.WEAKEST, i]))]))
              for i in nominal)
-    return [whitening(f)[0] - nominal[i] for i, f in flown if f is not None]
+    return [whitening(f)[0] - nominal[i] for i, f in features if f is not None]
 
 
-def _nameless_loadings(shift: np.ndarray) -> np.ndarray:
+def nameless_loadings(shift: np.ndarray) -> np.ndarray:
     """Directions (Q, r), times the standard deviation, of nameless shifts (n, Q) over their length.
 
     The direction of the largest one comes first.
     """
     length = np.linalg.norm(shift, axis=1, keepdims=True)
-    unit_shift = (shift / np.maximum(length, 1e-9))[length[:, 0] > LEAST_NAMELESS_LENGTH]
+    clear = length[:, 0] > LEAST_NAMELESS_LENGTH
+    unit_shift = shift[clear] / length[clear]
     _, deviation, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
     return axes.T * deviation
 
@@ -181,18 +187,18 @@ def _interaction(scene: Scene, coordinates: Coordinates, additive: LearnedModel,
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
                 relative.append(residual / smaller)
-    return _beyond_noise(np.array(relative), float(np.mean(noise)))
+    return loadings_beyond_noise(np.array(relative), float(np.mean(noise)))
 
 
-def _beyond_noise(relative: np.ndarray, noise: float) -> np.ndarray:
-    """Directions (Q, r), times the standard deviation, in which values (n, Q) vary more than such a noise may.
+def loadings_beyond_noise(values: np.ndarray, noise: float) -> np.ndarray:
+    """Directions (Q, r), times the standard deviation, in which values (n, Q) vary more than noise alone may.
 
-    noise: its variance. The direction of the largest variance comes first.
+    noise: variance of the noise in each direction. The direction of the largest variance comes first.
     """
-    many, dimensions = relative.shape
-    _, deviation, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
-    stands = stands_out(deviation ** 2, noise, dimensions, many)
-    return axes[stands].T * np.sqrt(deviation[stands] ** 2 - noise)
+    samples, dimensions = values.shape
+    _, deviation, axes = np.linalg.svd(values / np.sqrt(samples), full_matrices=False)
+    beyond = stands_out(deviation ** 2, noise, dimensions, samples)
+    return axes[beyond].T * np.sqrt(deviation[beyond] ** 2 - noise)
 
 
 def _residual_of_two(model: LearnedModel, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
@@ -212,7 +218,8 @@ def main() -> None:
     parser.add_argument("--force", action="store_true", help="replace the file")
     options = parser.parse_args()
     check_free(options.out, options.force)
-    library = build(Scene(options.scenario, load(options.vehicle)), say=lambda text: print(text, flush=True))
+    library = build(Scene(options.scenario, load(options.vehicle)),
+                    progress=lambda text: print(text, flush=True))
     save(library, options.out, options.force)
     for c in library.model.classes:
         measured = c.calibration

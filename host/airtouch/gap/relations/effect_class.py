@@ -13,32 +13,45 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.relations.readout import Readout
+from airtouch.gap.signatures.random_draws import own_parameter
 
-SMALLEST = 1e-300  #: least divisor and least argument of a logarithm
+SMALLEST = 1e-300  #: least divisor and least argument of a logarithm, to which a 0 is raised; chosen, below any number
 #: factor of strength between two knots of a curve. A larger number bends curves less, a smaller one needs more flights
 KNOT_FACTOR = 3.0
 KNOT = float(np.log(KNOT_FACTOR))
-#: a flight whose shift along the class's main direction is shorter says nothing of the curve, nominal deviations
+#: nominal deviations; a flight whose shift along the class's main direction is shorter says nothing of the curve. A
+#: larger number leaves out more of the weakest flights
 LEAST_SHIFT = 0.5
-#: errors of the curve count relative to the length of the shift, but not of a shorter one, nominal deviations
+#: nominal deviations; errors of the curve count relative to the length of the shift, but not of a shorter one. A larger
+#: number fits the curve more to strong flights
 LEAST_WEIGHT_LENGTH = 5.0
-#: flights with a longer shift show the scatter about the curve, as it is larger than that of nominal flights there,
-#: nominal deviations; where less than half of the flights are, the longer half
+#: nominal deviations; flights with a longer shift show the scatter about the curve, as it is larger than that of
+#: nominal flights there; where less than half of the flights have one, the longer half. A larger number takes it from
+#: fewer
 LEAST_SCATTER_LENGTH = 40.0
-OUTLIER_RATIO = 4.0  #: a flight that lies farther from the curve, in medians of this distance, hit something
-LEAST_NEGATIVE_FRACTION = 0.1  #: fraction of flights with a negative strength above which a class has two signs
-MOST_AXES = 16  #: directions of the scatter that are kept, the widest ones
-#: quantile of the strengths at which the curve begins: a few flights of the weakest show next to nothing
+#: distance of a flight from the curve over the median distance, above which it is an outlier that hit something. A
+#: larger number lets outliers bend the curve
+OUTLIER_RATIO = 4.0
+#: fraction of flights with a negative strength above which a class has two signs. A larger number holds more classes
+#: for one-sided
+LEAST_NEGATIVE_FRACTION = 0.1
+MOST_AXES = 16  #: directions of the scatter that are stored, the widest ones. A larger number makes a larger file
+#: quantile of the strengths at which the curve begins: a few flights of the weakest show next to nothing. A larger
+#: number begins it at stronger flights
 FIRST_KNOT_QUANTILE = 0.01
-#: a shift of this length or longer has the full weight in the main direction, nominal deviations
+#: nominal deviations; a shift of this length or longer has the full weight in the main direction. A larger number gives
+#: weak flights less weight in it
 FULL_WEIGHT_LENGTH = 3.0
-FIT_ROUNDS = 2  #: fits of a curve: of all flights, then without outliers
+FIT_ROUNDS = 2  #: fits of a curve: of all flights, then without outliers. More leave out more flights
+#: singular values of a curve's equations over the largest one, below which they count as 0. A larger number makes parts
+#: of the curve that few flights show smaller
+CURVE_RCOND = 1e-6
 #: flights for each coefficient of a coordinate of the curve, at least: with fewer the curve has fewer knots, and with
 #: one it would pass through every flight; chosen
 FLIGHTS_PER_COEFFICIENT = 2
-GRID_PER_KNOT = 6  #: strengths for each knot at which a class of one parameter is tried first
+GRID_PER_KNOT = 6  #: strengths for each knot at which a class of one parameter is tried first. More cost time
 #: a direction counts as scatter if its eigenvalue is more than this times the largest one that noise alone gives
-#: (Marchenko and Pastur 1967, for infinitely many samples)
+#: (Marchenko and Pastur 1967, for infinitely many samples). A larger number finds fewer directions
 EIGENVALUE_MARGIN = 1.2
 
 
@@ -49,8 +62,8 @@ class ClassCalibration:
     readout: what its strengths are in the effect's units; None where too few flights show the effect.
     The others are shares, which are fractions of the evidence for the class. nameless_share, second_share: what a
     nameless disturbance, or a second effect, gains beside the class; four of five flights with it have at most so much.
-    distance_scatter: standard deviation of the nats by which a flight with the class lies farther from it than nominal
-    flights from none, beside that of nominal flights.
+    distance_scatter: standard deviation of a flight's excess distance from the class (`Library.excess`), without the
+    part that nominal flights have too (`Library.excess_deviation` adds both).
     """
 
     readout: Readout | None = None
@@ -83,9 +96,9 @@ class EffectClass:
     calibration: ClassCalibration = ClassCalibration()
 
     @property
-    def of_one_parameter(self) -> bool:
-        """Whether the effect has several parameters, each with a class of its own: its name is "effect parameter"."""
-        return self.name != self.effect and self.name.startswith(f"{self.effect} ")
+    def own_parameter(self) -> str | None:
+        """The effect's parameter that the class is of, where each has a class of its own; else None."""
+        return own_parameter(self.effect, self.name)
 
     @property
     def least(self) -> float:
@@ -104,12 +117,19 @@ class EffectClass:
         return together.reshape(len(strength), -1) @ self.table.reshape(together[0].size, -1)
 
     @cached_property
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strengths (n, 1) of a class with one parameter, GRID_PER_KNOT a knot, and the shifts there (n, Q)."""
+    def grid(self) -> "StrengthGrid":
+        """Strengths of a class with one parameter, GRID_PER_KNOT a knot, from the least to the highest."""
         steps = GRID_PER_KNOT * (len(self.knots) - 1) + 1
         one = np.exp(np.linspace(self.knots[0], self.knots[-1], steps))
         strength = np.concatenate([one, -one] if self.signed else [one])[:, None]
-        return strength, self.mean(strength)
+        return StrengthGrid(strength, self.mean(strength))
+
+
+class StrengthGrid(NamedTuple):
+    """Strengths (n, 1) and the expected shifts (n, Q) there."""
+
+    strengths: np.ndarray
+    shifts: np.ndarray
 
 
 def _magnitude(strength: np.ndarray) -> np.ndarray:
@@ -199,7 +219,7 @@ def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights,
     knots = np.linspace(low, high, max(min(int(np.ceil((high - low) / KNOT)) + 1, most_knots), 2))
     columns = (parts[:, :, None] * _hats(magnitude, knots)[:, None]).reshape(len(strength), -1)
     weight = 1.0 / np.maximum(np.linalg.norm(shift, axis=1), LEAST_WEIGHT_LENGTH)
-    table = np.linalg.lstsq(columns * weight[:, None], shift * weight[:, None], rcond=1e-6)[0]
+    table = np.linalg.lstsq(columns * weight[:, None], shift * weight[:, None], rcond=CURVE_RCOND)[0]
     expected = columns @ table
     length = np.linalg.norm(expected, axis=1)
     distance = np.linalg.norm(shift - expected, axis=1) / np.hypot(length, LEAST_WEIGHT_LENGTH)
@@ -210,26 +230,26 @@ def _fitted(name: str, effect: str, shape: float | None, flights: ClassFlights,
                        axes=axes, variances=variances), near
 
 
-def _scatter(residual: np.ndarray, length: np.ndarray, fitted: int) -> tuple[np.ndarray, np.ndarray]:
+def _scatter(residual: np.ndarray, length: np.ndarray, coefficients: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions (Q, r), and variances (r,) along them, of flights about their curve, over the squared shift.
 
     residual (n, Q): flights less their expected shift, of this length (n,); what nominal flights scatter is not
-    counted. fitted: coefficients of each coordinate of the curve.
+    counted. coefficients: number of those that each coordinate of the curve was fitted with.
     """
     clear = length >= min(float(np.median(length)), LEAST_SCATTER_LENGTH)
     relative = residual[clear] / length[clear, None]
-    many = len(relative)
+    samples = len(relative)
     noise = float(np.mean(length[clear] ** -2.0))
-    freedom = max(many - fitted * clear.mean(), 1.0)
+    freedom = max(samples - coefficients * clear.mean(), 1.0)
     _, deviation, axes = np.linalg.svd(relative / np.sqrt(freedom), full_matrices=False)
-    stands = stands_out(deviation ** 2, noise, residual.shape[1], many)
-    stands[MOST_AXES:] = False
-    return axes[stands].T, deviation[stands] ** 2 - noise
+    beyond = stands_out(deviation ** 2, noise, residual.shape[1], samples)
+    beyond[MOST_AXES:] = False
+    return axes[beyond].T, deviation[beyond] ** 2 - noise
 
 
-def stands_out(variance: np.ndarray, noise: float, dimensions: int, many: int) -> np.ndarray:
+def stands_out(variance: np.ndarray, noise: float, dimensions: int, samples: int) -> np.ndarray:
     """Which eigenvalues (r,) of a covariance exceed what noise of this variance gives, bool (r,).
 
-    many: samples of which the covariance is, each of so many dimensions.
+    samples: number of those of which the covariance is; dimensions: of each.
     """
-    return variance > EIGENVALUE_MARGIN * noise * (1.0 + np.sqrt(dimensions / many)) ** 2
+    return variance > EIGENVALUE_MARGIN * noise * (1.0 + np.sqrt(dimensions / samples)) ** 2

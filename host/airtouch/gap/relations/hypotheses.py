@@ -1,6 +1,7 @@
 """Hypotheses on a flight and their evidence: effects together, or a nameless disturbance.
 
-A flight's coordinates are Q values, of which nominal flights have the covariance 1; evidence is in nats.
+A flight's coordinates are Q values, of which nominal flights have the covariance 1. The evidence for a hypothesis is
+the log of its Bayes factor over no effect, in nats.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,8 +15,11 @@ from scipy.special import logsumexp
 from airtouch.gap.relations.density import Fit, Rescaling, fit, log_density, principal, rescaling_of, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
-TURNS = 3  #: turns, at most, in which the effects of a hypothesis are fitted in turn; chosen
-#: lengths of the shift by a nameless disturbance, nominal standard deviations, equally likely; chosen
+#: rounds, at most, in which each effect of a hypothesis is fitted beside the others; chosen. A smaller number ends fits
+#: of effects that trade against each other too early
+MOST_ROUNDS = 3
+#: lengths of the shift by a nameless disturbance, nominal standard deviations, equally likely; chosen. With a smaller
+#: first one it gains more in flights that hardly shift; with a larger last one it explains stronger disturbances
 NAMELESS_LENGTHS = np.geomspace(3.0, 300.0, 10)
 
 
@@ -34,13 +38,14 @@ class LearnedModel:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Effects at their likeliest strengths.
+    """Effects at their likeliest strengths, with two log ratios over no effect, nats.
 
-    peak: log of the likelihood ratio to no effect, nats; evidence: that of the ratio averaged over strengths.
+    log_likelihood_ratio: of the densities of the flight, at these strengths; evidence: of the density averaged over
+    strengths (the log of the Bayes factor).
     """
 
     fits: tuple[Fit, ...]
-    peak: float
+    log_likelihood_ratio: float
     evidence: float
 
     @property
@@ -58,6 +63,11 @@ class Hypothesis:
         """Names of the classes' effects in the registry, in their order."""
         return tuple(c.effect for c in self.classes)
 
+    @property
+    def log_occam_factor(self) -> float:
+        """Nats, 0 or less, by which averaging over the strengths lowers the log likelihood ratio."""
+        return self.evidence - self.log_likelihood_ratio
+
     @cached_property
     def shift(self) -> np.ndarray:
         """Expected shift (Q,); 0 without effects."""
@@ -69,7 +79,7 @@ class FlightHypotheses:
 
     def __init__(self, values: np.ndarray, model: LearnedModel) -> None:
         self.values, self.model = values, model
-        self.none = Hypothesis((), 0.0, 0.0)
+        self.no_effect = Hypothesis((), 0.0, 0.0)
 
     def single_effects(self) -> list[Hypothesis]:
         """A hypothesis for every class alone, the likeliest first."""
@@ -78,15 +88,15 @@ class FlightHypotheses:
     def with_class(self, effect_class: EffectClass) -> Hypothesis:
         """The hypothesis of one class alone."""
         base, f = log_density(self.values), fit(effect_class, self.values, self.rescaling(()))
-        return Hypothesis((f,), f.peak - base, f.evidence - base)
+        return Hypothesis((f,), f.log_peak - base, f.log_marginal - base)
 
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
                       ) -> list[Hypothesis]:
         """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
         rescaling = self.rescaling(hypothesis.fits)
         residual = rescaling(self.values - hypothesis.shift)
-        cost = hypothesis.evidence - hypothesis.peak
-        out = [self.at_fits((*hypothesis.fits, fit(c, residual, rescaling)), cost)
+        log_occam_factor = hypothesis.log_occam_factor
+        out = [self.at_fits((*hypothesis.fits, fit(c, residual, rescaling)), log_occam_factor)
                for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
 
@@ -100,15 +110,15 @@ class FlightHypotheses:
     def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis with its effects fitted in turn, each beside the others."""
         best, fits = hypothesis, list(hypothesis.fits)
-        for _ in range(TURNS):
+        for _ in range(MOST_ROUNDS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
                 rescaling, beside = self.rescaling(others), np.sum([o.shift for o in others], axis=0)
                 fits[i] = fit(f.effect_class, rescaling(self.values - beside), rescaling)
-            tried = self.at_fits(tuple(fits))
-            if tried.peak <= best.peak:
+            trial = self.at_fits(tuple(fits))
+            if trial.log_likelihood_ratio <= best.log_likelihood_ratio:
                 break
-            best = tried
+            best = trial
         return best
 
     def squared_distance(self, hypothesis: Hypothesis) -> float:
@@ -126,18 +136,19 @@ class FlightHypotheses:
         gain = 0.5 * ((along * (1.0 - 1.0 / variance)) - np.log(variance)).sum(axis=1)
         density = rescaling.log_determinant + log_density(residual)
         averaged = float(logsumexp(density + gain) - np.log(len(gain)))
-        return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.peak
+        return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.log_likelihood_ratio
 
-    def at_fits(self, fits: Sequence[Fit], cost: float | None = None) -> Hypothesis:
+    def at_fits(self, fits: Sequence[Fit], log_occam_factor: float | None = None) -> Hypothesis:
         """The hypothesis of effects at the strengths of their fits.
 
-        cost: nats that averaging over the strengths of all but the last changes, if known.
+        log_occam_factor: that of all effects but the last, if known; else the sum of those of their fits.
         """
         rescaling = self.rescaling(fits)
         residual = rescaling(self.values - np.sum([f.shift for f in fits], axis=0))
-        peak = rescaling.log_determinant + log_density(residual) - log_density(self.values)
-        own = [f.evidence - f.peak for f in fits]
-        return Hypothesis(tuple(fits), peak, peak + (sum(own) if cost is None else cost + own[-1]))
+        ratio = rescaling.log_determinant + log_density(residual) - log_density(self.values)
+        factors = [f.log_occam_factor for f in fits]
+        total = sum(factors) if log_occam_factor is None else log_occam_factor + factors[-1]
+        return Hypothesis(tuple(fits), ratio, ratio + total)
 
     def rescaling(self, fits: Sequence[Fit]) -> Rescaling:
         """The rescaling by which the scatter of a flight under effects has the covariance 1; none changes nothing."""

@@ -1,8 +1,8 @@
 """Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect.
 
-`infer` adds effects one by one while each gains enough (`_likeliest`), a third only where two do not suffice. What
-speaks against effects is measured in two ways, each with its limit: what a nameless disturbance gains beside them
-(`_nameless`), and how far the flight lies from them (`_distance`).
+`infer` adds effects one by one while each gains enough (`_search`), a third only where two do not suffice. The
+counterevidence is measured in two ways, each with its limit: what a nameless disturbance gains beside the effects
+(`_nameless_gain`), and how far the flight lies from them (`_excess_distance`).
 """
 
 from collections import Counter
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from airtouch.gap.evidence.against import Against
+from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
@@ -36,34 +36,37 @@ NAMELESS_MARGIN = 30.0
 #: share that a nameless disturbance may gain beside the effects, added to that of their classes, as no curve is exact;
 #: chosen on flights of `learning.SEED`. A larger number answers `unknown` less often
 MODEL_ERROR_SHARE = 0.01
-PAIR_ERROR_SHARE = 0.01  #: share added once more for several effects, as two effects are not their sum; chosen there
-#: standard deviations of the distance of right effects. A flight may lie as far from the effects named; farther ones
-#: are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because they
-#: hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves)
-MOST_SCATTERS = 3.5
+#: share that is added once more for several effects, as two effects are not their sum; chosen there. A larger number
+#: answers `unknown` less often
+PAIR_ERROR_SHARE = 0.01
+#: standard deviations of the excess distance of right effects. A flight may lie as far from the effects named; farther
+#: ones are `unknown`. With an evidence below 10,000 nats 2 to 3 of 100 right flights lie farther, half of them because
+#: they hit something (2,750 flights of `learning.SEED`, standard deviations and limit by other halves). A larger number
+#: answers `unknown` less often
+MOST_EXCESS_DEVIATIONS = 3.5
 MOST_EFFECTS = 3  #: effects that are named together, at most; chosen. Each more costs a round of fits
 #: hypotheses to which one more effect is added, and additions to each that are fitted in turn; chosen. A larger number
 #: takes more time
-BEAM = 3
+BEAM_WIDTH = 3
 #: divisor of the evidence in probabilities, as the densities' tails are heavier than normal; chosen. A larger number
 #: makes probabilities less certain
-TEMPERATURE = 2.0
+EVIDENCE_TEMPERATURE = 2.0
 
 
 @dataclass(frozen=True)
 class Inference:
     """What the relations of a flight's signals show.
 
-    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; against: what
-    speaks against the likeliest effects, the gain of a nameless disturbance beside them or the flight's distance from
-    them, whichever is the larger part of its limit; readings: parameters of the likeliest effects, of those that the
-    library is calibrated for; without_sign: those of these effects whose sign does not show.
+    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none; counterevidence:
+    against the likeliest effects, the gain of a nameless disturbance beside them or the flight's excess distance from
+    them, whichever is larger relative to its limit; readings: parameters of the likeliest effects, of those that the
+    library is calibrated for, by effect and parameter; without_sign: those of these effects whose sign does not show.
     """
 
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
-    against: Against
-    readings: Mapping[str, Reading] = field(default_factory=dict)
+    counterevidence: Counterevidence
+    readings: Mapping[str, Mapping[str, Reading]] = field(default_factory=dict)
     without_sign: tuple[str, ...] = ()
 
     @property
@@ -77,23 +80,23 @@ class Inference:
         `none` counts as an effect of LEAST_EVIDENCE: an effect that has just enough evidence is as likely as none.
         """
         names = [*self.evidence, "none"]
-        score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / TEMPERATURE
+        score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / EVIDENCE_TEMPERATURE
         return dict(zip(names, np.exp(score - logsumexp(score)).tolist(), strict=True))
 
 
 def infer(library: Library, coordinates: np.ndarray) -> Inference:
     """Infer the effects that flights with coordinates (n, Q) have in common."""
-    many = len(coordinates)
-    flight = FlightHypotheses(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
+    count = len(coordinates)
+    flight = FlightHypotheses(np.sqrt(count) * coordinates.mean(axis=0), model_of_mean(library.model, count))
     singles = flight.single_effects()
-    best, against = _likeliest(flight, singles, library)
+    best, counterevidence = _search(flight, singles, library)
     return Inference(
-        classes=best.classes, evidence=_by_effect(singles), against=against,
+        classes=best.classes, evidence=_by_effect(singles), counterevidence=counterevidence,
         readings=_readings(best), without_sign=_without_sign(best))
 
 
-def _readings(best: Hypothesis) -> Mapping[str, Reading]:
-    """Parameters of the effects of a hypothesis.
+def _readings(best: Hypothesis) -> Mapping[str, Mapping[str, Reading]]:
+    """Parameters of the effects of a hypothesis, by effect and name.
 
     An effect of which several parameters act gives none: each was calibrated acting alone.
     """
@@ -113,54 +116,57 @@ def _calibrated(best: Hypothesis) -> list[tuple[str, Readout, np.ndarray]]:
             if c.calibration.readout is not None]
 
 
-def _against(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
-    """What speaks against effects, by the measure that is nearer to its limit or farther beyond."""
-    return max(_nameless(flight, best), _distance(flight, best, library), key=lambda a: a.nats / a.limit)
+def _counterevidence(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
+    """The evidence against effects, by the measure of the two that is larger relative to its limit."""
+    of_two = _nameless_gain(flight, best), _excess_distance(flight, best, library)
+    return max(of_two, key=lambda c: c.nats / c.limit)
 
 
-def _nameless(flight: FlightHypotheses, best: Hypothesis) -> Against:
+def _nameless_gain(flight: FlightHypotheses, best: Hypothesis) -> Counterevidence:
     """What a nameless disturbance gains beside effects."""
-    of_classes = max((c.calibration.nameless_share for c in best.classes), default=0.0)
-    share = of_classes + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
-    return Against(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
-                   of_distance=False)
+    largest = max((c.calibration.nameless_share for c in best.classes), default=0.0)
+    share = largest + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
+    return Counterevidence(flight.nameless_evidence(best) - best.evidence, NAMELESS_ALLOWANCE + share * best.evidence,
+                           of_distance=False)
 
 
-def _distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Against:
+def _excess_distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
     """How much farther a flight lies from effects than nominal flights from none."""
-    of_classes = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
-    share = float(np.hypot(of_classes, library.pair_distance_scatter * (len(best.fits) > 1)))
-    limit = MOST_SCATTERS * library.distance_scatter(share, best.evidence)
-    return Against(library.excess(flight.squared_distance(best)), limit, of_distance=True)
+    largest = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
+    distance_scatter = float(np.hypot(largest, library.pair_distance_scatter * (len(best.fits) > 1)))
+    limit = MOST_EXCESS_DEVIATIONS * library.excess_deviation(distance_scatter, best.evidence)
+    return Counterevidence(library.excess(flight.squared_distance(best)), limit, of_distance=True)
 
 
-def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
-    """The model of the mean of `many` flights times the square root of their number.
+def model_of_mean(model: LearnedModel, count: int) -> LearnedModel:
+    """The model of the mean of `count` flights times the square root of their number.
 
     Nominal scatter stays as it is, shifts are longer by that root, and single flights lie about them as before.
     """
-    if many == 1:
+    if count == 1:
         return model
-    return replace(model, classes=tuple(replace(c, table=np.sqrt(many) * c.table, variances=c.variances / many)
+    return replace(model, classes=tuple(replace(c, table=np.sqrt(count) * c.table, variances=c.variances / count)
                                         for c in model.classes))
 
 
-def _likeliest(flight: FlightHypotheses, singles: list[Hypothesis], library: Library) -> tuple[Hypothesis, Against]:
-    """The likeliest hypothesis, with no more effects than its evidence supports, and what speaks against it.
+def _search(flight: FlightHypotheses, singles: list[Hypothesis], library: Library,
+            ) -> tuple[Hypothesis, Counterevidence]:
+    """The likeliest hypothesis, with no more effects than its evidence supports, and the counterevidence.
 
-    A second effect is always tried, a third only where too much speaks against the two. A third is tried beside the
-    chosen two alone, a second beside each of the BEAM likeliest: which of them is right may show only with the second.
+    A second effect is always tried, a third only where the counterevidence to the two is too much. A third is tried
+    beside the chosen two alone, a second beside each of the BEAM_WIDTH likeliest: which of them is right may show only
+    with the second.
     """
     if not singles or singles[0].evidence < LEAST_EVIDENCE:
-        return flight.none, _against(flight, flight.none, library)
-    best, beam, against = _by_thing(singles, library), singles[:BEAM], None
-    while len(best.fits) < MOST_EFFECTS and (against is None or against.is_too_much):
+        return flight.no_effect, _counterevidence(flight, flight.no_effect, library)
+    best, beam, counterevidence = _likeliest_name(singles, library), singles[:BEAM_WIDTH], None
+    while len(best.fits) < MOST_EFFECTS and (counterevidence is None or counterevidence.is_too_much):
         larger = _with_one_more(flight, beam)
-        first = _by_thing(larger, library) if larger else None
+        first = _likeliest_name(larger, library) if larger else None
         if first is None or first.evidence < _required_of_one_more(flight, best):
             break
-        best, beam, against = first, [first], _against(flight, first, library)
-    return best, _against(flight, best, library) if against is None else against
+        best, beam, counterevidence = first, [first], _counterevidence(flight, first, library)
+    return best, _counterevidence(flight, best, library) if counterevidence is None else counterevidence
 
 
 def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
@@ -174,21 +180,22 @@ def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
                flight.nameless_evidence(best) + NAMELESS_MARGIN)
 
 
-def _by_thing(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
-    """The likeliest name of the likeliest thing: hypotheses that are names of one thing count together.
+def _likeliest_name(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
+    """The likeliest hypothesis of the likeliest thing: hypotheses that are names of one thing count together.
 
     Each has the weight that the choice among the classes of its effects leaves; evidence counts as in probabilities.
     """
     groups: list[list[Hypothesis]] = []
     for h in hypotheses:
-        alike = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
-        if alike is None:
+        group = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
+        if group is None:
             groups.append([h])
         else:
-            alike.append(h)
+            group.append(h)
     cost = library.choice_cost
-    weights = [logsumexp([h.evidence / TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group])
-               for group in groups]
+    log_weights = [[h.evidence / EVIDENCE_TEMPERATURE - sum(cost[name] for name in h.effect_names) for h in group]
+                   for group in groups]
+    weights = [logsumexp(of_group) for of_group in log_weights]
     return max(groups[int(np.argmax(weights))], key=lambda h: h.evidence)
 
 
@@ -197,10 +204,10 @@ def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hyp
 
     Of the same classes, reached from two hypotheses of the beam, the likelier is kept.
     """
-    extended = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM]),
+    additions = sorted((h for one in beam for h in flight.with_one_more(one, may_stand_beside)[:BEAM_WIDTH]),
                       key=lambda h: h.evidence)
-    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in extended}
-    likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM]
+    by_classes = {frozenset((f.effect_class.name, f.effect_class.shape) for f in h.fits): h for h in additions}
+    likeliest = sorted(by_classes.values(), key=lambda h: -h.evidence)[:BEAM_WIDTH]
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
 
@@ -209,13 +216,13 @@ def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
 
     It may not be another name of an effect in it; it may be another parameter of one, if each parameter has a class.
     """
-    another = other.of_one_parameter and other.name not in hypothesis.names
+    another = other.own_parameter is not None and other.name not in hypothesis.names
     return all(not interchangeable(other.effect, e) or (another and other.effect == e) for e in hypothesis.effect_names)
 
 
 def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
-    """Evidence for each effect, the mean of its classes' likelihoods."""
-    own: dict[str, list[float]] = {}
+    """Evidence for each effect, nats: the log of the mean of its classes' Bayes factors."""
+    by_effect: dict[str, list[float]] = {}
     for h in singles:
-        own.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
-    return {name: float(logsumexp(v) - np.log(len(v))) for name, v in own.items()}
+        by_effect.setdefault(h.fits[0].effect_class.effect, []).append(h.evidence)
+    return {name: float(logsumexp(v) - np.log(len(v))) for name, v in by_effect.items()}

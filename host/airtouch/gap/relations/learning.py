@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,17 +12,24 @@ from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import exposure
 from airtouch.gap.relations.readout import amount_of
-from airtouch.gap.signatures.random_draws import Kind, kinds_of, log_uniform
+from airtouch.gap.signatures.random_draws import Kind, kinds_of, log_uniform, own_parameter
 from airtouch.gap.signatures.signature import free_of, signature_of
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.batch import flights as flown
+from airtouch.simulation.batch import flights as simulated_flights
 from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
 from airtouch.vehicle import Vehicle
 
 SEED = 8_000_000  #: of all flights that are learned from; nobody draws sealed sets from it
-WEAKEST_SHIFT = 6.0  #: length of the shift of a class's weakest flights, which hardly shows beside nominal ones; chosen
-HALVINGS = 17  #: of the highest strength, at most, down to the weakest; chosen
-Say = Callable[[str], None]  #: what a long run reports its progress to
+#: nominal standard deviations, length of the shift of a class's weakest flights, which hardly shows beside nominal
+#: scatter; chosen. A larger number learns nothing of weaker effects
+WEAKEST_SHIFT = 6.0
+#: halvings, at most, of a class's highest strength down to its weakest flights; chosen. With a smaller number a class
+#: that still shows there begins at too high a strength
+LEARNING_HALVINGS = 17
+#: factor by which a shape's value becomes part of a random generator's seed, a whole number; chosen, so large that no
+#: two shapes have one seed
+SEED_PER_SHAPE = 1e6
+Progress = Callable[[str], None]  #: what a long run reports its progress to
 
 
 class Stream(IntEnum):
@@ -46,7 +54,8 @@ class Scene:
 
 def fly(scene: Scene, number: int, active: Sequence[Active] = ()) -> np.ndarray | None:
     """Features (features,) of flight number `number` with effects; None where it does not end well."""
-    log = next(iter(flown(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED, workers=1)))
+    log = next(iter(simulated_flights(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED,
+                                      workers=1)))
     if not isinstance(log, FlightLog):
         return None
     try:
@@ -68,15 +77,15 @@ class Drawing:
 
     def active(self, strength: float, rng: np.random.Generator) -> Active:
         """The effect at a strength, its direction drawn."""
-        drawn = self.kind.active(strength, rng)
-        parameter = signature_of(drawn.effect).class_by
-        return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, parameter: self.shape})
+        active = self.kind.active(strength, rng)
+        parameter = signature_of(active.effect).class_by
+        return active if self.shape is None else Active(active.effect, {**active.values, parameter: self.shape})
 
     @property
     def free(self) -> tuple[str, ...]:
         """Names of the effect's free parameters; of one where the class is of that one alone."""
-        alone = self.name.partition(" ")[2]
-        return tuple(p for p in free_of(get(self.kind.effect)) if alone in ("", p))
+        own = own_parameter(self.kind.effect, self.name)
+        return tuple(p for p in free_of(get(self.kind.effect)) if own in (None, p))
 
 
 def all_drawings() -> list[Drawing]:
@@ -111,26 +120,35 @@ def weakest_strength(highest: float, shifts: Callable[[float], Sequence[np.ndarr
         lengths = [np.linalg.norm(shift) for shift in shifts(strength)]
         return bool(lengths) and float(np.median(lengths)) <= WEAKEST_SHIFT
 
-    return halved(highest, HALVINGS, hides)
+    return halved(highest, LEARNING_HALVINGS, hides)
 
 
-def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,
-                  ) -> Iterator[tuple[int, Active, np.ndarray]]:
-    """Number, effect and features of flights with an effect whose strengths are log-uniform between two."""
+class DrawnFlight(NamedTuple):
+    """Number of a flight, what acts in it, and its features (features,)."""
+
+    number: int
+    active: Active
+    features: np.ndarray
+
+
+def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int) -> Iterator[DrawnFlight]:
+    """Flights with an effect whose strengths are log-uniform between two, without those that do not end well."""
     for number in range(count):
-        rng = np.random.default_rng([SEED, number, *drawing.name.encode(), int(1e6 * (drawing.shape or 0.0))])
+        shape = int(SEED_PER_SHAPE * (drawing.shape or 0.0))
+        rng = np.random.default_rng([SEED, number, *drawing.name.encode(), shape])
         active = drawing.active(log_uniform(*strengths, rng), rng)
-        made = fly(scene, number, [active])
-        if made is not None:
-            yield number, active, made
+        measured_features = fly(scene, number, [active])
+        if measured_features is not None:
+            yield DrawnFlight(number, active, measured_features)
 
 
-def disturbed_flights(scene: Scene, count: int) -> Iterator[tuple[int, np.ndarray]]:
-    """Number and features of flights with a nameless disturbance."""
+def disturbed_flights(scene: Scene, count: int) -> Iterator[DrawnFlight]:
+    """Flights with a nameless disturbance, without those that do not end well."""
     for number in range(count):
-        made = fly(scene, number, exposure.draw(np.random.default_rng([SEED, number, 1])))
-        if made is not None:
-            yield number, made
+        active = exposure.draw(np.random.default_rng([SEED, number, 1]))
+        measured_features = fly(scene, number, [active])
+        if measured_features is not None:
+            yield DrawnFlight(number, active, measured_features)
 
 
 def scaled(drawing: Drawing, active: Active) -> np.ndarray:

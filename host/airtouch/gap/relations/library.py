@@ -20,8 +20,8 @@ from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED_FILE = "diagnosis.npz"
-#: standard deviations of the distance of nominal flights from the median; farther ones are not as those that were
-#: learned from; chosen
+#: standard deviations of nominal flights' excess distance; flights whose median is larger are not as those that were
+#: learned from; chosen. A larger number uses the library for flights that are less like them
 FARTHEST_NOMINAL = 4.0
 CLASS_ARRAYS = ("knots", "table", "axes", "variances")  #: arrays of a class in a file
 #: fields of a calibration that are fractions of the evidence; each an array of all classes in a file
@@ -75,7 +75,8 @@ class Coordinates:
 class Library:
     """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
-    pair_distance_scatter: `ClassCalibration.distance_scatter` of two effects, beside those of their classes.
+    distance: of nominal flights; pair_distance_scatter: what two effects add to the `distance_scatter` of their classes
+    (`ClassCalibration`), a fraction of the evidence.
     """
 
     scenario: str
@@ -90,25 +91,26 @@ class Library:
         return (shipped, ()) if self is shipped() else super().__reduce_ex__(protocol)
 
     @property
-    def nominal_distance_scatter(self) -> float:
+    def nominal_excess_deviation(self) -> float:
         """Standard deviation of the excess distance of nominal flights, nats."""
         return 0.5 * self.distance.deviation
 
-    def distance_scatter(self, share: float, evidence: float) -> float:
+    def excess_deviation(self, distance_scatter: float, evidence: float) -> float:
         """Standard deviation of the excess distance of flights with effects, nats.
 
-        share: what of it is beyond that of nominal flights, over the evidence; evidence: of the effects, nats.
+        Two independent parts of it add: that of nominal flights, and `distance_scatter` (a fraction, as in
+        `ClassCalibration`) times the evidence for the effects, nats.
         """
-        return float(np.hypot(self.nominal_distance_scatter, share * evidence))
+        return float(np.hypot(self.nominal_excess_deviation, distance_scatter * evidence))
 
-    def excess(self, squared: float) -> float:
-        """Excess of a squared distance over that of the median nominal flight, in nats."""
-        return 0.5 * (squared - self.distance.median)
+    def excess(self, squared_distance: float) -> float:
+        """Excess distance, nats: half of what a squared distance has beyond that of the median nominal flight."""
+        return 0.5 * (squared_distance - self.distance.median)
 
     def lies_as_nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
-        middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
-        return self.excess(middle) < FARTHEST_NOMINAL * self.nominal_distance_scatter
+        median = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
+        return self.excess(median) < FARTHEST_NOMINAL * self.nominal_excess_deviation
 
     @property
     def effects(self) -> frozenset[str]:
@@ -122,8 +124,8 @@ class Library:
 
     def without(self, names: Iterable[str]) -> "Library":
         """The library without the classes of some effects."""
-        left_out = frozenset(names)
-        return self.with_classes(c for c in self.model.classes if c.effect not in left_out)
+        excluded = frozenset(names)
+        return self.with_classes(c for c in self.model.classes if c.effect not in excluded)
 
     def with_classes(self, classes: Iterable[EffectClass]) -> "Library":
         """The library with these classes in place of its own."""
@@ -189,23 +191,15 @@ def shipped() -> Library:
 
 
 def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Library | None:
-    """The shipped library, None where it does not hold for flights of a vehicle: see `why_no_library`."""
-    return None if why_no_library(vehicle, nominal) else shipped()
+    """The shipped library; None where it does not hold for flights of a vehicle.
 
-
-def why_no_library(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> str:
-    """Why the shipped library does not hold for flights of a vehicle, "" where it does.
-
-    vehicle: as declared; nominal: features of its nominal flights, None of one whose log lacks columns.
+    It holds for a vehicle that is declared as its own, by whatever name, if the nominal flights lie as its own do.
+    vehicle: as declared; nominal: features (features,) of its nominal flights, None of one whose log lacks columns.
     """
     library = shipped()
-    known = [f for f in nominal if f is not None]
-    if not known:
-        return "no nominal flight has features to compare"
-    if len(known) < len(nominal):
-        return "the log of a nominal flight lacks columns"
+    features = [f for f in nominal if f is not None]
+    if not features or len(features) < len(nominal):
+        return None
     if replace(load(library.vehicle), name=vehicle.name) != vehicle:
-        return f"the vehicle is declared unlike {library.vehicle}"
-    if not library.lies_as_nominal(library.coordinates(np.array(known))):
-        return f"the nominal flights lie elsewhere than simulated ones of the scenario {library.scenario!r}"
-    return ""
+        return None
+    return library if library.lies_as_nominal(library.coordinates(np.array(features))) else None

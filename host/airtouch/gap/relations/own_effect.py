@@ -54,8 +54,8 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
     low = min(weakest_strength(high, partial(_shifts, library, scene, drawing)), HIGHEST_START * high)
     strengths = [log_uniform(low, high, np.random.default_rng([SEED, i, *name.encode()]))
                  for i in range(settings.pairs)]
-    flown = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
-    pairs = [p for p in flown if p is not None and np.linalg.norm(p.flight - p.nominal) > LEAST_SHIFT]
+    flights = map_on_two_cores(partial(_pair, library, scene, drawing), enumerate(strengths))
+    pairs = [p for p in flights if p is not None and np.linalg.norm(p.flight - p.nominal) > LEAST_SHIFT]
     if len(pairs) < settings.least_pairs:
         return library
     amount, flight, nominal = (np.array(column) for column in zip(*pairs, strict=True))
@@ -63,15 +63,18 @@ def _with_class(library: Library, scene: Scene, name: str, settings: OwnEffectSe
     own = learn_class(name, name, None, ClassFlights(amount, flight - nominal, flight), settings.least_pairs)
     if own is None:
         return library
-    known = library.model.classes
-    calibration = calibrate_class(scene, library.with_classes([*known, own]), len(known), drawing, settings.calibration)
-    return library.with_classes([*known, replace(own, calibration=_at_least(calibration, known))])
+    others = library.model.classes
+    calibration = calibrate_class(scene, library.with_classes([*others, own]), len(others), drawing,
+                                  settings.calibration)
+    return library.with_classes([*others, replace(own, calibration=_with_larger_shares(calibration, others))])
 
 
-def _at_least(calibration: ClassCalibration, known: Sequence[EffectClass]) -> ClassCalibration:
-    """A calibration with shares no smaller than those of the known classes: a curve through few flights is less exact.
+def _with_larger_shares(calibration: ClassCalibration, others: Sequence[EffectClass]) -> ClassCalibration:
+    """A calibration with shares no smaller than those of other classes.
+
+    A curve through few flights is less exact than theirs.
     """
-    calibrations = (calibration, *(c.calibration for c in known))
+    calibrations = (calibration, *(c.calibration for c in others))
     return ClassCalibration(calibration.readout,
                             *(max(getattr(one, name) for one in calibrations) for name in SHARE_FIELDS))
 
@@ -87,8 +90,8 @@ def _pair(library: Library, scene: Scene, drawing: Drawing, numbered: tuple[int,
     number, strength = numbered
     active = drawing.active(strength, np.random.default_rng([SEED, number, *drawing.name.encode(), 1]))
     features = [fly(scene, number, effects) for effects in ([active], [])]
-    known = [f for f in features if f is not None]
-    if len(known) < len(features):
+    complete = [f for f in features if f is not None]
+    if len(complete) < len(features):
         return None
-    flight, nominal = library.coordinates(np.array(known))
+    flight, nominal = library.coordinates(np.array(complete))
     return Pair(scaled(drawing, active), flight, nominal)

@@ -4,8 +4,8 @@ A class's strength is a length in the space of features. What that is in the eff
 flights that the class was not learned from (calibration), and so does the error of a single flight.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,17 +13,33 @@ from airtouch.gap.signatures.signature import signature_of
 from airtouch.gap.signatures.term import neutral_of, parameter_of, unit
 from airtouch.simulation.effects import Effect
 
-#: by name of a parameter: its value and standard deviation, in its unit
-Reading = Mapping[str, tuple[float, float]]
 #: standard deviation, in the log strength, of the weights of calibration flights; chosen. A larger number averages more
 #: flights and follows a bend of the relation less
 KERNEL_WIDTH = float(np.log(2.0))
-#: flights that say that amount and strength are proportional, for strengths at the ends of the calibration; chosen
+#: flights that say that amount and strength are proportional, for strengths at the ends of the calibration; chosen. A
+#: larger number holds the local line closer to that
 RIDGE = 0.1
 #: fraction of the calibration flights with a strength of one sign whose amounts must be of one sign, so that a strength
-#: shows that of the amount; chosen
+#: shows that of the amount; chosen. A larger number leaves more signs open
 LEAST_SIGN_AGREEMENT = 0.9
 LINE_COEFFICIENTS = 2.0  #: degrees of freedom that a local line uses up: intercept and slope
+
+
+class Reading(NamedTuple):
+    """A parameter as the relations of signals show it: its value and standard deviation, in its unit."""
+
+    value: float
+    deviation: float
+
+
+class Amounts(NamedTuple):
+    """Amounts (k,) of the parameters of an effect, and their standard deviations (k,).
+
+    An amount is counted in natural steps from neutral; of a factor it is the logarithm (`amount_of`).
+    """
+
+    value: np.ndarray
+    deviation: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -49,8 +65,8 @@ class Readout:
         positive = self.amount[same_sign if same_sign.any() else ~same_sign, 0] > 0.0
         return bool(max(positive.mean(), 1.0 - positive.mean()) >= LEAST_SIGN_AGREEMENT)
 
-    def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amounts (k,) of a flight with a fitted strength (s,), not 0, and their standard deviations (k,).
+    def __call__(self, strength: np.ndarray) -> Amounts:
+        """Amounts of a flight with a fitted strength (s,), not 0.
 
         An amount is positive where the strength does not show its sign. Raises ValueError where the strength is 0, of
         which no logarithm is.
@@ -61,15 +77,15 @@ class Readout:
             return self._along(float(strength[0]))
         return self._across(strength)
 
-    def _along(self, strength: float) -> tuple[np.ndarray, np.ndarray]:
+    def _along(self, strength: float) -> Amounts:
         """One parameter: local linear regression of the logarithm of the amount on that of the strength.
 
         A strength of a sign that no calibration flight has is read as the mirror image of the other sign.
         """
         same_sign = self.strength[:, 0] * strength > 0.0
         if not same_sign.any():
-            mirrored, error_of_it = self._along(-strength)
-            return (-mirrored if self.shows_sign(np.array([-strength])) else mirrored), error_of_it
+            mirrored = self._along(-strength)
+            return mirrored._replace(value=-mirrored.value) if self.shows_sign(np.array([-strength])) else mirrored
         distance = np.log(np.abs(self.strength[same_sign, 0])) - np.log(abs(strength))
         ratio = np.log(np.abs(self.amount[same_sign, 0])) - distance
         weight = _weights(distance)
@@ -79,15 +95,15 @@ class Readout:
         sign = np.sign(np.median(self.amount[same_sign, 0])) if self.shows_sign(np.array([strength])) else 1.0
         amount = float(sign * np.exp(coefficients[0]))
         error = _deviation((ratio - columns @ coefficients)[:, None], weight)
-        return np.array([amount]), np.abs(amount) * error
+        return Amounts(np.array([amount]), np.abs(amount) * error)
 
-    def _across(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _across(self, strength: np.ndarray) -> Amounts:
         """Several parameters: linear in the strengths; errors in proportion to the length of the amount."""
         length = np.linalg.norm(self.amount, axis=1)
         matrix = np.linalg.lstsq(self.strength / length[:, None], self.amount / length[:, None], rcond=None)[0]
         amount, residual = strength @ matrix, (self.amount - self.strength @ matrix) / length[:, None]
         weight = _weights(np.log(np.linalg.norm(self.strength, axis=1)) - np.log(np.linalg.norm(strength)))
-        return amount, np.linalg.norm(amount) * _deviation(residual, weight)
+        return Amounts(amount, np.linalg.norm(amount) * _deviation(residual, weight))
 
 
 def _weights(distance: np.ndarray) -> np.ndarray:
@@ -116,16 +132,16 @@ def amount_of(effect: Effect, name: str, value: float) -> float:
     return (value - neutral_of(p)) / unit(p)
 
 
-def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
-    """The parameters of an effect whose class has a strength (s,) in a flight."""
-    return {name: _quantity(effect, name, float(amount), float(deviation))
+def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> dict[str, Reading]:
+    """The parameters of an effect, by name, whose class has a strength (s,) in a flight."""
+    return {name: _reading(effect, name, float(amount), float(deviation))
             for name, amount, deviation in zip(readout.parameters, *readout(strength), strict=True)}
 
 
-def _quantity(effect: Effect, name: str, amount: float, deviation: float) -> tuple[float, float]:
-    """Value and standard deviation of a parameter in its unit, from those of its amount; undoes `amount_of`."""
+def _reading(effect: Effect, name: str, amount: float, deviation: float) -> Reading:
+    """A parameter in its unit, from its amount and the standard deviation of that; undoes `amount_of`."""
     if signature_of(effect).factors:
         value = float(np.exp(amount))
-        return value, value * deviation
+        return Reading(value, value * deviation)
     p = parameter_of(effect, name)
-    return neutral_of(p) + amount * unit(p), deviation * unit(p)
+    return Reading(neutral_of(p) + amount * unit(p), deviation * unit(p))

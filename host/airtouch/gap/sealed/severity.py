@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from airtouch.gap.evidence.clock import clock_gain
+from airtouch.gap.evidence.clock import measured_clock_term
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import whole_of
@@ -109,7 +109,7 @@ def log_ratio(data: Data, active: Active) -> float:
     """Log likelihood of the flights under an effect with these values over that under none."""
     term = exact_term(active)
     if term.shows_in == CLOCK:
-        return clock_gain(data, term)[1]
+        return measured_clock_term(data, term).gain
     whole = whole_of(data)
     return judge(data, whole, (term,)) - judge(data, whole, ())
 

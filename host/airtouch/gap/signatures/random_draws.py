@@ -113,6 +113,14 @@ def kinds_of(effect: Effect) -> dict[str, Kind]:
     return known or {effect.name: Kind(effect.name, STEPS, _any_direction(effect))}
 
 
+def own_parameter(effect: str, kind: str) -> str | None:
+    """The parameter that a kind of an effect scales alone, None where it scales all that are free.
+
+    The name of such a kind is that of the effect, a blank and that of the parameter (`controller_gain rate`).
+    """
+    return kind.removeprefix(f"{effect} ") if kind.startswith(f"{effect} ") else None
+
+
 def _any_direction(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
     """Values of an effect at a strength in natural steps: a random direction of its free parameters."""
     free = [p for p in effect.parameters if p.name in free_of(effect)]

@@ -21,7 +21,7 @@ from airtouch.gap.evidence.least_squares import (
     without_offsets,
 )
 from airtouch.gap.evidence.problem import TWO_FOLDS, Problem
-from airtouch.gap.evidence.random_strength import strongest
+from airtouch.gap.evidence.random_strength import fit_strength
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
@@ -79,7 +79,7 @@ def judge_random(halves: Sequence[JudgedBlocks], term: Term) -> tuple[float, np.
     """
     gain, strengths = 0.0, []
     for train, test in TWO_FOLDS:
-        fitted = strongest(halves[train].problem, term, halves[train].residual, halves[train].extra_power)
+        fitted = fit_strength(halves[train].problem, term, halves[train].residual, halves[train].extra_power)
         held_out = halves[test]
         power = held_out.extra_power + held_out.problem.random_power([fitted])
         gain += held_out.problem.likelihood(held_out.residual, power) - held_out.log_likelihood
