@@ -4,7 +4,7 @@
     make fuzz TARGET=app RESUME=1                         # goes on to RUNS inputs where an earlier run was ended
     python tools/fuzz.py app --replay build/fuzz/findings/app/crash-...
     python tools/fuzz.py --coverage                       # lines that the corpus reaches, source by source
-    python tools/fuzz.py --keep                           # the corpus, made small, becomes the seeds of tests/fuzz
+    python tools/fuzz.py --minimise                   # the corpus, made small, becomes the seeds of tests/fuzz
 
 A million inputs of one target take 1 to 8 minutes of processor time, all targets take hours.
 
@@ -177,7 +177,7 @@ def main() -> None:
                         help="(default: the best that this machine has)")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
-    instead.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
+    instead.add_argument("--minimise", action="store_true", help="make the corpus small, as the seeds of tests/fuzz")
     instead.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")
     options = parser.parse_args()
     names = options.targets or list(targets())
@@ -192,13 +192,13 @@ def main() -> None:
     made_by = engine(options.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
-    if options.keep and made_by.name != "libfuzzer":
-        raise SystemExit("--keep needs clang with libFuzzer, which makes a corpus small: apt-get install clang")
+    if options.minimise and made_by.name != "libfuzzer":
+        raise SystemExit("--minimise needs clang with libFuzzer, which makes a corpus small: apt-get install clang")
     print(f"compiling {', '.join(names)}", file=sys.stderr, flush=True)
     programs = build(names, made_by, flags=LONG)
     if options.replay:
         sys.exit(max(subprocess.run([programs[name], *options.replay]).returncode for name in names))
-    if options.keep:
+    if options.minimise:
         for name in names:
             print("{}: {} seeds, {} bytes".format(name, *keep_seeds(name, programs[name])))
         return None

@@ -110,6 +110,9 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
         goal_lines = "".join(line for line in goals if sign in line)
         assert total(view, truth) in goal_lines and total(view, truth) in results, truth
         assert total(build, truth) in results and (truth == "none" or total(build, truth) in goal_lines), truth
+    first, below = page[:page.index("- **Trust it**")], page[page.index("## Goals"):]
+    best_and_worst = re.findall(r"\d+ of \d+", first[first.index("| best |"):])
+    assert len(best_and_worst) >= 6 and all(f" {figure}" in below for figure in best_and_worst), best_and_worst
     for rows_of_part in (nominal, unknown_scatter):
         assert whole(rows_of_part) in page[:page.index("## Flight by flight")] and whole(rows_of_part) in results
 

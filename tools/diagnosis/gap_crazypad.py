@@ -1,10 +1,10 @@
 """Diagnoses every flight of CrazyPAD alone, calibrated on the other normal flights of its drone.
 
-    python tools/diagnosis/gap_crazypad.py [FOLDER] [--json results.jsonl] [--leave-one-out]    # 20 s
+    python tools/diagnosis/gap_crazypad.py [FOLDER] [--keep results.jsonl] [--leave-one-out]    # 20 s
     python tools/diagnosis/gap_crazypad.py [FOLDER] --corrections
 
 The figures are in host/docs/gap-crazypad.md. FOLDER holds the flights and their manifest.csv. The label is read after
-the diagnosis. With --json, flights that the file holds already are not diagnosed again. The priors of the diagnosis
+the diagnosis. With --keep, flights that the file holds already are not diagnosed again. The priors of the diagnosis
 were chosen with these conditions in view; --leave-one-out chooses them anew for each condition, from a grid, by the
 others alone. --corrections fits how unsteadiness and heave follow the corrections of the estimated velocity, on the
 building part: all but every fourth condition.
@@ -33,7 +33,7 @@ from recordings.crazypad.figures import balanced_accuracy, exact_rotors, print_f
 from recordings.crazypad.labels import VEHICLE, baseline, family, manifest
 from recordings.crazypad.patterns import hover_patterns, likeliest
 from recordings.folder import add_folder
-from recordings.result_store import Result, complete
+from recordings.result_store import Result, add_keep_option, complete
 
 SAME: Any = STEADY  #: unsteadiness and heave that do not tell a damage
 #: priors to choose from, round numbers below and above those of `PRIORS`
@@ -118,21 +118,20 @@ def main() -> None:
     """Diagnose every flight, or fit how the powers follow the corrections, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, "crazypad")
-    parser.add_argument("--json", type=Path, metavar="FILE",
-                        help="JSON lines; results that it holds are not computed again, new ones are appended")
+    add_keep_option(parser, "", "--json")
     parser.add_argument("--leave-one-out", action="store_true", help="also with priors chosen by the others")
     parser.add_argument("--corrections", action="store_true",
                         help="instead fit how unsteadiness and heave follow the corrections of the velocity")
     options = parser.parse_args()
-    if options.corrections and (options.json or options.leave_one_out):
-        parser.error("--corrections diagnoses no flight: leave out --json and --leave-one-out")
+    if options.corrections and (options.keep or options.leave_one_out):
+        parser.error("--corrections diagnoses no flight: leave out --keep and --leave-one-out")
     check_data_set(options.folder)
     if options.corrections:
         show_corrections(options.folder)
         return
-    check_free(options.json, force=True)
+    check_free(options.keep, force=True)
     start = time.time()
-    print_figures(diagnose_all(options.folder, options.json))
+    print_figures(diagnose_all(options.folder, options.keep))
     if options.leave_one_out:
         print("\nPriors chosen without the condition judged:")
         print_figures(cross_validate(options.folder))

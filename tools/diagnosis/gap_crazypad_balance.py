@@ -65,16 +65,21 @@ def _share_right(tests: Sequence[RotorTest]) -> float:
 
 
 def _severity(tests: Sequence[RotorTest]) -> float:
-    """Spearman's rank correlation of measured and true millimetres."""
+    """Spearman's rank correlation of measured and true millimetres; NaN where all cuts are the same."""
     true = np.concatenate([np.full(len(t.mm), labels.cut_mm(t.pair[1])) for t in tests])
+    if len(set(true)) == 1:
+        return float("nan")
     return float(spearmanr(np.concatenate([t.mm for t in tests]), true).statistic)
 
 
 def _with_interval(tests: Sequence[RotorTest], figure: Callable[[Sequence[RotorTest]], float]) -> str:
-    """A figure with its 90 % interval, conditions resampled."""
+    """A figure with its 90 % interval, conditions resampled; a dash and why where it is NaN."""
+    value = figure(tests)
+    if np.isnan(value):
+        return "- (all cuts are the same)"
     low, high = resampled(lambda pick: figure([tests[i] for i in pick]), len(tests), replicates=figures.RESAMPLES,
                           level=0.9)
-    return f"{figure(tests):.2f} ({low:.2f} to {high:.2f})"
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
 
 
 def show_family(b: Balances, vehicle: vehicles.Vehicle) -> None:

@@ -1,24 +1,24 @@
-"""Prints in how many of neural-swarm's flights under another vehicle a test that knows the seconds sees the wake.
+"""Prints what the wakes in neural-swarm's flights under another vehicle show, by one of three tests.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]    # 15 s
+    python tools/diagnosis/gap_wakes.py [FLIGHTS]                      # wakes that a test sees which knows the seconds
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] --false-alarms       # nominal flights diagnosed with such seconds
+    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # how well each measure of the diagnosis tells
 
-The seconds come from the other vehicles' own logs, where the data hold a cut of the same time: another vehicle within
-0.15 m sideways and 0.1 to 0.6 m above, as the data's labels say. In these seconds against the rest of the flight: the
-mean force along z, the power of that force above 1 Hz, and the power of the yaw torque from 2 to 20 Hz. The same
-three are taken of nominal flights of the same vehicle and kind of flying, in the same seconds shifted along the flight
-by each half second. A flight is seen where one of the three is beyond all but a third of one per cent of these, which
-makes 1 % false alarms. --answers: what `gap_real.py --keep` wrote, to print what the diagnosis says beside it; the
-results of one run, as one with --partner and one without would each say something else. build: days 19 and 20.
+The test that knows the seconds, [--part build|all] [--answers x.jsonl], takes 15 s. The seconds come from the other
+vehicles' own logs, where the data hold a cut of the same time: another vehicle within 0.15 m sideways and 0.1 to 0.6 m
+above, as the data's labels say. In these seconds against the rest of the flight: the mean force along z, the power of
+that force above 1 Hz, and the power of the yaw torque from 2 to 20 Hz. The same three are taken of nominal flights of
+the same vehicle and kind of flying, in the same seconds shifted along the flight by each half second. A flight is seen
+where one of the three is beyond all but a third of one per cent of these, which makes 1 % false alarms. --answers: what
+`gap_real.py --keep` wrote, to print what the diagnosis says beside it; the results of one run, as one with --partner
+and one without would each say something else. build: days 19 and 20.
 
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] --false-alarms [--keep x.jsonl]    # of nominal flights, 15 min
+--false-alarms [--keep x.jsonl] takes 15 min. Each nominal flight of days 19 and 20 against the others of its group
+(`gap_real.py --rows nominal`), as if another vehicle had been overhead in the seconds of each downwash flight of its
+kind: how often a wake passes for one there.
 
-Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
-vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
-
-    python tools/diagnosis/gap_wakes.py [FLIGHTS] --without-seconds    # a test without the seconds, 3 to 5 min
-
-Of the wakes and the nominal flights of days 19 and 20: how well each measure by which the diagnosis knows a wake tells
-the two apart. The figures are in host/docs/gap-real.md and gap-findings.md.
+--without-seconds takes 3 to 5 min. Of the wakes and the nominal flights of days 19 and 20: how well each measure by
+which the diagnosis knows a wake tells the two apart. The figures are in host/docs/gap-real.md and gap-findings.md.
 """
 
 import argparse
@@ -42,7 +42,7 @@ from recordings.wakes.without_seconds import show_without_seconds
 
 
 def main() -> None:
-    """Print how many wakes the test sees, or the false alarms of the diagnosis."""
+    """Print how many wakes the test sees, the false alarms of the diagnosis, or how well its measures tell wakes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
     parser.add_argument("--part", choices=("build", "all"), default="build",

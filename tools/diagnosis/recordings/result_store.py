@@ -13,9 +13,9 @@ Result = dict[str, Any]  #: JSON-ready
 REFUSED = "refused"  #: verdict of a flight that the diagnosis refuses; such a result is not kept
 
 
-def add_keep_option(parser: argparse.ArgumentParser, more: str = "") -> None:
-    """Add the option --keep. more: for its help text."""
-    parser.add_argument("--keep", type=Path, metavar="FILE",
+def add_keep_option(parser: argparse.ArgumentParser, more: str = "", *other_names: str) -> None:
+    """Add the option --keep. more: for its help text; other_names: under which it is known too."""
+    parser.add_argument("--keep", *other_names, type=Path, metavar="FILE",
                         help=f"{more}JSON lines, made if not there; results that it holds are not computed again, new "
                              "ones are appended")
 

@@ -27,7 +27,8 @@ MOST_LEFT_OUT = 3  #: at most one flight in so many is left out; where more are 
 #: distance off the median, m/s^2 and rad/s^2, from which an odd flight is left out; chosen
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
 #: the same of simulated flights, which have no trim of their own: six standard deviations of 60 nominal flights of the
-#: scenario `diagnosis` and more. With FAR a flight that lands on an edge hid masses of 5 % (gap-blind.md, seed 112233)
+#: scenario `diagnosis` and more. With FAR a flight that lands on an edge hid masses of 5 % (gap-blind-record.md, seed
+#: 112233)
 FAR_SIMULATED = 0.1 * FAR
 #: range of the baseline flights' trims that a note mentions, m/s^2 and rad/s^2 (host/docs/gap-floor.md); chosen
 APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])

@@ -1,0 +1,14 @@
+"""The table of the balance's test: a figure that cannot be computed is a dash with its reason."""
+
+import numpy as np
+
+from tools.diagnosis import gap_crazypad_balance
+from tools.diagnosis.recordings.crazypad.balance import RotorTest
+
+
+def test_severity_of_equal_cuts_is_a_dash_with_its_reason(capsys):
+    tests = [RotorTest(("E8", f"cut_M{rotor}_2mm_2mm"), False, 1.0, np.array([True]), np.array([True]), np.array([2.0]))
+             for rotor in (1, 2)]
+    gap_crazypad_balance.show_rotor(tests)
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| a")]
+    assert len(rows) == 2 and all("- (all cuts are the same)" in row and "nan" not in row for row in rows)
