@@ -10,7 +10,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, converged, fit
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
-from airtouch.gap.naming.records import Candidate, Selection
+from airtouch.gap.naming.records import Hypothesis, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
@@ -84,7 +84,7 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     return NamedEffect(effect.name, {**effect.parameters, name: raised, **scaled}, effect.seconds)
 
 
-def _mean_of_halves(hypothesis: Candidate) -> np.ndarray | None:
+def _mean_of_halves(hypothesis: Hypothesis) -> np.ndarray | None:
     """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
     scaled = [f.scaled for f in hypothesis.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None

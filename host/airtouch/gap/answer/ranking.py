@@ -2,7 +2,7 @@
 
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
-from airtouch.gap.answer.shrink import Gap, closure_of, nearer
+from airtouch.gap.answer.shrink import Gap, closure_of, is_nearer_to_floor
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
@@ -51,7 +51,7 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
     irregular_times = selection.nameless.of_times > against(selection).limit
-    return irregular_times or nearer(data, selection.halves, hypothesis, gap)
+    return irregular_times or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

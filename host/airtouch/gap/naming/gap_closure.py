@@ -7,9 +7,10 @@ baseline of another drone a bias or a wind may gain held-out likelihood and yet 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from airtouch.gap.evidence.clock import clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
-from airtouch.gap.naming.records import Selection, TakenBack
+from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnName
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
@@ -27,11 +28,11 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named_steps)
     if not selection.policy.must_close_gap or hypothesis is None or of_known_seconds:
         return None
-    if names_one_of_the_loop(data, selection):
+    if is_one_loop_effect(data, selection):
         return LEAST_CLOSED
     if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in hypothesis.terms):
         return None
-    return LEAST_CLOSED if names_one_that_passes(selection) else 0.0
+    return LEAST_CLOSED if is_one_passing_effect(selection) else 0.0
 
 
 def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
@@ -43,23 +44,24 @@ def closes_too_little(data: Data, selection: Selection, gap: float, closed: floa
     return least is not None and (closed < least or closed <= 0.0)
 
 
-def with_none_named(selection: Selection, closed: float) -> Selection:
+def with_names_withdrawn(data: Data, selection: Selection, closed: float) -> Selection:
     """The selection with no effect named, as those that were named close too little of the gap.
 
-    closed: fraction of the gap that they close. Beside none the nameless model gains what it gains over none.
+    closed: fraction of the gap that they close. Without them the nameless model gains what it gains over no effect, and
+    the logged times hold whatever they hold.
     """
-    nameless = replace(selection.nameless, over_last_step=selection.nameless.over_none)
-    first = selection.named_steps[0].name
-    return replace(selection, steps=(), nameless=nameless, assumed=False, taken_back=TakenBack(first, closed))
+    over_none = selection.nameless.over_none
+    return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, clock_left(data, ())),
+                   assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, closed))
 
 
-def names_one_that_passes(selection: Selection) -> bool:
+def is_one_passing_effect(selection: Selection) -> bool:
     """Whether one effect is named, and it is a passing one."""
     hypothesis = selection.named_hypothesis
     return hypothesis is not None and len(selection.named_steps) == 1 and all(t.gate for t in hypothesis.terms)
 
 
-def names_one_of_the_loop(data: Data, selection: Selection) -> bool:
+def is_one_loop_effect(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
     hypothesis = selection.named_hypothesis
     return hypothesis is not None and len(selection.named_steps) == 1 and _of_the_loop(data, hypothesis.terms)

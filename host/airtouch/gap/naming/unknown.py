@@ -53,7 +53,7 @@ def unsteadiness_ratio(selection: Selection) -> float:
     hypothesis = selection.named_hypothesis
     if hypothesis is not None and any(t.shows_in == MEAN or t.gate for t in hypothesis.terms):
         return 0.0
-    return selection.unsteadiness.nats / selection.unsteadiness.limit
+    return selection.unsteadiness_rarity.nats / selection.unsteadiness_rarity.limit
 
 
 def against_over_limit(selection: Selection) -> float:
