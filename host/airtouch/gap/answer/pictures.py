@@ -62,7 +62,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral densities (bins,) of a channel's residual in the air, its unit squared/Hz; after as in `Signal`."""
+    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`."""
 
     channel: str
     unit: str
