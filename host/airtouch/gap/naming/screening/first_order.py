@@ -25,9 +25,14 @@ from airtouch.gap.evidence.random_strength import strongest
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
-STEP = 0.25  #: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen
-REWEIGHTINGS = 3  #: least-squares fits, each with the weights of the residual of the one before; chosen
-NOTHING = 1e-9  #: change of a spectrum per natural step, unit/sqrt(Hz), that counts as none; chosen, far above rounding
+#: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen. A larger number
+#: takes the slope over more of the curve, a smaller one is nearer to rounding
+STEP = 0.25
+#: least-squares fits, each with the weights of the residual of the one before; chosen. A larger number takes more time
+REWEIGHTINGS = 3
+#: change of a spectrum per natural step, unit/sqrt(Hz), up to which it counts as none; chosen, far above rounding. With
+#: a larger number more effects count as shown by the commands alone
+LEAST_CHANGE = 1e-9
 UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any that is fitted; chosen
 
 
@@ -92,7 +97,7 @@ def shows(data: Data, term: Term) -> bool:
 
     An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
     """
-    return any(np.abs(v).max(initial=0.0) > NOTHING for i in range(len(term.free))
+    return any(np.abs(v).max(initial=0.0) > LEAST_CHANGE for i in range(len(term.free))
                for flight in _change(data, term, i) for v in flight.values())
 
 
