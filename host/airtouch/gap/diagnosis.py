@@ -195,9 +195,7 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
 
 def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
                       rank_all: bool = True) -> tuple[Selection, Gap]:
-    """What is chosen among the candidates, and the gap that it closes.
-
-    rank_all: as for `naming.select`.
+    """The selection among all candidates, and the gap that its effects close; rank_all: as for `naming.select`.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
     `naming.gap_closure`. Where they do not, the others are judged without them. Without nominal flights a wake is no
@@ -214,8 +212,8 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
                                 least_nats=selection.least_nats)
             gap = gap_of_rest
-    closed = gap.closure.shrink.value
-    if gap_closure.closes_too_little(data, selection, gap.closure.before, closed):
-        selection = gap_closure.with_names_withdrawn(data, selection, closed)
+    shrink = gap.closure.shrink.value
+    if gap_closure.closes_too_little(data, selection, gap.closure.before, shrink):
+        selection = gap_closure.with_names_withdrawn(data, selection, shrink)
         gap = gap_of(data, selection.halves, None)
     return selection, gap

@@ -90,7 +90,7 @@ def named_by(data, term):
     fits = tuple(fit(data, part, [term]) for part in halves(data))
     candidate = Hypothesis(term.name, fits[0].terms, 100.0, fits, evidence=100.0)
     return Selection({term.name: candidate}, (Step.of(candidate),), NamelessGain(), halves(data),
-                     {term.name: 8.0}, policy_of(FLOOR, 20.0), assumed=False)
+                     {term.name: 8.0}, policy_of(FLOOR, 20.0), spectrum_is_assumed=False)
 
 
 def test_intervals_of_a_named_effect_hold_the_truth_of_a_linear_gaussian_problem(hovers):

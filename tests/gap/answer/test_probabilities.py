@@ -20,7 +20,7 @@ def selection(gains, named=(), left=4.0):
     """A selection among candidates whose evidence is their gain, beside which the nameless model gains `left`."""
     candidates = {n: Hypothesis(n, (terms(n)[0],), g, evidence=g) for n, g in gains.items()}
     return Selection(candidates, tuple(Step.of(candidates[n]) for n in named), NamelessGain(150.0, left), (None, None),
-                     dict.fromkeys(gains, LEAST), POLICY, assumed=False)
+                     dict.fromkeys(gains, LEAST), POLICY, spectrum_is_assumed=False)
 
 
 @pytest.mark.parametrize("over_limit", [0.5, 1.0, 3.0])

@@ -30,7 +30,7 @@ def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
     inferred = Inference((), GAINS, Against(left, 30.0, of_distance=False)) if by_relations else None
     return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
-                     dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=inferred)
+                     dict.fromkeys(GAINS, 8.0), POLICY, spectrum_is_assumed=False, inference=inferred)
 
 
 def gap(before):

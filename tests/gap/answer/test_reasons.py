@@ -44,8 +44,8 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
         steps.append(replace(Step.of(judged(n, total)), leave_one_out_gain=0.25 * EVIDENCE[n]))
     related = SimpleNamespace(evidence=EVIDENCE, against=Against(beside, 30.0, of_distance)) if inference else None
     return Selection(single_effects, tuple(steps), NamelessGain(150.0, beside), (None, None),
-                     dict.fromkeys(EVIDENCE, 8.0), POLICY, assumed=False, over_prediction=OverPrediction(*lost),
-                     inference=related)
+                     dict.fromkeys(EVIDENCE, 8.0), POLICY, spectrum_is_assumed=False,
+                     over_prediction=OverPrediction(*lost), inference=related)
 
 
 def test_the_answer_has_no_reason():

@@ -8,7 +8,7 @@ import pytest
 import airtouch.gap.diagnosis as diagnose
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming.gap_closure import closes_too_little, least_closed, named_beside_the_loop
+from airtouch.gap.naming.gap_closure import closes_too_little, least_shrink, named_beside_the_loop
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -42,8 +42,8 @@ OVER = STANDS_OUT + 0.1
     (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), OVER, None), (named("packet_loss"), OVER, None),
     (selection(None, ()), OVER, None)])
 def test_least_share_that_a_named_effect_must_close(of, gap, least):
-    assert least_closed(DATA, of, gap) == least
-    assert least_closed(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
+    assert least_shrink(DATA, of, gap) == least
+    assert least_shrink(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
 
 
 @pytest.mark.parametrize(("name", "closed", "too_little"), [

@@ -39,9 +39,9 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
 
 def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
-    gaining = (c for c in selection.single_effects.values() if selection.gained(c) > 0.0)
-    most = sorted(gaining, key=lambda c: -selection.gained(c))
-    return [Rejected(c.name, shortfall(selection, c)) for c in most[:NEAREST]]
+    gaining = [h for h in selection.single_effects.values() if selection.gain(h) > 0.0]
+    best_first = sorted(gaining, key=lambda h: -selection.gain(h))
+    return [Rejected(h.name, shortfall(selection, h)) for h in best_first[:NEAREST]]
 
 
 def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
@@ -57,7 +57,7 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
         return (f"as strong as it often seems to be in nominal flights: of {hypothesis.gain:.0f} nats "
                 f"{max(hypothesis.evidence, 0.0):.1f} are beyond that scatter, but {least:.0f} are needed")
     if hypothesis.name == selection.withdrawn.name:
-        return f"closes {max(selection.withdrawn.fraction_closed, 0.0):.0%} of the gap, too little to be its cause"
+        return f"closes {max(selection.withdrawn.shrink, 0.0):.0%} of the gap, too little to be its cause"
     if selection.named_hypothesis:
         names = [s.name for s in selection.named_steps]
         return (f"gains {hypothesis.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "

@@ -17,7 +17,8 @@ REWEIGHTINGS, OWN_REWEIGHTINGS = 3, 2
 #: added to a normal matrix to invert it: fraction of its diagonal, and least; chosen, next to none. Larger numbers draw
 #: coefficients to 0
 RIDGE, LEAST_RIDGE = 1e-9, 1e-12
-MOST_COLUMNS = 4  #: columns of one channel that are used at most; chosen. A larger number follows the flight more closely
+#: columns of one channel that are used at most; chosen. A larger number follows the flight more closely
+MOST_COLUMNS = 4
 #: standard errors by which the mean square of nominal flights' coefficients must exceed that of chance to count as
 #: scatter; chosen. With a larger number fewer columns have any
 LEAST_ERRORS = 3.0

@@ -45,8 +45,8 @@ def selection_by_relations(search: Search, inference: Inference, rank_all: bool 
     not_fitted = {name: Hypothesis(name, (), 0.0, full=False) for name in search.candidates}
     return Selection(
         single_effects=search.single_effects if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
-        halves=search.trial.halves, least_nats=search.least_nats, assumed=False, inference=inference,
-        policy=search.trial.policy)
+        halves=search.trial.halves, least_nats=search.least_nats, spectrum_is_assumed=False,
+        inference=inference, policy=search.trial.policy)
 
 
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:

@@ -111,10 +111,10 @@ def _first_selection(search: Search, passing: Hypothesis | None) -> PartialSelec
 
 def _worth_adding(partial: PartialSelection, least_evidence: float) -> list[Hypothesis]:
     """Extensions that gain enough over the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    enough = [e.hypothesis for e in partial.extensions.values() if e.hypothesis.gain - partial.gain >= e.required_gain]
+    worthy = [e.hypothesis for e in partial.extensions.values() if e.hypothesis.gain - partial.gain >= e.required_gain]
     if partial.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
-        return [h for h in enough if h.evidence >= least_evidence]
-    return enough
+        return [h for h in worthy if h.evidence >= least_evidence]
+    return worthy
 
 
 def _best_of(extensions: Sequence[Hypothesis], before: float, least_evidence: float) -> Hypothesis | None:
@@ -144,8 +144,8 @@ def _with_step(search: Search, partial: PartialSelection, best: Hypothesis) -> P
     beside_last = {n: e.hypothesis for n, e in partial.extensions.items()}
     single_effects = partial.single_effects
     if not partial.names:  # what nominal flights have as well stands beside every candidate
-        added = {s.name for s in partial.steps}
-        single_effects = {**single_effects, **{n: c for n, c in beside_last.items() if n not in added}}
+        step_names = {s.name for s in partial.steps}
+        single_effects = {**single_effects, **{n: h for n, h in beside_last.items() if n not in step_names}}
     left_by_another = bool(partial.names) and is_random_misfit(search.trial, partial.steps[-1], best)
     enough = best.evidence >= search.trial.policy.least_evidence
     steps = (*partial.steps, Step.of(best, is_named=enough and not left_by_another))
@@ -165,9 +165,9 @@ def _extensions(search: Search, steps: Sequence[Step], before: Mapping[str, Hypo
     as a deviation takes gain from others and seldom adds any.
     """
     trial, any_named = search.trial, any(s.is_named for s in steps)
-    gained = {n for n, gain in further_gains.items() if gain > WORTH_AGAIN * FIRST_GAIN}
-    worth = {n: v for n, v in search.candidates.items() if any_named or n in gained}
-    sure = {n for n, c in before.items() if c.full and c.evidence >= SURE_EVIDENCE and not is_random(n)}
-    best = round_of(trial, worth, steps[-1], search.progress, promising=sure)
+    gaining_names = {n for n, gain in further_gains.items() if gain > WORTH_AGAIN * FIRST_GAIN}
+    candidates = {n: v for n, v in search.candidates.items() if any_named or n in gaining_names}
+    sure_names = {n for n, h in before.items() if h.full and h.evidence >= SURE_EVIDENCE and not is_random(n)}
+    best = round_of(trial, candidates, steps[-1], search.progress, promising=sure_names)
     return {n: Extension(c, least_further_gain(trial, steps[-1], c) if any_named else trial.policy.least_evidence)
             for n, c in best.items()}

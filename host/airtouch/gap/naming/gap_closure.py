@@ -16,7 +16,7 @@ from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
 
 
-def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
+def least_shrink(data: Data, selection: Selection, gap: float) -> float | None:
     """Fraction of the gap that effects must close to be named; None where they need not close any.
 
     gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
@@ -35,24 +35,24 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     return LEAST_CLOSED if is_one_passing_effect(selection) else 0.0
 
 
-def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
-    """Whether the effects named take away less of the gap than they must, or nothing.
+def closes_too_little(data: Data, selection: Selection, gap: float, shrink: float) -> bool:
+    """Whether the effects named close less of the gap than they must, or nothing.
 
-    gap: as for `least_closed`; closed: fraction of it that they take away.
+    gap: as for `least_shrink`; shrink: fraction of it that they close.
     """
-    least = least_closed(data, selection, gap)
-    return least is not None and (closed < least or closed <= 0.0)
+    least = least_shrink(data, selection, gap)
+    return least is not None and (shrink < least or shrink <= 0.0)
 
 
-def with_names_withdrawn(data: Data, selection: Selection, closed: float) -> Selection:
+def with_names_withdrawn(data: Data, selection: Selection, shrink: float) -> Selection:
     """The selection with no effect named, as those that were named close too little of the gap.
 
-    closed: fraction of the gap that they close. Without them the nameless model gains what it gains over no effect, and
-    the logged times hold whatever they hold.
+    shrink: fraction of the gap that they close. Without them the nameless model gains what it gains over no effect, and
+    no fault of the logged times is explained.
     """
     over_none = selection.nameless.over_none
     return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, clock_left(data, ())),
-                   assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, closed))
+                   spectrum_is_assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, shrink))
 
 
 def is_one_passing_effect(selection: Selection) -> bool:
@@ -80,12 +80,12 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
     return others if len(others) < len(names) else []
 
 
-def loop_closes_too_little(closed: float, closed_by_others: float) -> bool:
+def loop_closes_too_little(shrink: float, shrink_of_others: float) -> bool:
     """Whether effects of the control loop close less than LEAST_CLOSED beyond what those beside them close alone.
 
-    closed: fraction of the gap that all take away; closed_by_others: that the others take away, judged without them.
+    shrink: fraction of the gap that all close; shrink_of_others: that the others close, judged without them.
     """
-    return closed - closed_by_others < LEAST_CLOSED
+    return shrink - shrink_of_others < LEAST_CLOSED
 
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:

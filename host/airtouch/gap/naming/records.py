@@ -139,10 +139,10 @@ class UnsteadinessRarity(NamedTuple):
 
 
 class WithdrawnName(NamedTuple):
-    """An effect whose name was withdrawn, as it closes too small a fraction of recorded flights' gap; "" for none."""
+    """An effect whose name was withdrawn, as its shrink of recorded flights' gap is too small; "" for none."""
 
     name: str = ""
-    fraction_closed: float = 0.0
+    shrink: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -152,9 +152,9 @@ class Selection:
     single_effects: the best hypothesis of every candidate, by name, beside the deviations alone; steps: effects added
     one after another; nameless: what the nameless model gains; halves: the blocks that effects were fitted and judged
     on; least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely
-    than none; policy: what the flights must show; assumed: whether the spectrum of an effect of the last step is
-    assumed, as it is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects
-    named; inference: what named the effects, where the relations of signals did; withdrawn: a name that was withdrawn;
+    than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
+    as the effect is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects named;
+    inference: what named the effects, where the relations of signals did; withdrawn: a name that was withdrawn;
     unsteadiness_rarity: how much less steady the flights are than nominal ones.
     """
 
@@ -164,7 +164,7 @@ class Selection:
     halves: tuple[BlockSet, BlockSet]
     least_nats: Mapping[str, float]
     policy: NamingPolicy
-    assumed: bool
+    spectrum_is_assumed: bool
     over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
     withdrawn: WithdrawnName = WithdrawnName()
@@ -195,7 +195,7 @@ class Selection:
         """Slots (`Term.slot`) of the terms of the effects named: a deviation may have the same name."""
         return frozenset(t.slot for i, s in enumerate(self.steps) if s.is_named for t in new_terms(self.steps, i))
 
-    def gained(self, hypothesis: Hypothesis) -> float:
+    def gain(self, hypothesis: Hypothesis) -> float:
         """Nats that a single effect gains: of held-out data, or of the relations of signals where these decide."""
         return float(self.inference.evidence[hypothesis.name] if self.inference is not None else hypothesis.gain)
 

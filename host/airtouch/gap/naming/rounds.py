@@ -132,8 +132,8 @@ def _is_better(new: Hypothesis, old: Hypothesis) -> bool:
     """
     if new.full != old.full:
         return new.full
-    need = LONGER_GAIN if len(new.terms) > len(old.terms) else 0.0
-    return new.gain > old.gain + need
+    margin = LONGER_GAIN if len(new.terms) > len(old.terms) else 0.0
+    return new.gain > old.gain + margin
 
 
 def _is_tried_alone(variant: PricedVariant) -> bool:

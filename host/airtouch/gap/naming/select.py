@@ -119,7 +119,8 @@ def _by_replay(search: Search, partial: PartialSelection) -> Selection:
     selection = Selection(
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, clock_left(trial.data, last)),
-        policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
+        spectrum_is_assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)),
+        policy=policy)
     if policy.judges_unsteadiness:
         selection = replace(selection, unsteadiness_rarity=unsteadiness_rarity(trial.data))
     if policy.judges_over_prediction:

@@ -27,7 +27,7 @@ def against(selection: Selection) -> Against:
     if selection.inference is not None:
         return selection.inference.against
     gain = selection.last_step.gain if selection.last_step else 0.0
-    limit = selection.policy.unknown.nats(gain, selection.nameless.over_none, selection.assumed)
+    limit = selection.policy.unknown.nats(gain, selection.nameless.over_none, selection.spectrum_is_assumed)
     return Against(selection.nameless.over_last_step, limit, of_distance=False)
 
 

@@ -40,11 +40,12 @@ UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any 
 class FirstOrder:
     """Mean effects judged to first order.
 
-    gain: held-out nats; fitted, variances: for each half the k scaled parameters as fitted to it, and their variances.
+    gain: held-out nats; estimates, variances: for each half the k scaled parameters as fitted to it, and their
+    variances.
     """
 
     gain: float
-    fitted: Sequence[np.ndarray]
+    estimates: Sequence[np.ndarray]
     variances: Sequence[np.ndarray]
 
 
@@ -59,7 +60,7 @@ def judge_means(data: Data, halves: Sequence[JudgedBlocks], terms: Sequence[Term
               for half in halves]
     k = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - k)
-    gain, fitted, variances = 0.0, [], []
+    gain, estimates, variances = 0.0, [], []
     for train, test in TWO_FOLDS:
         x, variance = _least_squares(halves[train], tables[train], bounds)
         held_out = halves[test]
@@ -67,9 +68,9 @@ def judge_means(data: Data, halves: Sequence[JudgedBlocks], terms: Sequence[Term
         after, cost = without_offsets(held_out.problem, held_out.modelled.residual + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
             + held_out.offset_cost
-        fitted.append(x[:k])
+        estimates.append(x[:k])
         variances.append(variance[:k])
-    return FirstOrder(gain, fitted, variances)
+    return FirstOrder(gain, estimates, variances)
 
 
 def _in_the_replay(terms: Sequence[Term]) -> list[Term]:

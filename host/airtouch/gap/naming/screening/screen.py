@@ -121,7 +121,7 @@ def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Hypothe
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
     judged = judge_means(start.trial.data, start.halves, terms, start.terms)
     gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
-    of_halves = np.array(judged.fitted)[:, :k]
+    of_halves = np.array(judged.estimates)[:, :k]
     strength = Strength(own.among_all(of_halves.mean(axis=0)),
                         covariance_among_all(own, np.diag(_variance_of_mean(of_halves, judged.variances, k))))
     return Hypothesis(variant.name, (*start.terms, *terms), gain, full=False,
