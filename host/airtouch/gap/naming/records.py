@@ -153,7 +153,7 @@ class Selection:
     one after another; nameless: what the nameless model gains; halves: the blocks that effects were fitted and judged
     on; least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely
     than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
-    as the effect is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects named;
+    as the effect is random or changes the loop of recorded flights; over_prediction: that of the effects named;
     inference: what named the effects, where the relations of signals did; withdrawn: a name that was withdrawn;
     unsteadiness_rarity: how much less steady the flights are than nominal ones.
     """
