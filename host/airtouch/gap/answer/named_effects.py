@@ -60,9 +60,9 @@ def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: n
         least = judge(data, all_blocks, best.terms) + SHAPE_PRICE
         for shape in term.shaped():
             trial = fit(data, all_blocks, [*best_terms[:i], shape, *best_terms[i + 1:]], start)
-            level = judge(data, all_blocks, trial.terms)
-            if level > least:
-                best, least, best_terms[i] = trial, level, shape
+            log_likelihood = judge(data, all_blocks, trial.terms)
+            if log_likelihood > least:
+                best, least, best_terms[i] = trial, log_likelihood, shape
     return converged(data, all_blocks, best)
 
 

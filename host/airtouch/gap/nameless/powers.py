@@ -75,8 +75,8 @@ def power_factors(powers: Powers, prior_mean: np.ndarray, prior_std: np.ndarray)
         out += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
     out[count == 0] = prior_mean[count == 0]
     scaled = e * np.exp(-out[cell])
-    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail_scale)), CELLS)
-    return out, level - 0.5 * (out - prior_mean) ** 2 * precision
+    log_posterior = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail_scale)), CELLS)
+    return out, log_posterior - 0.5 * (out - prior_mean) ** 2 * precision
 
 
 def power_gain(trained: Powers, held_out: Powers, floor: NamelessFloor, simulated: bool) -> float:

@@ -91,7 +91,7 @@ def forward(search: Search, passing: Hypothesis | None) -> PartialSelection:
     partial = _first_selection(search, passing)
     while len(partial.names) < MOST_EFFECTS:
         least = search.trial.policy.least_evidence
-        best = _best_of(_worth_adding(partial, least), partial.gain, least)
+        best = _best_of(_sufficient_extensions(partial, least), partial.gain, least)
         if best is None:
             break
         partial = _with_step(search, partial, best)
@@ -101,7 +101,7 @@ def forward(search: Search, passing: Hypothesis | None) -> PartialSelection:
 def _first_selection(search: Search, passing: Hypothesis | None) -> PartialSelection:
     """The selection before the first effect is added, with a passing effect as a step already."""
     if passing is None:
-        extensions = {n: Extension(c, search.least_nats[n]) for n, c in search.single_effects.items()}
+        extensions = {n: Extension(h, search.least_nats[n]) for n, h in search.single_effects.items()}
         return PartialSelection((), extensions, search.single_effects, search.least_nats)
     single_effects = {**search.single_effects, passing.name: passing}
     steps = (Step.of(passing),)
@@ -109,12 +109,13 @@ def _first_selection(search: Search, passing: Hypothesis | None) -> PartialSelec
     return PartialSelection(steps, extensions, single_effects, {**search.least_nats, passing.name: PASSING_GAIN})
 
 
-def _worth_adding(partial: PartialSelection, least_evidence: float) -> list[Hypothesis]:
+def _sufficient_extensions(partial: PartialSelection, least_evidence: float) -> list[Hypothesis]:
     """Extensions that gain enough over the last step; beside MOST_DEVIATIONS those alone that would be named."""
-    worthy = [e.hypothesis for e in partial.extensions.values() if e.hypothesis.gain - partial.gain >= e.required_gain]
+    extensions = partial.extensions.values()
+    sufficient = [e.hypothesis for e in extensions if e.hypothesis.gain - partial.gain >= e.required_gain]
     if partial.deviations >= MOST_DEVIATIONS:  # a random effect that another leaves may be one more
-        return [h for h in worthy if h.evidence >= least_evidence]
-    return worthy
+        return [h for h in sufficient if h.evidence >= least_evidence]
+    return sufficient
 
 
 def _best_of(extensions: Sequence[Hypothesis], before: float, least_evidence: float) -> Hypothesis | None:
@@ -146,9 +147,9 @@ def _with_step(search: Search, partial: PartialSelection, best: Hypothesis) -> P
     if not partial.names:  # what nominal flights have as well stands beside every candidate
         step_names = {s.name for s in partial.steps}
         single_effects = {**single_effects, **{n: h for n, h in beside_last.items() if n not in step_names}}
-    left_by_another = bool(partial.names) and is_random_misfit(search.trial, partial.steps[-1], best)
-    enough = best.evidence >= search.trial.policy.least_evidence
-    steps = (*partial.steps, Step.of(best, is_named=enough and not left_by_another))
+    is_misfit = bool(partial.names) and is_random_misfit(search.trial, partial.steps[-1], best)
+    has_evidence = best.evidence >= search.trial.policy.least_evidence
+    steps = (*partial.steps, Step.of(best, is_named=has_evidence and not is_misfit))
     after = replace(partial, steps=steps, single_effects=single_effects)
     if len(after.names) >= MOST_EFFECTS:  # nothing is added to these
         return after

@@ -18,7 +18,7 @@ from airtouch.gap.signatures.signature import OVERHEAD
 
 
 def passing_effect(search: Search, without: Sequence[str]) -> Hypothesis | None:
-    """The passing effect that explains most; None if no passing effect passes the tests below.
+    """The passing effect that explains most, as a hypothesis; None where none meets the conditions below.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
@@ -29,15 +29,15 @@ def passing_effect(search: Search, without: Sequence[str]) -> Hypothesis | None:
     if data.study.scatter is None:
         return None
     least = height_gain(data, trial.halves) + PASSING_GAIN
-    passing = [g for g in passing_effects(data, without).values()
-               if g.gain >= least and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
-    if passing:  # else what always acts need not be judged
-        always = [c.gain for name, c in search.single_effects.items() if c.evidence >= search.least_nats[name]]
-        passing = [g for g in passing if g.gain >= max(always, default=0.0) + PASSING_GAIN]
-    if not passing:
+    effects = [e for e in passing_effects(data, without).values()
+               if e.gain >= least and passing_evidence(data, e.key, e.gain, e.strength) >= PASSING_GAIN]
+    if effects:  # else what always acts need not be judged
+        steady_gains = [h.gain for name, h in search.single_effects.items() if h.evidence >= search.least_nats[name]]
+        effects = [e for e in effects if e.gain >= max(steady_gains, default=0.0) + PASSING_GAIN]
+    if not effects:
         return None
-    overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
-    return _hypothesis_of(trial, max(overhead or passing, key=lambda g: g.gain))
+    overhead = [e for e in effects if e.key == KNOWN_OVERHEAD]
+    return _hypothesis_of(trial, max(overhead or effects, key=lambda e: e.gain))
 
 
 def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Hypothesis:

@@ -46,21 +46,21 @@ class GateTrial(NamedTuple):
     cost: float
 
 
-def block_gate(data: Data, whole: BlockSet, level_without: np.ndarray, terms: Sequence[Term]) -> GateTrial:
+def block_gate(data: Data, whole: BlockSet, null_log_likelihoods: np.ndarray, terms: Sequence[Term]) -> GateTrial:
     """An effect as fitted where it acts, with the gate of the blocks in which it does.
 
-    No gate where it acts nowhere or everywhere. whole: all blocks of the flights; level_without (b,): log likelihood of
-    each in the air without the effect. The effect is fitted to the blocks that are explained worst, then to those in
+    No gate where it acts nowhere or everywhere. whole: all blocks of the flights; null_log_likelihoods (b,): of each
+    in the air, without the effect. The effect is fitted to the blocks that are explained worst, then to those in
     which it gains, SEARCH_ROUNDS times at most; then the intervals' ends are moved.
     """
-    air, cost = problem_of(data, whole).flat.air, interval_cost(len(level_without))
+    air, cost = problem_of(data, whole).flat.air, interval_cost(len(null_log_likelihoods))
     at_the_ends = _at_the_ends(data, air)
-    acting = _explained_worst(air, level_without)
+    acting = _explained_worst(air, null_log_likelihoods)
     for _ in range(SEARCH_ROUNDS):
         fitted = fit(data, _part(whole, acting), terms)
-        gain = np.where(at_the_ends, -np.inf, block_levels(data, whole, fitted.terms) - level_without)
+        gain = np.where(at_the_ends, -np.inf, block_log_likelihoods(data, whole, fitted.terms) - null_log_likelihoods)
         intervals = best_intervals(gain, air.flight, cost)
-        chosen = np.zeros(len(level_without), bool)
+        chosen = np.zeros(len(null_log_likelihoods), bool)
         for first, last in intervals:
             chosen[first:last + 1] = True
         if not intervals or chosen.mean() > MOST_OF_FLIGHTS:
@@ -106,21 +106,22 @@ def _best_interval(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[i
     return interval
 
 
-def block_levels(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
+def block_log_likelihoods(data: Data, part: BlockSet, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under effects."""
     judged = judged_blocks(data, part, terms)
     flat = judged.problem.flat
-    block, levels = flat.air.block_of_value, judged.log_likelihoods()[:flat.replay_count]
+    block, per_value = flat.air.block_of_value, judged.log_likelihoods()[:flat.replay_count]
     in_air = block >= 0
-    return np.bincount(block[in_air], levels[in_air])
+    return np.bincount(block[in_air], per_value[in_air])
 
 
-def _explained_worst(air: AirBlocks, level_without: np.ndarray) -> np.ndarray:
+def _explained_worst(air: AirBlocks, null_log_likelihoods: np.ndarray) -> np.ndarray:
     """Which blocks (b,) are explained worst: WORST_FRACTION of them, of the least log likelihood of a value."""
     in_air = air.block_of_value[air.block_of_value >= 0]
-    count = np.maximum(np.bincount(in_air, minlength=len(level_without)), 1)
-    out = np.zeros(len(level_without), bool)
-    out[np.argsort(level_without / count)[:max(int(WORST_FRACTION * len(level_without)), LEAST_WORST)]] = True
+    blocks = len(null_log_likelihoods)
+    values = np.maximum(np.bincount(in_air, minlength=blocks), 1)
+    out = np.zeros(blocks, bool)
+    out[np.argsort(null_log_likelihoods / values)[:max(int(WORST_FRACTION * blocks), LEAST_WORST)]] = True
     return out
 
 
@@ -150,14 +151,14 @@ def _ends_s(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
 def _sharpen(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
 
-    def level(of_gate: Gate) -> float:
+    def log_likelihood(of_gate: Gate) -> float:
         """Log likelihood with the effect in a gate."""
         return judge(data, whole, [replace(t, gate=of_gate) for t in terms])
 
-    best = level(gate)
+    best = log_likelihood(gate)
     for step, i, end, sign in itertools.product(STEPS_S, range(len(gate)), (0, 1), (-1.0, 1.0)):
         moved = _move_end(gate, i, end, sign * step)
-        if moved[i][1] < moved[i][2] and (gain := level(moved)) > best:
+        if moved[i][1] < moved[i][2] and (gain := log_likelihood(moved)) > best:
             best, gate = gain, moved
     return gate
 

@@ -16,7 +16,7 @@ from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate
-from airtouch.gap.passing.gate_search import LEAST_BLOCKS, GateTrial, block_gate, block_levels
+from airtouch.gap.passing.gate_search import LEAST_BLOCKS, GateTrial, block_gate, block_log_likelihoods
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -53,23 +53,24 @@ class PassingEffect:
 class NoEffect:
     """Flights without any effect, against which a passing one is held.
 
-    whole: all their blocks; block_levels (b,): log likelihood of every block in the air; level: that of the flights,
-    as sure of the commands' floor as without (False) and with (True) random effects.
+    whole: all their blocks; block_log_likelihoods (b,): of every block in the air; log_likelihood: of the flights, with
+    the commands' floor as certain as without (False) and as uncertain as with (True) random effects.
     """
 
     data: Data
     whole: BlockSet
-    block_levels: np.ndarray
-    level: Mapping[bool, float]
+    block_log_likelihoods: np.ndarray
+    log_likelihood: Mapping[bool, float]
 
 
 def no_effect(data: Data) -> NoEffect | None:
     """Flights without any effect; None where they are too short to say when an effect acts."""
     whole = whole_of(data)
-    levels = block_levels(data, whole, ())
-    if len(levels) < LEAST_BLOCKS:
+    of_blocks = block_log_likelihoods(data, whole, ())
+    if len(of_blocks) < LEAST_BLOCKS:
         return None
-    return NoEffect(data, whole, levels, {uncertain: judge(data, whole, (), uncertain) for uncertain in (False, True)})
+    of_flights = {uncertain: judge(data, whole, (), uncertain) for uncertain in (False, True)}
+    return NoEffect(data, whole, of_blocks, of_flights)
 
 
 def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, PassingEffect]:
@@ -93,7 +94,7 @@ def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, Passin
 
 def _trials(base: NoEffect, terms: Sequence[Term], burst_gates: Sequence[tuple[Gate, float]]) -> list[GateTrial]:
     """An effect in the blocks that it explains best and in the bursts of each signal, as far as there are any."""
-    trials = [block_gate(base.data, base.whole, base.block_levels, terms),
+    trials = [block_gate(base.data, base.whole, base.block_log_likelihoods, terms),
               *(GateTrial(terms, gate, cost) for gate, cost in burst_gates)]
     return [trial for trial in trials if trial.gate]
 
@@ -115,7 +116,7 @@ def _fitted_in_gate(base: NoEffect, name: str, trial: GateTrial) -> PassingEffec
     acting = [replace(t, gate=trial.gate) for t in trial.terms]
     fitted = fit(base.data, base.whole, acting)
     free = sum(len(t.free) for t in acting)
-    level_without = base.level[bool(random_of(acting))]
-    cost_of_parameters = PARAMETER_COST * free * np.log(len(base.block_levels))
-    gain = judge(base.data, base.whole, fitted.terms) - level_without - trial.cost - cost_of_parameters
+    null_log_likelihood = base.log_likelihood[bool(random_of(acting))]
+    cost_of_parameters = PARAMETER_COST * free * np.log(len(base.block_log_likelihoods))
+    gain = judge(base.data, base.whole, fitted.terms) - null_log_likelihood - trial.cost - cost_of_parameters
     return PassingEffect(name, fitted, gain, trial.cost, name)
