@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.answer.advice import steps as next_steps
-from airtouch.gap.answer.controls import closure_by_vehicle, control
+from airtouch.gap.answer.advice import next_steps
+from airtouch.gap.answer.controls import arms_of, control_of
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
@@ -131,7 +131,8 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=() if verdict == "none" else alike_of(selection),
         where=(), gap={"before": before, "after": gap.closure.after if is_effect else before, "floor": 1.0},
-        shrink=gap.closure.shrink if is_effect else None, control=control(data, selection, gap) if is_effect else None)
+        shrink=gap.closure.shrink if is_effect else None,
+        control=control_of(data, selection, gap) if is_effect else None)
 
 
 def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
@@ -146,7 +147,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))
     answer = replace(
         result, where=cells, map=whole_map, headline=headline,
-        arms=closure_by_vehicle(comparison.declared, judged, selection, result) if is_effect else {},
+        arms=arms_of(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
         cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -194,9 +195,7 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
 
 def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
                       rank_all: bool = True) -> tuple[Selection, Gap]:
-    """What is chosen among the candidates, and the gap that it closes.
-
-    rank_all: as for `naming.select`.
+    """The selection among all candidates, and the gap that its effects close; rank_all: as for `naming.select`.
 
     In recorded flights effects must close a part of the gap to be named, those of the loop also beside others: see
     `naming.gap_closure`. Where they do not, the others are judged without them. Without nominal flights a wake is no
@@ -213,8 +212,8 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
                                 least_nats=selection.least_nats)
             gap = gap_of_rest
-    closed = gap.closure.shrink.value
-    if gap_closure.closes_too_little(data, selection, gap.closure.before, closed):
-        selection = gap_closure.with_none_named(selection, closed)
+    shrink = gap.closure.shrink.value
+    if gap_closure.closes_too_little(data, selection, gap.closure.before, shrink):
+        selection = gap_closure.with_names_withdrawn(data, selection, shrink)
         gap = gap_of(data, selection.halves, None)
     return selection, gap

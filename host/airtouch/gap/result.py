@@ -84,7 +84,7 @@ class HowFar:
 class NamedEffect:
     """An effect that the diagnosis names, with its fitted parameters.
 
-    seconds: stretches (flight, from_s, to_s) in which it acts; empty where it always does.
+    seconds: intervals (flight, from_s, to_s) in which it acts; empty where it always does.
     """
 
     name: str
@@ -169,7 +169,7 @@ REST_OF_FLIGHT = "rest of the flight"  #: as the floor of an open cell
 class OpenCell:
     """A channel, band and phase of flight that no effect named explains, and when.
 
-    from_s, to_s: stretch of a flight in which most of its gap is, over_floor: rms over the floor there at most;
+    from_s, to_s: interval of a flight in which most of its gap is, over_floor: rms over the floor there at most;
     follows: signals that its power ranks like; nearest: effects that gain most; floor: what its floor is, that of the
     map or, where a flight is less steady than nominal ones, REST_OF_FLIGHT, whose median rms it is.
     """
@@ -209,7 +209,7 @@ class Diagnosis:
 
     verdict: "effect", "none" or "unknown"; shrink: fraction of the gap that the named effects close, None where none is
     named; control: how far a deliberately wrong effect closes it, None where none was wrong; arms: how far the named
-    effects do with the vehicle as declared and as calibrated (`answer.controls.closure_by_vehicle`). Terminal, report
+    effects do with the vehicle as declared and as calibrated (`answer.controls.arms_of`). Terminal, report
     and JSON show this and compute nothing of their own.
     """
 

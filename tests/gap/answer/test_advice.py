@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from airtouch.gap.answer.advice import MISSIONS, collect, steps, switched_on
+from airtouch.gap.answer.advice import MISSIONS, collect_command, next_steps, simulate_command
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.alike import ALIKE, CONFUSED, MISSION
 from airtouch.simulation import effects as registry
@@ -18,7 +18,7 @@ BASELINE = ("nominal.csv",)
 
 
 def advice(answer, flights=WITH_GYRO):
-    return steps(replace(answer, baseline=BASELINE, indistinguishable=()), flights, VEHICLE)
+    return next_steps(replace(answer, baseline=BASELINE, indistinguishable=()), flights, VEHICLE)
 
 
 def test_named_effects_are_switched_on_in_the_simulator():
@@ -32,7 +32,7 @@ def test_named_effects_are_switched_on_in_the_simulator():
 def test_a_vehicle_of_a_file_of_its_own_is_named_by_a_file(vehicle):
     """`--vehicle` takes no name of a vehicle that is not built in, and would take another one for one that is."""
     answer = replace(diagnosis(), baseline=())
-    commands = [step.command for step in steps(answer, WITH_GYRO, vehicle) if "--vehicle" in step.command]
+    commands = [step.command for step in next_steps(answer, WITH_GYRO, vehicle) if "--vehicle" in step.command]
     assert len(commands) == 2 and all("--vehicle VEHICLE.toml" in command for command in commands)
 
 
@@ -44,7 +44,7 @@ def test_none_asks_for_nothing_to_be_added():
 @pytest.mark.parametrize("phase", sorted(MISSIONS))
 def test_an_open_gap_is_flown_again_in_its_phase(phase):
     again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))
-    assert again.command == collect(MISSIONS[phase]) and "--effect-file" in own.command
+    assert again.command == collect_command(MISSIONS[phase]) and "--effect-file" in own.command
 
 
 def test_an_open_gap_at_landing_is_flown_again_as_it_was():
@@ -54,7 +54,7 @@ def test_an_open_gap_at_landing_is_flown_again_as_it_was():
 
 def test_effects_that_look_alike_come_first_and_what_is_missing_last():
     answer = replace(diagnosis(), baseline=())
-    alike, switch_on, baseline, gyro = steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
+    alike, switch_on, baseline, gyro = next_steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
     assert alike.text.startswith("To tell mass from thrust_coefficient: ")
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
 
@@ -66,7 +66,7 @@ def test_advised_commands_are_valid():
     for name, effect in EFFECTS.items():
         values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high
                                    and not p.integer else p.default, unit=p.unit) for p in effect.parameters}
-        line = switched_on([NamedEffect(name, values)], VEHICLE.name)
+        line = simulate_command([NamedEffect(name, values)], VEHICLE.name)
         parsed_effect = registry.parse(line.split("--effect ")[1].strip("'"))
         expected = {k: q.value for k, q in values.items()}
         assert parsed_effect[0] == name and parsed_effect[1] == pytest.approx(expected, rel=1e-3)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.controls import closure_by_vehicle, control
+from airtouch.gap.answer.controls import arms_of, control_of
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.signatures.signature import WRONG
 from hovers import DOWN, FLOOR, hover, select_from
@@ -21,7 +21,7 @@ def pushed():
 
 def test_a_wrong_effect_closes_nothing(pushed):
     data, selection, gap = pushed
-    wrong = control(data, selection, gap)
+    wrong = control_of(data, selection, gap)
     assert wrong.name == WRONG[0] and wrong.closure.before == gap.closure.before
     assert abs(wrong.closure.shrink.value) < 0.05 < 0.8 < gap.closure.shrink.value
 
@@ -29,17 +29,17 @@ def test_a_wrong_effect_closes_nothing(pushed):
 def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch):
     data, selection, gap = pushed
     monkeypatch.setattr("airtouch.gap.answer.controls.WRONG", ("thrust_coefficient", "mass", "com_offset"))
-    assert control(data, selection, gap).name == "com_offset"
+    assert control_of(data, selection, gap).name == "com_offset"
     monkeypatch.setattr("airtouch.gap.answer.controls.WRONG", ("thrust_coefficient", "mass"))
-    assert control(data, selection, gap) is None
+    assert control_of(data, selection, gap) is None
 
 
 def test_the_gap_is_also_closed_with_the_vehicle_as_declared(pushed):
     """With the same study it closes as much; with none the answer's own is the only one."""
     data, selection, gap = pushed
     answer = SimpleNamespace(gap={"before": gap.closure.before, "after": gap.closure.after}, shrink=gap.closure.shrink)
-    assert closure_by_vehicle(None, data.flights, selection, answer) == {"declared": gap.closure}
-    both = closure_by_vehicle(FLOOR, data.flights, selection, answer)
+    assert arms_of(None, data.flights, selection, answer) == {"declared": gap.closure}
+    both = arms_of(FLOOR, data.flights, selection, answer)
     assert both["calibrated"] == gap.closure
     assert both["declared"].shrink.value == pytest.approx(gap.closure.shrink.value, abs=0.02)
 
@@ -51,6 +51,6 @@ def test_a_jitter_is_measured_in_the_logged_times_with_either_vehicle():
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     assert [s.name for s in selection.named_steps] == ["time_jitter"] and gap.closure.before > 2.0
     answer = SimpleNamespace(gap={"before": gap.closure.before, "after": gap.closure.after}, shrink=gap.closure.shrink)
-    both = closure_by_vehicle(FLOOR, data.flights, selection, answer)
+    both = arms_of(FLOOR, data.flights, selection, answer)
     assert both["declared"] == both["calibrated"] == gap.closure
-    assert control(data, selection, gap) is None
+    assert control_of(data, selection, gap) is None

@@ -28,7 +28,7 @@ from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.naming.policy import policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR, hover
@@ -89,9 +89,9 @@ def test_intervals_of_a_fit_hold_the_truth_of_a_linear_gaussian_problem(hovers):
 def named_by(data, term):
     """The selection that names one effect, with its fits to both halves."""
     fits = tuple(fit(data, part, [term]) for part in halves(data))
-    candidate = Candidate(term.name, fits[0].terms, 100.0, fits, evidence=100.0)
+    candidate = Hypothesis(term.name, fits[0].terms, 100.0, fits, evidence=100.0)
     return Selection({term.name: candidate}, (Step.of(candidate),), NamelessGain(), halves(data),
-                     {term.name: 8.0}, policy_of(FLOOR, 20.0), assumed=False)
+                     {term.name: 8.0}, policy_of(FLOOR, 20.0), spectrum_is_assumed=False)
 
 
 def test_intervals_of_a_named_effect_hold_the_truth_of_a_linear_gaussian_problem(hovers):

@@ -83,6 +83,15 @@ def test_flight_of_the_signal_is_that_of_the_median_gap():
     assert pictures(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
 
 
+def test_flight_without_the_channel_does_not_count_for_the_median():
+    """Of three gaps the middle one, though two more flights have no gyro; without any gyro there is no signal."""
+    turning = [flight(SECONDS, gyro=noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((0.3, 0.1, 0.2))]
+    without_gyro = [replace(flight(SECONDS, name=f"no gyro {i}"), rates=None) for i in range(2)]
+    rate = [cell("rate_x", "hover", 1.0)]
+    assert pictures(*turning, *without_gyro, cells=rate).signal.flight == "0.2"
+    assert pictures(*without_gyro, cells=rate).signal is None
+
+
 @pytest.mark.parametrize(("channel", "gyro", "shown"), [
     ("torque_y", 0.01, True), ("torque_y", None, False), ("rate_x", 0.01, False)])
 def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.gap.answer.probabilities import LEAST_LEAD, MOST_UNKNOWN, probabilities
 from airtouch.gap.naming.policy import TEMPERATURE, policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step
 from airtouch.gap.signatures.candidates import terms
 from hovers import FLOOR
 
@@ -18,9 +18,9 @@ LEAST = 8.0  #: nats of evidence that a candidate needs to be likelier than none
 
 def selection(gains, named=(), left=4.0):
     """A selection among candidates whose evidence is their gain, beside which the nameless model gains `left`."""
-    candidates = {n: Candidate(n, (terms(n)[0],), g, evidence=g) for n, g in gains.items()}
+    candidates = {n: Hypothesis(n, (terms(n)[0],), g, evidence=g) for n, g in gains.items()}
     return Selection(candidates, tuple(Step.of(candidates[n]) for n in named), NamelessGain(150.0, left), (None, None),
-                     dict.fromkeys(gains, LEAST), POLICY, assumed=False)
+                     dict.fromkeys(gains, LEAST), POLICY, spectrum_is_assumed=False)
 
 
 @pytest.mark.parametrize("over_limit", [0.5, 1.0, 3.0])

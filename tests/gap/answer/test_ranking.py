@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.answer.ranking import AT_FLOOR, LEAST_DIFFERENCE, alike_of, ranking_of, verdict_of
 from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step, Unsteadiness
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step, UnsteadinessRarity
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.result import Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import terms
@@ -22,7 +22,7 @@ GAINS = {"mass": 200.0, "wind": 40.0, "inertia": 2.0}
 def candidate(name, gate=()):
     """A candidate that was not fitted in full, so that the ranking asks for no flights."""
     term = replace(terms(name)[0], gate=gate)
-    return Candidate(name, (term,), GAINS[name], evidence=GAINS[name], full=False)
+    return Hypothesis(name, (term,), GAINS[name], evidence=GAINS[name], full=False)
 
 
 def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0.0):
@@ -30,7 +30,7 @@ def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
     inferred = Inference((), GAINS, Counterevidence(left, 30.0, of_distance=False)) if by_relations else None
     return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
-                     dict.fromkeys(GAINS, 8.0), POLICY, assumed=False, inference=inferred)
+                     dict.fromkeys(GAINS, 8.0), POLICY, spectrum_is_assumed=False, inference=inferred)
 
 
 def gap(before):
@@ -54,7 +54,7 @@ def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
 @pytest.mark.parametrize(("named", "nats", "verdict"), [
     ((), 12.0, "unknown"), ((), 7.0, "none"), (("mass",), 12.0, "none")])
 def test_what_shakes_for_some_seconds_acts_though_the_gap_is_at_its_floor(named, nats, verdict):
-    unsteady = replace(selection(named), unsteadiness=Unsteadiness(nats, 8.0))
+    unsteady = replace(selection(named), unsteadiness_rarity=UnsteadinessRarity(nats, 8.0))
     assert verdict_of(RECORDED, unsteady, gap(AT_FLOOR)) == verdict
 
 
@@ -68,7 +68,7 @@ LIMIT = 20.0  #: nats that may be left beside a mass that gains 200
     (selection(of_times=LIMIT - 1.0, left=LIMIT - 1.0), False, "none"),
     (selection(of_times=LIMIT + 1.0, left=LIMIT + 1.0), False, "unknown")])  # odd times, which no nominal flight has
 def test_simulated_flights_at_their_floor_have_effects_that_bring_cells_nearer(monkeypatch, of, nearer, verdict):
-    monkeypatch.setattr("airtouch.gap.answer.ranking.nearer", lambda *_: nearer)
+    monkeypatch.setattr("airtouch.gap.answer.ranking.is_nearer_to_floor", lambda *_: nearer)
     assert verdict_of(SIMULATED, of, gap(AT_FLOOR)) == verdict
     assert verdict_of(RECORDED, of, gap(AT_FLOOR)) == "none"
     assert verdict_of(SIMULATED, of, gap(OVER)) == verdict_of(RECORDED, of, gap(OVER)), "above it they are alike"

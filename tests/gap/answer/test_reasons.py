@@ -10,13 +10,13 @@ from airtouch.gap.evidence.cells import REST_VIEW, cell_numbers
 from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
-    Candidate,
+    Hypothesis,
     NamelessGain,
     OverPrediction,
     Selection,
     Step,
-    TakenBack,
-    Unsteadiness,
+    UnsteadinessRarity,
+    WithdrawnName,
 )
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
@@ -29,7 +29,7 @@ TERMS = {name: (SimpleNamespace(name=name, slot=name, shows_in="mean"),) for nam
 
 
 def judged(name, gain, evidence=None):
-    return Candidate(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
+    return Hypothesis(name, TERMS[name], gain, evidence=gain if evidence is None else evidence)
 
 
 def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, lost=(0.0, None)):
@@ -45,8 +45,8 @@ def selection(named=("mass",), inference=False, of_distance=False, beside=4.0, l
     related = SimpleNamespace(evidence=EVIDENCE,
                               counterevidence=Counterevidence(beside, 30.0, of_distance)) if inference else None
     return Selection(single_effects, tuple(steps), NamelessGain(150.0, beside), (None, None),
-                     dict.fromkeys(EVIDENCE, 8.0), POLICY, assumed=False, over_prediction=OverPrediction(*lost),
-                     inference=related)
+                     dict.fromkeys(EVIDENCE, 8.0), POLICY, spectrum_is_assumed=False,
+                     over_prediction=OverPrediction(*lost), inference=related)
 
 
 def test_the_answer_has_no_reason():
@@ -105,7 +105,7 @@ def test_reasons_where_nothing_is_named():
     assert not is_explained(nothing)
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, but only up to 18 may be left"
     assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, while a model without names gains 150"
-    back = replace(nothing, taken_back=TakenBack("mass", -0.2))
+    back = replace(nothing, withdrawn=WithdrawnName("mass", -0.2))
     assert shortfall(back, judged("mass", 990.0)) == "closes 0% of the gap, too little to be its cause"
     related = selection((), inference=True, beside=40.0)
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
@@ -114,11 +114,11 @@ def test_reasons_where_nothing_is_named():
 
 
 def test_reason_where_the_flight_is_less_steady_than_nominal_ones():
-    unsteady = replace(selection(()), unsteadiness=Unsteadiness(12.34, 8.0))
+    unsteady = replace(selection(()), unsteadiness_rarity=UnsteadinessRarity(12.34, 8.0))
     assert not is_explained(unsteady)
     assert why_not(unsteady, "none", "unknown") == ("torque and lift are less steady than in nominal flights by 12.3 "
                                                     "nats, but only up to 8.0 may be chance")
-    steady = replace(unsteady, unsteadiness=Unsteadiness(7.0, 8.0))
+    steady = replace(unsteady, unsteadiness_rarity=UnsteadinessRarity(7.0, 8.0))
     assert why_not(steady, "unknown", "none") == ("torque and lift are less steady than in nominal flights by 7.0 "
                                                   "nats, and up to 8.0 may be chance")
     left_too = replace(unsteady, nameless=NamelessGain(150.0, 40.0))

@@ -13,7 +13,7 @@ from airtouch.gap.answer.shrink import (
     closure_of_jitter,
     fraction_closed,
     gap_of,
-    nearer,
+    is_nearer_to_floor,
 )
 from airtouch.gap.evidence.cells import CELLS, REPLAY_VIEW, VIEW_STRIDE, cell_numbers
 from airtouch.gap.evidence.data import Data
@@ -22,7 +22,7 @@ from airtouch.gap.evidence.problem import problem_of
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.clock import LEAST_JITTER_S
 from airtouch.gap.naming.judging import PricedVariant, cross_validated, halves, trial_of
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signals.channels import COLUMN, TORQUE
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.signatures.candidates import terms
@@ -113,7 +113,7 @@ def test_a_gap_that_one_half_alone_shows_is_not_measured_there():
 
 
 def test_the_interval_is_that_of_the_power_of_white_noise():
-    """An energy of 16 becomes 4, that of N real samples of white noise, which scatters by 4 sqrt(2 / N).
+    """A power ratio of 16 becomes 4, that of N real samples of white noise, which scatters by 4 sqrt(2 / N).
 
     So the shrink (4 - sqrt(4)) / 3 scatters by sqrt(2 / N) / 3, and its 90 % interval is 2 * 1.645 of these wide.
     """
@@ -124,8 +124,8 @@ def test_the_interval_is_that_of_the_power_of_white_noise():
         data = Data(FLOOR, [hover(seed, louder=2.0)])
         both_halves = halves(data)
         n = int(sum(counts_of(data, half)[lift].sum() for half in both_halves))
-        energies_before = Gap((lift, lift), 0.0, np.full(n, 16.0), None)
-        closure = closure_of(data, both_halves, Candidate("nothing", (), 0.0), energies_before)
+        ratios_before = Gap((lift, lift), 0.0, np.full(n, 16.0), None)
+        closure = closure_of(data, both_halves, Hypothesis("nothing", (), 0.0), ratios_before)
         assert (closure.before, closure.after) == pytest.approx((4.0, 2.0), rel=0.05)
         assert closure.shrink.low < closure.shrink.value < closure.shrink.high
         widths.append(closure.shrink.high - closure.shrink.low)
@@ -136,11 +136,11 @@ def biased(mps2):
     """The hypothesis that the accelerometer shows so much lift."""
     (bias,) = terms("imu_bias")[:1]
     fitted = SimpleNamespace(terms=(bias.fitted(bias.scaled({**bias.values, "acc_z": mps2})),))
-    return Candidate("imu_bias", fitted.terms, 0.0, (fitted, fitted))
+    return Hypothesis("imu_bias", fitted.terms, 0.0, (fitted, fitted))
 
 
-@pytest.mark.parametrize(("energy_over_floor", "is_nearer"), [(0.0, False), (1.0, True), (1.8, True), (2.2, False)])
-def test_less_than_the_floor_is_as_far_off_as_more(energy_over_floor, is_nearer):
+@pytest.mark.parametrize(("power_over_floor", "is_nearer"), [(0.0, False), (1.0, True), (1.8, True), (2.2, False)])
+def test_less_than_the_floor_is_as_far_off_as_more(power_over_floor, is_nearer):
     """A flight with next to no noise is off by all of the floor; what a bias adds to its lowest band brings it nearer.
 
     A constant has its power in the lowest bin, and half as much in the next, which together may be as far over.
@@ -150,13 +150,14 @@ def test_less_than_the_floor_is_as_far_off_as_more(energy_over_floor, is_nearer)
     lift[cell_numbers(REPLAY_VIEW, 0, LIFT)] = True
     bins = np.flatnonzero(frequencies(AIR) < BANDS_HZ[1])
     floor = FLOOR.floor.power[AIR][bins, LIFT]
-    energy_of_1 = (1.0 / 1.5) / frequencies(AIR)[1] / floor[0] * 1.5  # of 1 m/s^2, in both bins, over the floor
-    bias = biased(np.sqrt(energy_over_floor * len(bins) / energy_of_1))
-    assert nearer(data, both_halves, bias, SimpleNamespace(cells=(lift, lift))) == is_nearer
+    power_of_1 = (1.0 / 1.5) / frequencies(AIR)[1] / floor[0] * 1.5  # of 1 m/s^2, in both bins, over the floor
+    bias = biased(np.sqrt(power_over_floor * len(bins) / power_of_1))
+    assert is_nearer_to_floor(data, both_halves, bias, SimpleNamespace(cells=(lift, lift))) == is_nearer
 
 
 def test_the_right_effect_is_nearer_and_none_is_not():
     data = Data(FLOOR, [hover(7, (0.0, 0.0, 0.5))])
     both_halves, all_cells = halves(data), SimpleNamespace(cells=(np.ones(CELLS, bool),) * 2)
-    assert nearer(data, both_halves, biased(0.5), all_cells)
-    assert not nearer(data, both_halves, biased(-0.5), all_cells) and not nearer(data, both_halves, None, all_cells)
+    assert is_nearer_to_floor(data, both_halves, biased(0.5), all_cells)
+    assert not is_nearer_to_floor(data, both_halves, biased(-0.5), all_cells)
+    assert not is_nearer_to_floor(data, both_halves, None, all_cells)

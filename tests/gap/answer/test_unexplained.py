@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst_stretch
-from airtouch.gap.naming.records import Unsteadiness
+from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst_interval
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.passing_effect import unsteadiness_rarity
+from airtouch.gap.naming.records import UnsteadinessRarity
 from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.result import REST_OF_FLIGHT
 from airtouch.gap.signals.channels import COLUMN, COUNT
@@ -42,10 +44,10 @@ def test_a_command_is_held_against_the_floor_of_its_cell():
     np.testing.assert_allclose(ratios_of_blocks(one, gap, command), 3.0, rtol=0.01)
 
 
-def test_the_worst_stretch_ends_where_the_gap_is_half_way_to_its_median():
-    assert worst_stretch(np.array([1.0, 1.0, 3.1, 5.0, 2.9, 4.0, 1.0, 1.0, 1.0])) == (2, 3)
-    assert worst_stretch(np.array([5.0, 1.0, 1.0])) == (0, 0)
-    assert worst_stretch(np.array([2.0, 2.0, 2.0])) == (0, 2)
+def test_the_worst_interval_ends_where_the_gap_is_half_way_to_its_median():
+    assert worst_interval(np.array([1.0, 1.0, 3.1, 5.0, 2.9, 4.0, 1.0, 1.0, 1.0])) == (2, 3)
+    assert worst_interval(np.array([5.0, 1.0, 1.0])) == (0, 0)
+    assert worst_interval(np.array([2.0, 2.0, 2.0])) == (0, 2)
 
 
 def test_open_cell_has_flight_and_seconds_of_the_largest_gap():
@@ -79,12 +81,12 @@ def test_at_most_five_cells_are_reported():
     assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
 
 
-STEADY = Unsteadiness()
+STEADY = UnsteadinessRarity()
 
 
-def selection(unsteadiness=STEADY):
+def selection(rarity=STEADY):
     """A selection without candidates."""
-    return SimpleNamespace(last_step=None, single_effects={}, named_hypothesis=None, unsteadiness=unsteadiness)
+    return SimpleNamespace(last_step=None, single_effects={}, named_hypothesis=None, unsteadiness_rarity=rarity)
 
 
 def test_an_unsteady_flight_has_the_seconds_and_the_channel_that_is_shaken():
@@ -93,9 +95,12 @@ def test_an_unsteady_flight_has_the_seconds_and_the_channel_that_is_shaken():
     shaken = noise(40.0, 0.1, 3) * np.where([False, True, False], strength, 1.0)
     flights = [flight(40.0, noise(40.0, 1.0, 5), noise(40.0, 0.1, 4), name="calm.csv"),
                flight(40.0, noise(40.0, 1.0, 6), shaken, name="shaken.csv")]
-    scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (-2.5, 0.5), UNSTEADY_LIFT: (-2.5, 0.5)})
-    (entry,) = unexplained(replace(STUDY, scatter=scatter), flights, selection(Unsteadiness(12.0, 8.0)), [])
+    scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (-3.5, 0.2), UNSTEADY_LIFT: (-2.6, 0.2)})
+    study = replace(STUDY, scatter=scatter)
+    rarity = unsteadiness_rarity(Data(study, flights))
+    assert rarity.rarest == UNSTEADY_TORQUE and rarity.nats > rarity.limit
+    (entry,) = unexplained(study, flights, selection(rarity), [])
     assert (entry.flight, entry.channel, entry.phase) == ("shaken.csv", "torque_y", "hover")
     assert entry.from_s == pytest.approx(20.0, abs=0.4) and entry.to_s == pytest.approx(22.0, abs=0.4)
     assert entry.floor == REST_OF_FLIGHT and entry.over_floor == pytest.approx(4.0, rel=0.25)
-    assert unexplained(replace(STUDY, scatter=scatter), flights, selection(Unsteadiness(7.0, 8.0)), []) == []
+    assert unexplained(study, flights, selection(rarity._replace(nats=0.9 * rarity.limit)), []) == []

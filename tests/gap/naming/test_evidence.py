@@ -5,7 +5,7 @@ import pytest
 
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.policy import LEAST_GAIN
-from airtouch.gap.naming.records import Candidate, Strength
+from airtouch.gap.naming.records import Hypothesis, Strength
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.signatures.scatter import Scatter
 from gap_flights import VEHICLE
@@ -18,7 +18,7 @@ NOMINAL = Scatter({"mass": np.array([RMS])}, FREEDOM, (0.0, 0.0))
 def evidence(scatter, strength, gain=100.0):
     """Evidence for a mass of an exact strength that gains so many nats, 40 of them its base's."""
     exact = Strength(np.array([strength]), np.zeros((1, 1)))
-    candidate = Candidate("mass", (terms("mass")[0],), gain, strength=exact)
+    candidate = Hypothesis("mass", (terms("mass")[0],), gain, strength=exact)
     return with_evidence(scatter, {"mass": candidate}, 40.0)["mass"].evidence
 
 

@@ -17,7 +17,7 @@ from airtouch.gap.naming.policy import (
     WORTH_AGAIN,
     policy_of,
 )
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from hovers import DOWN, scattered, select_from, weak
 
 POLICY = policy_of(scattered(exact=True), 30.0)  #: of simulated flights
@@ -32,7 +32,7 @@ def select(monkeypatch):
     def run(candidates, passing=None, screened=(), least_evidence=FIRST_GAIN):
         def candidate(name, base_gain=0.0):
             gain, evidence = candidates[name]
-            return Candidate(name, (), base_gain + gain, full=name not in screened, evidence=evidence)
+            return Hypothesis(name, (), base_gain + gain, full=name not in screened, evidence=evidence)
 
         def round_of(trial, variants, base, progress, promising=()):
             if base is None:
@@ -108,7 +108,7 @@ def test_small_gains_are_not_judged_again_beside_a_deviation(select):
 
 
 def test_passing_effect_is_the_first_step(select):
-    passing = Candidate("wake", (), 60.0, evidence=30.0)
+    passing = Hypothesis("wake", (), 60.0, evidence=30.0)
     partial, _ = select({"a": (100.0, 20.0)}, passing)
     assert names(partial) == [("wake", True), ("a", True)]
     assert partial.single_effects["wake"] is passing and partial.least_nats["wake"] == LEAST_GAIN

@@ -8,12 +8,18 @@ import pytest
 import airtouch.gap.diagnosis as diagnose
 from airtouch.gap.answer.shrink import gap_of
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming.gap_closure import closes_too_little, least_closed, named_beside_the_loop
+from airtouch.gap.naming.gap_closure import (
+    closes_too_little,
+    least_shrink,
+    named_beside_the_loop,
+    with_names_withdrawn,
+)
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.result import Closure, Quantity
 from airtouch.gap.signatures.candidates import all_candidates, terms
+from airtouch.gap.signatures.signature import PASSING
 from gap_flights import fly
 
 LAW = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "actuator_delay" for a in active))
@@ -42,8 +48,8 @@ OVER = STANDS_OUT + 0.1
     (named("downwash", gate=((0, 1),), key=KNOWN_OVERHEAD), OVER, None), (named("packet_loss"), OVER, None),
     (selection(None, ()), OVER, None)])
 def test_least_share_that_a_named_effect_must_close(of, gap, least):
-    assert least_closed(DATA, of, gap) == least
-    assert least_closed(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
+    assert least_shrink(DATA, of, gap) == least
+    assert least_shrink(DATA, selection(of.named_hypothesis, of.named_steps, recorded=False), gap) is None
 
 
 @pytest.mark.parametrize(("name", "closed", "too_little"), [
@@ -70,6 +76,17 @@ def delayed(study):
     recorded = replace(study, scatter=replace(study.scatter, exact=False))
     data = Data(recorded, fly(1, 93, {"actuator_delay": {"delay": 0.005}}))
     return recorded, data, select(data, all_candidates())
+
+
+def test_a_withdrawn_error_of_the_times_is_left_to_the_nameless_model(study):
+    """While it is named, the times hold nothing more; without its name they hold all that it gained."""
+    data = Data(study, fly(1, 94, {"time_jitter": {"rms": 0.004}}))
+    selection = select(data, {"time_jitter": all_candidates()["time_jitter"]}, without=tuple(PASSING))
+    assert [s.name for s in selection.named_steps] == ["time_jitter"] and selection.nameless.of_times == 0.0
+    after = with_names_withdrawn(data, selection, 0.1)
+    assert not after.steps and after.withdrawn == ("time_jitter", 0.1)
+    assert after.nameless.of_times == pytest.approx(selection.steps[0].gain)
+    assert after.nameless.over_last_step == after.nameless.over_none == selection.nameless.over_none
 
 
 @pytest.mark.parametrize("closes", [True, False])

@@ -10,7 +10,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import TWO_FOLDS
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.judging import PricedVariant, covariance_among_all
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import fly
@@ -64,7 +64,7 @@ def test_choice_of_a_clock_effect_is_charged(beside_mass):
     assert both.charges.choice_cost == (0.75 if beside_mass else 0.5)
 
 
-def test_certainty_refund_is_given_back_once(flying):
+def test_uncertain_floor_loss_is_given_back_once(flying):
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, fly(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
@@ -74,11 +74,11 @@ def test_certainty_refund_is_given_back_once(flying):
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, uncertain) for k in (0, 1))
                     for uncertain in (False, True))
     joint_gain = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
-    assert sure - unsure > 5.0 and late.charges.certainty_refund == 0.0 and both.charges.choice_cost == 0.5
-    assert both.charges.certainty_refund == pytest.approx(sure - unsure)
+    assert sure - unsure > 5.0 and late.charges.uncertain_floor_loss == 0.0 and both.charges.choice_cost == 0.5
+    assert both.charges.uncertain_floor_loss == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(joint_gain + (sure - unsure) - 0.5)
     third = judging.cross_validated(on, judging.PricedVariant("vibration", all_candidates()["vibration"][0], 0.0), both)
-    assert third.charges.certainty_refund == both.charges.certainty_refund, "paid once"
+    assert third.charges.uncertain_floor_loss == both.charges.uncertain_floor_loss, "paid once"
 
 
 def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(study):
@@ -89,8 +89,8 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     chosen = judging.cross_validated(on, judging.PricedVariant("controller_gain", (gain,), 0.0), None)
     certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, uncertain_floor)
                               for train, test in TWO_FOLDS) for uncertain_floor in (False, True))
-    assert isinstance(chosen, Candidate) and certain > uncertain + 10.0
+    assert isinstance(chosen, Hypothesis) and certain > uncertain + 10.0
     vibration = judging.PricedVariant("vibration", (terms("vibration")[0],), 0.0)
     both = judging.cross_validated(on, vibration, chosen)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
-    assert both.charges.certainty_refund == pytest.approx(certain - uncertain)
+    assert both.charges.uncertain_floor_loss == pytest.approx(certain - uncertain)

@@ -45,7 +45,7 @@ def gain_of_all_but(on, effects, place):
 def test_gain_is_that_of_all_less_that_of_the_others(late, effects):
     """Late sensors gain more while no noise has made the commands' floor uncertain: nobody else adds that."""
     steps = added(late, *effects)
-    assert steps[-1].charges.certainty_refund > 400.0
+    assert steps[-1].charges.uncertain_floor_loss > 400.0
     for place, step in enumerate(with_leave_one_out_gains(late, steps)):
         assert step.leave_one_out_gain == pytest.approx(steps[-1].gain - gain_of_all_but(late, effects, place), abs=0.5)
 

@@ -16,7 +16,7 @@ from hovers import STIFF, own_gain, select_from
 def test_loop_effect_is_named_by_the_commands(flying, name, parameter, value):
     selection, data = select_from(fly(1, 2, {name: {parameter: value}}), (name, "mass"), flying)
     (step,) = selection.steps
-    assert step.name == name and step.is_named and selection.assumed
+    assert step.name == name and step.is_named and selection.spectrum_is_assumed
     assert selection.policy.unknown.least == pytest.approx(12.0 * 5 / 3), "of four nominal flights"
     assert step.terms[0].values[parameter] == pytest.approx(value, rel=0.2)
     assert set(selection.least_nats.values()) == {policy.LEAST_GAIN}, "as in recorded flights"
@@ -43,7 +43,7 @@ def test_effect_that_only_the_commands_show_is_fitted(flying, tmp_path):
 def test_changed_loop_is_assumed_in_recorded_flights(flying, simulated):
     study = replace(flying, scatter=Scatter({}, 8.0, (0.0, 0.0), exact=simulated))
     selection, _ = select_from(fly(1, 2, {"sensor_latency": {"delay": 0.008}}), ("sensor_latency",), study)
-    assert [s.name for s in selection.steps] == ["sensor_latency"] and selection.assumed is not simulated
+    assert [s.name for s in selection.steps] == ["sensor_latency"] and selection.spectrum_is_assumed is not simulated
 
 
 def test_turbulent_ground_effect_is_named(flying):

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from airtouch.gap.evidence.fit import FittedTerms
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.signature import SPECTRUM
 
 
 def hypothesis(name, *parts):
     """A candidate fitted to both halves with these terms."""
-    return Candidate(name, parts, 100.0, tuple(FittedTerms(parts, np.zeros(0), np.zeros((0, 0))) for _ in (0, 1)))
+    return Hypothesis(name, parts, 100.0, tuple(FittedTerms(parts, np.zeros(0), np.zeros((0, 0))) for _ in (0, 1)))
 
 
 def selection(*steps):

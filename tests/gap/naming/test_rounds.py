@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.judging import PricedVariant, cross_validated
 from airtouch.gap.naming.policy import FIRST_GAIN, HOPELESS, LEAST_GAIN
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from gap_flights import VEHICLE, fly
@@ -43,7 +43,7 @@ def test_companion_must_gain_longer_gain(drag, names):
 
 
 def test_longer_variant_must_gain_longer_gain_in_any_order():
-    short, long = (Candidate("gust", (None,) * n, gain, (None, None), full=True) for n, gain in ((1, 30.0), (2, 31.0)))
+    short, long = (Hypothesis("gust", (None,) * n, gain, (None, None), full=True) for n, gain in ((1, 30.0), (2, 31.0)))
     for judged in ([short, long], [long, short]):
         assert rounds.best_of_each(judged, 0)["gust"] is short
 

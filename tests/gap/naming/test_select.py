@@ -36,7 +36,7 @@ def test_nominal_flight_has_no_effect():
     assert set(selection.least_nats.values()) == {policy.LEAST_GAIN}  # without a loop the stricter one
     assert selection.nameless.over_none == selection.nameless.over_last_step < 12.0
     assert not any(j.full for j in selection.single_effects.values())
-    assert not selection.assumed and selection.policy.unknown.nominal_gain == 0.0
+    assert not selection.spectrum_is_assumed and selection.policy.unknown.nominal_gain == 0.0
     drag, motor = selection.single_effects["rotor_drag"], selection.single_effects["weak_motor"]
     # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
     assert drag.gain == pytest.approx(-policy.PRICE) and drag.charges.choice_cost == 0.0
@@ -72,7 +72,7 @@ def test_deviation_is_not_named():
     # four times a floor of twice the declared power; the declared one itself is no part of what is added
     assert selection.named_hypothesis.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
     assert [t.name for t in selection.named_hypothesis.terms] == ["imu_noise"]
-    assert {t.name for t in selection.last_step.terms} == {"imu_noise", "mass"} and selection.assumed
+    assert {t.name for t in selection.last_step.terms} == {"imu_noise", "mass"} and selection.spectrum_is_assumed
     push_only, _ = select_from([hover(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
     assert [s.is_named for s in push_only.steps] == [False] and push_only.named_hypothesis is None
     assert is_explained(push_only)
@@ -174,7 +174,7 @@ def test_variant_of_the_right_time_is_named(time_s):
     flight = replace(flight, acceleration=flight.acceleration + lift[:, None] * [0.0, 0.0, 1.0])
     selection, _ = select_from([flight], ("motor_noise",))
     (step,) = selection.steps
-    assert step.terms[0].values["time"] == time_s and selection.assumed
+    assert step.terms[0].values["time"] == time_s and selection.spectrum_is_assumed
     assert step.charges.choice_cost == pytest.approx(np.log(3.0)), "one of three times"
     # four motors of their own, each with a quarter of the weight
     assert step.terms[0].values["rms"] == pytest.approx(0.6 / VEHICLE.gravity_mps2 * 2.0, rel=0.25)

@@ -9,7 +9,7 @@ import pytest
 from airtouch.gap.evidence.cells import CELLS, COMMAND_VIEW, REPLAY_VIEW, REST_VIEW, cell_numbers
 from airtouch.gap.naming import thresholds
 from airtouch.gap.naming.policy import LEAST_GAIN
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signals.channels import CHANNELS
 from airtouch.gap.signatures.candidates import terms
 from hovers import DOWN, hover, scattered, select_from
@@ -69,7 +69,7 @@ def trial(recorded=False):
 
 
 def fitted(gain, full=True):
-    return Candidate("mass", (), gain, fits=(SimpleNamespace(), SimpleNamespace()), full=full)
+    return Hypothesis("mass", (), gain, fits=(SimpleNamespace(), SimpleNamespace()), full=full)
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_misfit_of_the_whole_gain(cells, recorded, everywhere, full, gain):
 def test_a_second_of_a_name_is_a_further_effect_of_its_own(rotors, share):
     """Two weak rotors have one name. Beside an effect of the loop, another that changed it would need a quarter."""
     def hypothesis(gain, of_rotors):
-        return Candidate("weak_motor", tuple(WEAK[r] for r in of_rotors), gain, full=False)
+        return Hypothesis("weak_motor", tuple(WEAK[r] for r in of_rotors), gain, full=False)
 
     loop = SimpleNamespace(changes_loop=lambda active: True)
     judged = SimpleNamespace(data=SimpleNamespace(study=SimpleNamespace(loop=loop)), policy=SimpleNamespace(

@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.naming.policy import UnknownLimit, policy_of
-from airtouch.gap.naming.records import Candidate, NamelessGain, OverPrediction, Selection, Step, Unsteadiness
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, OverPrediction, Selection, Step, UnsteadinessRarity
 from airtouch.gap.naming.unknown import (
     against_over_limit,
     counterevidence,
@@ -26,7 +26,7 @@ POLICY = replace(policy_of(FLOOR, 30.0), unknown=LIMIT)
 
 def selection(left=0.0, gain=None, over_none=0.0, assumed=False, lost=0.0, by_relations=None):
     """A selection whose effects gain so many nats (None: no effect), beside which the nameless model gains `left`."""
-    steps = () if gain is None else (Step.of(Candidate("mass", (), gain)),)
+    steps = () if gain is None else (Step.of(Hypothesis("mass", (), gain)),)
     inference = None if by_relations is None else SimpleNamespace(counterevidence=by_relations)
     return Selection({}, steps, NamelessGain(over_none, left), (None, None), {}, POLICY, assumed,
                      OverPrediction(lost, 0), inference)
@@ -72,8 +72,8 @@ GATE = (("a.csv", 1.0, 2.0),)
     (("imu_noise",), GATE, False), (("mass",), (), False), (("imu_noise", "mass"), (), False)])
 def test_unsteady_flights_speak_against_what_is_equally_strong_all_along(names, gate, counts):
     named = tuple(replace(terms(name)[0], gate=gate) for name in names)
-    steps = (Step.of(Candidate(names[0], named, 1000.0)),) if names else ()
-    unsteady = replace(selection(), steps=steps, unsteadiness=Unsteadiness(12.0, 8.0))
+    steps = (Step.of(Hypothesis(names[0], named, 1000.0)),) if names else ()
+    unsteady = replace(selection(), steps=steps, unsteadiness_rarity=UnsteadinessRarity(12.0, 8.0))
     assert unsteadiness_ratio(unsteady) == (1.5 if counts else 0.0)
     assert is_explained(unsteady) != counts
-    assert is_explained(replace(unsteady, unsteadiness=Unsteadiness(7.9, 8.0)))
+    assert is_explained(replace(unsteady, unsteadiness_rarity=UnsteadinessRarity(7.9, 8.0)))

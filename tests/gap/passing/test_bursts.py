@@ -8,8 +8,8 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts as passing_bursts
-from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, bursts
-from airtouch.gap.passing.stretches import ENDS
+from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate
+from airtouch.gap.passing.gate_search import ENDS
 from gap_flights import fly
 
 HERTZ = 25.0  #: of the torque that is put in, in the middle of YAW_BURSTS' band
@@ -40,14 +40,14 @@ def test_bursts_are_where_the_power_is(study, nominal_flight, monkeypatch, signa
     rng = np.random.default_rng(0)
     noise = 0.3 * rng.normal(size=len(nominal_flight))
     with_residual(monkeypatch, shaken(nominal_flight, begin_s, end_s, 30.0) + noise)
-    gate, cost = bursts(Data(study, [nominal_flight]), signal)
+    gate, cost = burst_gate(Data(study, [nominal_flight]), signal)
     assert [(name, pytest.approx(begin_s), pytest.approx(end_s)) for name, *_ in gate] == list(gate)
     assert len(gate) == 1 and cost > 0.0
 
 
 def test_a_flight_that_is_shaken_alike_all_along_has_no_bursts(study, nominal_flight, monkeypatch):
     with_residual(monkeypatch, shaken(nominal_flight, 0.0, 0.0, 1.0))
-    assert bursts(Data(study, [nominal_flight]), YAW_BURSTS) == ((), 0.0)
+    assert burst_gate(Data(study, [nominal_flight]), YAW_BURSTS) == ((), 0.0)
 
 
 def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_flight, monkeypatch):
@@ -57,9 +57,9 @@ def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_fligh
     resting = replace(nominal_flight, phase=np.where(standing, GROUND, nominal_flight.phase),
                       pwm=np.where(standing[:, None], 0.0, nominal_flight.pwm))
     with_residual(monkeypatch, np.where(standing, 0.001, 1.0) * values)
-    assert bursts(Data(study, [resting]), YAW_BURSTS) == ((), 0.0)
+    assert burst_gate(Data(study, [resting]), YAW_BURSTS) == ((), 0.0)
 
 
 def test_a_flight_that_only_takes_off_says_nothing(study, nominal_flight):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
-    assert bursts(Data(study, [taking_off]), FORCE_BURSTS) == ((), 0.0)
+    assert burst_gate(Data(study, [taking_off]), FORCE_BURSTS) == ((), 0.0)

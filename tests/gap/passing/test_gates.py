@@ -1,4 +1,4 @@
-"""Passing effects: stretches found in flights into which one was injected, and none where none was."""
+"""Passing effects: gates found in flights into which one was injected, and none where none was."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights import flight
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.select import select
-from airtouch.gap.passing import gates, stretches
+from airtouch.gap.passing import gate_search, gates
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
@@ -61,8 +61,8 @@ def test_the_diagnosis_says_when(study, nominal_flight):
     diagnosis = diagnose_with_study(study, [pushed(nominal_flight, 0.03)], LOOP)
     assert diagnosis.verdict == "effect"
     assert diagnosis.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
-    stretches = [s for e in diagnosis.effects for s in e.seconds]
-    assert stretches and all(name == nominal_flight.name for name, _, _ in stretches)
+    gate = [s for e in diagnosis.effects for s in e.seconds]
+    assert gate and all(name == nominal_flight.name for name, _, _ in gate)
     fields = next(e for e in diagnosis.plain()["effects"] if "seconds" in e)
     assert FROM_S - 2.0 < fields["seconds"][0]["from_s"] < fields["seconds"][-1]["to_s"] < TO_S + 2.0
 
@@ -156,7 +156,7 @@ def test_what_stays_open_is_shown_with_its_seconds(study, nominal_flight):
 
 
 def test_no_effect_passes_in_take_off_and_landing(study, nominal_flight):
-    ends = np.isin(nominal_flight.phase, stretches.ENDS)
+    ends = np.isin(nominal_flight.phase, gate_search.ENDS)
     assert ends.sum() * flight.PERIOD_S > 1.0
     force = nominal_flight.acceleration.copy()
     force[ends, 2] -= 0.1 * VEHICLE.gravity_mps2

@@ -9,8 +9,8 @@ from scipy.stats import skew
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.passing.gate_search import ENDS
 from airtouch.gap.passing.one_sided import PUSH_BAND_HZ, downward
-from airtouch.gap.passing.stretches import ENDS
 from airtouch.gap.signals.channels import residual
 from gap_flights import fly
 

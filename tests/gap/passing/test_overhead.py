@@ -29,7 +29,7 @@ SECONDS = ((7.0, 7.4), (9.2, 9.7), (13.0, 13.3))
 def path(begin_s, place, seconds=20.0):
     """The log of a vehicle that hangs at a place."""
     time = begin_s + np.arange(0.0, seconds, 0.01)
-    return FlightLog({"t_s": time, **{k: np.full(len(time), v) for k, v in zip(overhead.PLACE, place, strict=True)}},
+    return FlightLog({"t_s": time, **{k: np.full(len(time), v) for k, v in zip(overhead.POSITION, place, strict=True)}},
                      {"source": "one"})
 
 
@@ -40,7 +40,7 @@ def test_a_vehicle_is_overhead_where_both_logs_hold_the_time():
         assert overhead.seconds_overhead(low, [path(3.0, place)]) == ()
 
 
-def test_two_vehicles_overhead_one_after_another_are_two_stretches():
+def test_two_vehicles_overhead_one_after_another_are_two_intervals():
     low = path(0.0, (0.0, 0.0, 0.5))
     partners = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
     assert np.array(overhead.seconds_overhead(low, partners)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
@@ -120,7 +120,7 @@ def test_where_no_wake_is_judged_a_note_says_that_the_partner_was_not_used(monke
     """As in flights without a gyro, whose balance is judged instead."""
     monkeypatch.setattr(module.balance_result, "applies", lambda *_: True)
     monkeypatch.setattr(module.balance_result, "diagnosis", lambda *arguments: arguments[3])
-    log = nominal_flight.log.with_columns({k: np.zeros(len(nominal_flight)) for k in overhead.PLACE})
+    log = nominal_flight.log.with_columns({k: np.zeros(len(nominal_flight)) for k in overhead.POSITION})
     assert module.diagnose([log], VEHICLE) == []
     assert module.diagnose([log], VEHICLE, partner=[log]) == [overhead.UNUSED.format("a gyro")]
 

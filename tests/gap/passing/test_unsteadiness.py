@@ -9,12 +9,19 @@ from scipy.signal import butter, sosfiltfilt
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts
-from airtouch.gap.passing.bursts import YAW_BURSTS
-from airtouch.gap.passing.stretches import ENDS
-from airtouch.gap.passing.unsteadiness import COLUMNS, STEADY, UNSTEADY_LIFT, UNSTEADY_TORQUE, over_rest, unsteady
+from airtouch.gap.passing.bursts import SHAKE_BAND_HZ, SHAKE_PIECE_S
+from airtouch.gap.passing.gate_search import ENDS
+from airtouch.gap.passing.unsteadiness import (
+    COLUMNS,
+    LEAST_ENTROPY,
+    UNSTEADY_LIFT,
+    UNSTEADY_TORQUE,
+    log_entropies,
+    rms_over_median,
+)
 from gap_flights import fly
 
-PIECE = round(YAW_BURSTS.piece_s / PERIOD_S)
+PIECE = round(SHAKE_PIECE_S / PERIOD_S)
 HERTZ = 25.0  #: of what is put in, in the middle of the band
 
 
@@ -48,11 +55,11 @@ def test_it_is_the_log_of_the_arithmetic_over_the_geometric_mean(study, nominal_
     """Two levels of power, one of them in a share s: log(1 + s (ratio - 1)) - s log(ratio). Scales do not matter."""
     whole = counted(nominal_flight)
     first = np.flatnonzero(whole)[np.count_nonzero(whole) // 2]
-    signal = shaken(nominal_flight, first * YAW_BURSTS.piece_s, (first + 8) * YAW_BURSTS.piece_s, ratio)
+    signal = shaken(nominal_flight, first * SHAKE_PIECE_S, (first + 8) * SHAKE_PIECE_S, ratio)
     share = whole[first:first + 8].sum() / whole.sum()
     expected = np.log(1.0 + share * (ratio - 1.0)) - share * np.log(ratio)
     with_residual(monkeypatch, {2: 0.1 * signal, 3: 3.0 * signal, 4: signal, 5: 0.01 * signal})
-    of_flight = unsteady(Data(study, [nominal_flight]))
+    of_flight = log_entropies(Data(study, [nominal_flight]))
     assert of_flight == dict.fromkeys(COLUMNS, pytest.approx(np.log(expected), abs=0.15))
 
 
@@ -61,12 +68,12 @@ def test_one_torque_that_is_shaken_counts_a_third_of_three_that_are(study, nomin
     ratio, whole = 20.0, counted(nominal_flight)
     first = np.flatnonzero(whole)[np.count_nonzero(whole) // 2]
     steady = shaken(nominal_flight, 0.0, 0.0, 1.0)
-    yaw = shaken(nominal_flight, first * YAW_BURSTS.piece_s, (first + 8) * YAW_BURSTS.piece_s, ratio)
+    yaw = shaken(nominal_flight, first * SHAKE_PIECE_S, (first + 8) * SHAKE_PIECE_S, ratio)
     with_residual(monkeypatch, {2: steady, 3: steady, 4: steady, 5: yaw})
     share = whole[first:first + 8].sum() / whole.sum()
     low, high = ((2.0 + level / ratio ** share) / 3.0 for level in (1.0, ratio))
     expected = np.log(share * high + (1.0 - share) * low) - share * np.log(high) - (1.0 - share) * np.log(low)
-    of_flight = unsteady(Data(study, [nominal_flight]))
+    of_flight = log_entropies(Data(study, [nominal_flight]))
     assert of_flight[UNSTEADY_TORQUE] == pytest.approx(np.log(expected), abs=0.15)
     assert of_flight[UNSTEADY_LIFT] < np.log(0.01)
 
@@ -77,13 +84,13 @@ def test_it_is_that_of_scipys_filtered_lift(study, nominal_flight, monkeypatch):
     flight, samples = nominal_flight, np.arange(len(lift))
     counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS))
     fast = np.interp(samples, samples[counts], lift[counts])
-    for hertz, kind in zip(YAW_BURSTS.band_hz, ("highpass", "lowpass"), strict=True):
+    for hertz, kind in zip(SHAKE_BAND_HZ, ("highpass", "lowpass"), strict=True):
         fast = sosfiltfilt(butter(2, hertz * 2.0 * PERIOD_S, kind, output="sos"), fast)
     pieces = len(fast) // PIECE
     power = np.square(fast[:pieces * PIECE]).reshape(pieces, PIECE).mean(axis=1)[counted(flight)]
     expected = np.log(power.mean()) - np.log(power).mean()
-    assert unsteady(Data(study, [flight]))[UNSTEADY_LIFT] == pytest.approx(np.log(expected), abs=0.02)
-    ratio = over_rest(study, flight, 2)
+    assert log_entropies(Data(study, [flight]))[UNSTEADY_LIFT] == pytest.approx(np.log(expected), abs=0.02)
+    ratio = rms_over_median(study, flight, 2)
     assert np.array_equal(np.isfinite(ratio), counted(flight))
     assert np.nanmax(ratio) == pytest.approx(np.sqrt(power.max() / np.median(power)), rel=0.02)
 
@@ -94,13 +101,13 @@ def test_a_long_rest_on_the_ground_makes_no_flight_unsteady(study, nominal_fligh
     resting = replace(nominal_flight, phase=np.where(standing, GROUND, nominal_flight.phase),
                       pwm=np.where(standing[:, None], 0.0, nominal_flight.pwm))
     with_residual(monkeypatch, dict.fromkeys(range(6), np.where(standing, 0.001, 1.0) * values))
-    assert max(unsteady(Data(study, [resting])).values()) < np.log(0.1)
+    assert max(log_entropies(Data(study, [resting])).values()) < np.log(0.1)
 
 
 def test_a_flight_that_only_takes_off_says_nothing(study, nominal_flight):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
-    assert unsteady(Data(study, [taking_off])) == dict.fromkeys(COLUMNS, np.log(STEADY))
-    assert np.isnan(over_rest(study, taking_off, 2)).all()
+    assert log_entropies(Data(study, [taking_off])) == dict.fromkeys(COLUMNS, np.log(LEAST_ENTROPY))
+    assert np.isnan(rms_over_median(study, taking_off, 2)).all()
 
 
 def test_two_flights_that_differ_in_power_alone_are_steady(study, nominal_flight, monkeypatch):
@@ -108,4 +115,4 @@ def test_two_flights_that_differ_in_power_alone_are_steady(study, nominal_flight
     steady = shaken(nominal_flight, 0.0, 0.0, 1.0)
     levels = iter(np.repeat([1.0, 10.0], 6))
     monkeypatch.setattr(bursts, "residual", lambda *_: np.repeat(steady[:, None], 6, axis=1) * next(levels))
-    assert max(unsteady(Data(study, [nominal_flight, nominal_flight])).values()) < np.log(0.05)
+    assert max(log_entropies(Data(study, [nominal_flight, nominal_flight])).values()) < np.log(0.05)

@@ -16,32 +16,32 @@ URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tuple[NextStep, ...]:
-    """What to do next, most useful first.
+def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tuple[NextStep, ...]:
+    """The steps to take next, most useful first.
 
-    answer: complete but for these steps; flights: which it is about; vehicle: as declared.
+    answer: complete but for these steps; flights: those that were diagnosed; vehicle: as declared.
     """
     argument = argument_of(vehicle)
-    next_steps = [_to_tell_apart(group) for group in answer.indistinguishable]
+    steps = [_step_to_tell_apart(group) for group in answer.indistinguishable]
     if answer.verdict == "unknown":
-        next_steps += _for_an_open_gap(answer.headline, argument)
+        steps += _steps_for_open_gap(answer.headline, argument)
     if answer.verdict == "effect":
-        named = " and ".join(dict.fromkeys(e.name for e in answer.effects))
-        next_steps.append(NextStep(
-            f"Switch on {named} with these parameters in the simulator, and fly it again.",
-            switched_on(answer.effects, argument)))
+        names = " and ".join(dict.fromkeys(e.name for e in answer.effects))
+        steps.append(NextStep(
+            f"Switch on {names} with these parameters in the simulator, and fly it again.",
+            simulate_command(answer.effects, argument)))
     if answer.verdict == "none":
-        next_steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
+        steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
     if not answer.baseline:
-        next_steps.append(NextStep(
+        steps.append(NextStep(
             "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
             "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
     if any(f.rates is None for f in flights):
-        next_steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
-    return tuple(next_steps)
+        steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
+    return tuple(steps)
 
 
-def switched_on(effects: Sequence[NamedEffect], vehicle: str) -> str:
+def simulate_command(effects: Sequence[NamedEffect], vehicle: str) -> str:
     """The command that flies the named effects in the simulator; a passing effect acts for the whole flight there.
 
     vehicle: what `--vehicle` takes.
@@ -64,33 +64,33 @@ def _argument(effect: str, parameter: str, value: float) -> str:
     return text
 
 
-def collect(mission: str) -> str:
+def collect_command(mission: str) -> str:
     """The command that flies a mission three times."""
     return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
 
 
-def _to_tell_apart(group: tuple[str, ...]) -> NextStep:
-    """What tells the effects of a group from one another."""
-    among = confusion_among(group)
-    return NextStep(f"To tell {' from '.join(sorted(among.effects))}: {among.remedy}.",
-                    collect(among.mission) if among.mission else "")
+def _step_to_tell_apart(group: tuple[str, ...]) -> NextStep:
+    """The step that tells the effects of a group from one another."""
+    confusion = confusion_among(group)
+    return NextStep(f"To tell {' from '.join(sorted(confusion.effects))}: {confusion.remedy}.",
+                    collect_command(confusion.mission) if confusion.mission else "")
 
 
-def _for_an_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
-    """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion.
+def _steps_for_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
+    """The steps for a gap that no known effect explains: more of the phase with most of it, and an effect of one's own.
 
     argument: what `--vehicle` takes.
     """
-    next_steps = []
+    steps = []
     if headline is not None and headline.phase in MISSIONS:
-        next_steps.append(NextStep(
+        steps.append(NextStep(
             f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
-            collect(MISSIONS[headline.phase])))
+            collect_command(MISSIONS[headline.phase])))
     elif headline is not None:
-        next_steps.append(NextStep(
+        steps.append(NextStep(
             "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
-    next_steps.append(NextStep(
+    steps.append(NextStep(
         "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
         f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL... --effect-file mine.py",
         ADD_AN_EFFECT))
-    return next_steps
+    return steps

@@ -8,14 +8,14 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, mean_parameters
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
-from airtouch.gap.naming.records import Candidate, Selection
+from airtouch.gap.naming.records import Hypothesis, Selection
 from airtouch.gap.result import Closure, Control, Diagnosis
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import CLOCK, WRONG
 from airtouch.gap.study import Study
 
 
-def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
+def control_of(data: Data, selection: Selection, gap: Gap) -> Control | None:
     """The gap with a deliberately wrong effect in the model.
 
     None where none of WRONG is wrong, or where jitter alone is named: its gap is that of the logged times, which no
@@ -29,12 +29,12 @@ def control(data: Data, selection: Selection, gap: Gap) -> Control | None:
     if name is None:
         return None
     fits = tuple(fit(data, half, variants[name][0]) for half in selection.halves)
-    return Control(name, closure_of(data, selection.halves, Candidate(name, fits[0].terms, 0.0, fits), gap))
+    return Control(name, closure_of(data, selection.halves, Hypothesis(name, fits[0].terms, 0.0, fits), gap))
 
 
-def closure_by_vehicle(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
-                       ) -> dict[str, Closure]:
-    """How far the effects named close the gap with each of two models of the vehicle; the JSON's `arms`.
+def arms_of(declared: Study | None, judged: Sequence[Flight], selection: Selection, answer: Diagnosis,
+            ) -> dict[str, Closure]:
+    """How far the effects named close the gap with each of two models of the vehicle, by its name.
 
     "declared": the vehicle as its file declares it, the effects fitted anew beside it; "calibrated": the vehicle as
     calibrated on the baseline flights, from which the answer is. Without a baseline the answer itself is "declared".
@@ -53,5 +53,5 @@ def closure_by_vehicle(declared: Study | None, judged: Sequence[Flight], selecti
     terms = tuple(t for t in selection.named_hypothesis.terms if t.shows_in != CLOCK)
     start = mean_parameters(selection.named_hypothesis.fits[0].terms if selection.named_hypothesis.fits else ())
     fits = tuple(fit(data, half, terms, start) for half in both_halves)
-    gap = gap_of(data, both_halves, Candidate(selection.named_hypothesis.name, terms, 0.0, fits))
+    gap = gap_of(data, both_halves, Hypothesis(selection.named_hypothesis.name, terms, 0.0, fits))
     return {"declared": gap.closure, "calibrated": overall}

@@ -10,7 +10,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, converged, fit
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
-from airtouch.gap.naming.records import Candidate, Selection
+from airtouch.gap.naming.records import Hypothesis, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
@@ -34,10 +34,10 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
     readings = selection.inference.readings if selection.inference is not None else {}
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
     fitted = best_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
-    shown = [t for t in fitted.terms if t.slot in selection.named_slots]
+    named_terms = [t for t in fitted.terms if t.slot in selection.named_slots]
     effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits), readings)
-               for t in shown if not t.companion]
-    for random_part in (t for t in shown if t.companion and t.shows_in == SPECTRUM):
+               for t in named_terms if not t.companion]
+    for random_part in (t for t in named_terms if t.companion and t.shows_in == SPECTRUM):
         effects = [with_random_part(e, random_part) for e in effects]
     effects += [_named(t, from_times(data, t), readings) for t in named.terms if t.shows_in == CLOCK]
     order = [s.name for s in selection.named_steps]
@@ -55,14 +55,14 @@ def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: n
 
     start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
     """
-    best, chosen = fit(data, all_blocks, terms, start), list(terms)
+    best, best_terms = fit(data, all_blocks, terms, start), list(terms)
     for i, term in enumerate(terms):
-        needed = judge(data, all_blocks, best.terms) + SHAPE_PRICE
-        for shaped in term.shaped():
-            trial = fit(data, all_blocks, [*chosen[:i], shaped, *chosen[i + 1:]], start)
-            gain = judge(data, all_blocks, trial.terms)
-            if gain > needed:
-                best, needed, chosen[i] = trial, gain, shaped
+        least = judge(data, all_blocks, best.terms) + SHAPE_PRICE
+        for shape in term.shaped():
+            trial = fit(data, all_blocks, [*best_terms[:i], shape, *best_terms[i + 1:]], start)
+            log_likelihood = judge(data, all_blocks, trial.terms)
+            if log_likelihood > least:
+                best, least, best_terms[i] = trial, log_likelihood, shape
     return converged(data, all_blocks, best)
 
 
@@ -79,12 +79,13 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     fitted = {k: random_part.values[name] * random_part.values[k] for k in random_part.free}  # at strength 1
     of_mean, bounds = effect.parameters[name], {p.name: p.high for p in random_part.effect.parameters}
     strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_STRENGTH)
-    raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
-    scaled = {k: replace(effect.parameters[k], value=value / strength) for k, value in fitted.items()}
-    return NamedEffect(effect.name, {**effect.parameters, name: raised, **scaled}, effect.seconds)
+    high = strength if of_mean.high is None else max(of_mean.high, strength)
+    of_random = {k: replace(effect.parameters[k], value=value / strength) for k, value in fitted.items()}
+    parameters = {**effect.parameters, name: replace(of_mean, value=strength, high=high), **of_random}
+    return NamedEffect(effect.name, parameters, effect.seconds)
 
 
-def _mean_of_halves(hypothesis: Candidate) -> np.ndarray | None:
+def _mean_of_halves(hypothesis: Hypothesis) -> np.ndarray | None:
     """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
     scaled = [f.scaled for f in hypothesis.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None

@@ -32,8 +32,8 @@ LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel
 
 
 @dataclass(frozen=True)
-class FlightGap:
-    """Measured minus modelled (n, COUNT) of a flight, without and with mean effects; after: None where none act."""
+class FlightResidual:
+    """Residual (n, COUNT) of a flight without and with mean effects in the model; after: None where none act."""
 
     flight: Flight
     before: np.ndarray
@@ -62,7 +62,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral densities (bins,) of one channel's gap in the air, its unit squared/Hz; after as in `Signal`."""
+    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`."""
 
     channel: str
     unit: str
@@ -75,8 +75,8 @@ class Spectrum:
 class Pictures:
     """Every curve of a report.
 
-    signal: of the headline's cell, None without one; frequency_hz (bins,): of the spectra; commands: None where no
-    flight has a steady stretch.
+    signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
+    spectra; commands: None where no flight has a steady stretch.
     """
 
     signal: Signal | None = None
@@ -96,28 +96,33 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     if not cells or not flights:
         return Pictures(commands=commands)
     active = [t.active() for t in mean_of(effects)]
-    gaps = [FlightGap(f, study.residual(f), study.residual(f, active) if active else None)
+    residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
-    return Pictures(_signal(_of_median_flight(gaps, cells[0]), cells[0]), frequencies(AIR),
-                    _spectra(study, gaps, effects, channels), commands)
+    median = _median_residual(residuals, cells[0].channel)
+    return Pictures(None if median is None else _signal(median, cells[0]), frequencies(AIR),
+                    _spectra(study, residuals, effects, channels), commands)
 
 
-def _signal(gap: FlightGap, cell: Cell) -> Signal:
+def _signal(residual: FlightResidual, cell: Cell) -> Signal:
     """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_CUTOFF_HZ."""
-    flight, c = gap.flight, COLUMN[cell.channel]
+    flight, c = residual.flight, COLUMN[cell.channel]
     highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_CUTOFF_HZ)
     measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
-                       for values in (_measured(flight, c), None if gap.after is None else gap.after[:, c]))
+                       for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
     return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, measured, _lowpass(flight, gap.before[:, c], highest_hz), after, cell.floor)
+                  flight.phase, measured, _lowpass(flight, residual.before[:, c], highest_hz), after, cell.floor)
 
 
-def _of_median_flight(gaps: Sequence[FlightGap], cell: Cell) -> FlightGap:
-    """The flight whose gap in the cell's channel is the median of all flights'."""
-    c = COLUMN[cell.channel]
-    size = [np.nan_to_num(np.nanstd(g.before[g.flight.usable & (g.flight.phase != GROUND), c])) for g in gaps]
-    return gaps[int(np.argsort(size)[len(size) // 2])]
+def _median_residual(residuals: Sequence[FlightResidual], channel: str) -> FlightResidual | None:
+    """The residual whose standard deviation in a channel is the median; None where no flight has the channel.
+
+    Flights that lack the channel do not count, nor does what is on the ground.
+    """
+    in_air = [r.before[r.flight.usable & (r.flight.phase != GROUND), COLUMN[channel]] for r in residuals]
+    known = [(float(np.nanstd(values)), r) for values, r in zip(in_air, residuals, strict=True)
+             if np.isfinite(values).any()]
+    return sorted(known, key=lambda pair: pair[0])[len(known) // 2][1] if known else None
 
 
 def _measured(flight: Flight, channel: int) -> np.ndarray | None:
@@ -140,16 +145,16 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
     return out
 
 
-def _spectra(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], channels: Sequence[str],
+def _spectra(study: Study, residuals: Sequence[FlightResidual], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
     """The spectra of channels in the air, means over the flights that have the channel; none where none has."""
-    flown = [g for g in gaps if len(starts(g.flight, AIR))]
-    if not flown:
+    airborne = [r for r in residuals if len(starts(r.flight, AIR))]
+    if not airborne:
         return ()
     floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_NOMINAL_BLOCKS else
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
-    before = _mean_of_known([_power(g.flight, g.before) for g in flown])
-    after = _power_after(study, flown, effects, floor) if effects else None
+    before = _mean_of_known([_power(r.flight, r.before) for r in airborne])
+    after = _power_after(study, airborne, effects, floor) if effects else None
     return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
 
@@ -162,24 +167,25 @@ def _mean_of_known(powers: Sequence[np.ndarray]) -> np.ndarray:
     return np.where(count > 0, np.where(known, stacked, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _power(flight: Flight, gap: np.ndarray) -> np.ndarray:
-    """Mean power (bins, COUNT) of a gap (n, COUNT) over all blocks in the air of a flight."""
-    bridged = interpolate_over(gap, ~flight.bridged)
+def _power(flight: Flight, residual: np.ndarray) -> np.ndarray:
+    """Mean power (bins, COUNT) of a residual (n, COUNT) over all blocks in the air of a flight."""
+    bridged = interpolate_over(residual, ~flight.bridged)
     return (np.abs(short_time_spectra(bridged, starts(flight, AIR), AIR)) ** 2).mean(axis=0)
 
 
-def _power_after(study: Study, gaps: Sequence[FlightGap], effects: Sequence[Term], floor: np.ndarray) -> np.ndarray:
+def _power_after(study: Study, residuals: Sequence[FlightResidual], effects: Sequence[Term], floor: np.ndarray,
+                 ) -> np.ndarray:
     """Mean power (bins, COUNT) with effects in the model.
 
     No sample of a random effect can be predicted, only its power. What it leaves is the floor times the ratio of the
     power to that expected, floor and random effect together: the floor where the model is right, less where it predicts
     too much.
     """
-    powers = [_power(g.flight, g.before if g.after is None else g.after) for g in gaps]
+    powers = [_power(r.flight, r.before if r.after is None else r.after) for r in residuals]
     random = random_of(effects)
     if not random:
         return _mean_of_known(powers)
     of_random = [sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
-                 for data in (Data(study, [g.flight]) for g in gaps)]
-    expected = _mean_of_known([np.where(np.isfinite(p), r, np.nan) for p, r in zip(powers, of_random, strict=True)])
+                 for data in (Data(study, [r.flight]) for r in residuals)]
+    expected = _mean_of_known([np.where(np.isfinite(p), x, np.nan) for p, x in zip(powers, of_random, strict=True)])
     return _mean_of_known(powers) * floor / (floor + expected)

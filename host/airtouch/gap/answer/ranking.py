@@ -2,7 +2,7 @@
 
 from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
-from airtouch.gap.answer.shrink import Gap, closure_of, nearer
+from airtouch.gap.answer.shrink import Gap, closure_of, is_nearer_to_floor
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
@@ -51,7 +51,7 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
     irregular_times = selection.nameless.of_times > counterevidence(selection).limit
-    return irregular_times or nearer(data, selection.halves, hypothesis, gap)
+    return irregular_times or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:
@@ -68,11 +68,11 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
             shrink = gap.closure.shrink
         elif single is not None and single.full and single.gain > FIRST_GAIN:
             shrink = closure_of(data, selection.halves, single, gap).shrink
-        nats = None if single is None else selection.gained(single)
+        nats = None if single is None else selection.gain(single)
         out.append(RankedCandidate(name, float(p), shrink or Quantity(0.0), why_not(selection, name, verdict), nats,
                                    measured=shrink is not None))
-    order = {n: selection.gained(c) for n, c in selection.single_effects.items()}
-    out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
+    gains = {n: selection.gain(h) for n, h in selection.single_effects.items()}
+    out.sort(key=lambda r: (r.name != answer, -r.probability, -gains.get(r.name, 0.0)))
     return out
 
 
@@ -82,12 +82,12 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
         return ()
     groups = []
     first = selection.single_effects[selection.named_steps[0].name]
-    same = [n for n, c in selection.single_effects.items() if (c.full or selection.inference is not None)
-            and selection.gained(first) - selection.gained(c) < LEAST_DIFFERENCE]
-    if len(same) > 1:
-        groups.append(tuple(sorted(same)))
+    as_good = [n for n, h in selection.single_effects.items() if (h.full or selection.inference is not None)
+               and selection.gain(first) - selection.gain(h) < LEAST_DIFFERENCE]
+    if len(as_good) > 1:
+        groups.append(tuple(sorted(as_good)))
     for step in selection.named_steps:
-        alike = names_alike(step.name)
-        if alike and not any(step.name in g for g in groups):
-            groups.append(tuple(sorted(alike.effects)))
+        synonyms = names_alike(step.name)
+        if synonyms and not any(step.name in g for g in groups):
+            groups.append(tuple(sorted(synonyms.effects)))
     return tuple(groups)

@@ -2,7 +2,7 @@
 
 from airtouch.gap.answer.words import joined
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
-from airtouch.gap.naming.records import Candidate, Selection, Step
+from airtouch.gap.naming.records import Hypothesis, Selection, Step
 from airtouch.gap.naming.unknown import (
     counterevidence,
     is_explained,
@@ -39,30 +39,30 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
 
 def nearest(selection: Selection) -> list[Rejected]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
-    gaining = (c for c in selection.single_effects.values() if selection.gained(c) > 0.0)
-    most = sorted(gaining, key=lambda c: -selection.gained(c))
-    return [Rejected(c.name, shortfall(selection, c)) for c in most[:NEAREST]]
+    gaining = [h for h in selection.single_effects.values() if selection.gain(h) > 0.0]
+    best_first = sorted(gaining, key=lambda h: -selection.gain(h))
+    return [Rejected(h.name, shortfall(selection, h)) for h in best_first[:NEAREST]]
 
 
-def shortfall(selection: Selection, candidate: Candidate) -> str:
-    """What a candidate lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
+def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
+    """What an effect lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
-        return shortfall_by_relations(selection, selection.inference, candidate.name)
-    least = selection.least_nats[candidate.name]
-    if candidate.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
+        return shortfall_by_relations(selection, selection.inference, hypothesis.name)
+    least = selection.least_nats[hypothesis.name]
+    if hypothesis.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)
-    if candidate.gain < least:
-        return f"held-out data gain {candidate.gain:.1f} nats by it, but {least:.0f} are needed"
-    if candidate.evidence < least:
-        return (f"as strong as it often seems to be in nominal flights: of {candidate.gain:.0f} nats "
-                f"{max(candidate.evidence, 0.0):.1f} are beyond that scatter, but {least:.0f} are needed")
-    if candidate.name == selection.taken_back.name:
-        return f"closes {max(selection.taken_back.closed, 0.0):.0%} of the gap, too little to be its cause"
+    if hypothesis.gain < least:
+        return f"held-out data gain {hypothesis.gain:.1f} nats by it, but {least:.0f} are needed"
+    if hypothesis.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: of {hypothesis.gain:.0f} nats "
+                f"{max(hypothesis.evidence, 0.0):.1f} are beyond that scatter, but {least:.0f} are needed")
+    if hypothesis.name == selection.withdrawn.name:
+        return f"closes {max(selection.withdrawn.shrink, 0.0):.0%} of the gap, too little to be its cause"
     if selection.named_hypothesis:
         names = [s.name for s in selection.named_steps]
-        return (f"gains {candidate.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "
+        return (f"gains {hypothesis.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "
                 f"{selection.named_hypothesis.gain:.0f}")
-    return f"gains {candidate.gain:.0f} nats, while a model without names gains {selection.nameless.over_none:.0f}"
+    return f"gains {hypothesis.gain:.0f} nats, while a model without names gains {selection.nameless.over_none:.0f}"
 
 
 def shortfall_by_relations(selection: Selection, inference: Inference, name: str) -> str:
@@ -93,7 +93,7 @@ def _remainder_in_words(selection: Selection, name: str) -> str:
 
     Where that is more over its limit, the nats by which the flights are less steady than nominal ones.
     """
-    unsteady_nats, may_be_chance = selection.unsteadiness
+    unsteady_nats, may_be_chance, _ = selection.unsteadiness_rarity
     if unsteadiness_ratio(selection) > remainder_ratio(selection):
         most = f"{'but only' if unsteady_nats > may_be_chance else 'and'} up to {may_be_chance:.1f} may be chance"
         return f"torque and lift are less steady than in nominal flights by {unsteady_nats:.1f} nats, {most}"

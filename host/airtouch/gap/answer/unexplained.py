@@ -6,13 +6,12 @@ import numpy as np
 
 from airtouch.gap.answer.followed_signals import followed_signals
 from airtouch.gap.answer.reasons import nearest
-from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import unsteadiness_ratio
-from airtouch.gap.passing.bursts import YAW_BURSTS
-from airtouch.gap.passing.unsteadiness import COLUMNS, over_rest, unsteady
+from airtouch.gap.passing.bursts import SHAKE_BAND_HZ, SHAKE_PIECE_S
+from airtouch.gap.passing.unsteadiness import COLUMNS, rms_over_median
 from airtouch.gap.result import REST_OF_FLIGHT, Cell, OpenCell, Rejected
 from airtouch.gap.signals.channels import CHANNELS, COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
@@ -22,7 +21,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
 
-MOST_CELLS = 5  #: most cells that are reported; chosen, as many as a reader can take in
+MOST_CELLS = 5  #: cells that are reported at most; chosen, as many as a reader can take in
 
 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
@@ -33,22 +32,24 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     the headline, then the others, those with the largest gap before any effect first. Of these the first
     MOST_CELLS are reported, without those on the ground and those of one regime alone.
 
-    What is left is measured minus modelled with the effects of the last step, deviations included, at the values fitted
-    to the first half of the data (`Candidate.terms`), not at those of the answer, which are fitted to all of it
+    What is left is the residual with the effects of the last step in the model, deviations included, at the values
+    fitted to the first half of the data (`Hypothesis.terms`), not at those of the answer, which are fitted to all of it
     (`named_effects`). So the second half is held out and the first is not: less is left in the flights of the first.
     """
     terms = selection.last_step.fits[0].terms if selection.last_step and selection.last_step.fits else ()
     active = [t.active() for t in mean_of(terms)]
     chosen = [c for c in cells if c.phase != summary.GROUND_NAME and c.regime == "all"][:MOST_CELLS]
-    gaps = [(f, study.residual(f, active)) for f in flights] if chosen else []
+    residuals = [(f, study.residual(f, active)) for f in flights] if chosen else []
     near = tuple(nearest(selection))
-    out = [_unsteady_cell(study, flights, near)] if unsteadiness_ratio(selection) >= 1.0 else []
+    out = []
+    if unsteadiness_ratio(selection) >= 1.0:
+        out.append(_unsteady_cell(study, flights, COLUMNS[selection.unsteadiness_rarity.rarest], near))
     for cell in chosen:
-        ratios = _in_phase([(f, ratios_of_blocks(f, gap, cell)) for f, gap in gaps], cell.phase)
+        ratios = _in_phase([(f, ratios_of_blocks(f, residual, cell)) for f, residual in residuals], cell.phase)
         if not ratios:
             continue
         flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
-        first, last = worst_stretch(ratio)
+        first, last = worst_interval(ratio)
         begin = starts(flight, AIR)
         out.append(OpenCell(
             cell.channel, cell.band_hz, cell.phase, flight.name, from_s=float(begin[first] * PERIOD_S),
@@ -57,32 +58,30 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     return out
 
 
-def _unsteady_cell(study: Study, flights: Sequence[Flight], near: tuple[Rejected, ...]) -> OpenCell:
-    """The channel of torque or lift that is shaken most beyond the rest of its flight, and when.
+def _unsteady_cell(study: Study, flights: Sequence[Flight], columns: Sequence[int], near: tuple[Rejected, ...],
+                   ) -> OpenCell:
+    """The channel among columns of the residual that is shaken most beyond the rest of its flight, and when.
 
-    It is one of the torques or the lift, whichever is farther from how steady it is in nominal flights.
+    columns: of the torques or the lift, whichever is rarer as unsteady in nominal flights.
     """
-    scatter, sizes = study.scatter, unsteady(Data(study, flights))
-    assert scatter is not None  # else nobody knows how steady flights are
-    name = max(sizes, key=lambda n: scatter.rarity({n: sizes[n]})[0])
-    ratios = [(f, c, over_rest(study, f, c)) for f in flights for c in COLUMNS[name]]
+    ratios = [(f, c, rms_over_median(study, f, c)) for f in flights for c in columns]
     flight, column, ratio = max((r for r in ratios if np.isfinite(r[2]).any()), key=lambda r: float(np.nanmax(r[2])))
-    first, last = worst_stretch(ratio)
-    from_s, to_s = first * YAW_BURSTS.piece_s, (last + 1) * YAW_BURSTS.piece_s
+    first, last = worst_interval(ratio)
+    from_s, to_s = first * SHAKE_PIECE_S, (last + 1) * SHAKE_PIECE_S
     phase = np.bincount(flight.phase[round(from_s / PERIOD_S):round(to_s / PERIOD_S)], minlength=len(KINDS)).argmax()
-    return OpenCell(CHANNELS[column].name, YAW_BURSTS.band_hz, KINDS[phase], flight.name, from_s, to_s,
+    return OpenCell(CHANNELS[column].name, SHAKE_BAND_HZ, KINDS[phase], flight.name, from_s, to_s,
                     float(ratio[first:last + 1].max()), nearest=near, floor=REST_OF_FLIGHT)
 
 
-def ratios_of_blocks(flight: Flight, gap: np.ndarray, cell: Cell) -> np.ndarray:
+def ratios_of_blocks(flight: Flight, residual: np.ndarray, cell: Cell) -> np.ndarray:
     """Rms of a cell's channel and band over the cell's floor, in each block (blocks,) in the air.
 
-    gap (n, COUNT): the flight, measured minus modelled. NaN where the log lacks the channel.
+    residual (n, COUNT): of the flight. NaN where the log lacks the channel.
     """
     begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
-    if not len(begin) or not np.isfinite(gap[:, c]).any():
+    if not len(begin) or not np.isfinite(residual[:, c]).any():
         return np.full(len(begin), np.nan)
-    density = np.abs(short_time_spectra(interpolate_missing(gap[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
+    density = np.abs(short_time_spectra(interpolate_missing(residual[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
     gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
     return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
 
@@ -104,10 +103,10 @@ def _commonest_phase(flight: Flight) -> np.ndarray:
     return (phase[:, :, None] == np.arange(len(KINDS))).sum(axis=1).argmax(axis=1)
 
 
-def worst_stretch(ratio: np.ndarray) -> tuple[int, int]:
+def worst_interval(ratio: np.ndarray) -> tuple[int, int]:
     """First and last block around the largest ratio (blocks,) that stay above the middle between it and the median.
 
-    A block of NaN counts in neither and ends the stretch.
+    A block of NaN counts in neither and ends the interval.
     """
     peak = int(np.nanargmax(ratio))
     limit = 0.5 * (ratio[peak] + float(np.nanmedian(ratio)))

@@ -8,7 +8,8 @@ from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import band_in_words
 
-MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen
+MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen. A larger number makes a longer table
+DECIMALS = 1  #: of the seconds and ratios of an open cell that are shown
 
 
 def format_of(q: Quantity) -> str:
@@ -50,19 +51,26 @@ def seconds_in_words(effect: NamedEffect) -> str:
 
 
 def all_open_in_words(cells: Sequence[OpenCell]) -> list[str]:
-    """One line for each place where the gap stays open. Phases that share their worst seconds share a line."""
-    lines: dict[str, list[OpenCell]] = {}
+    """One line for each place where the gap stays open. Cells that differ in the phase alone share a line."""
+    groups: dict[tuple, list[OpenCell]] = {}
     for cell in cells:
-        lines.setdefault(open_in_words(replace(cell, phase="")), []).append(cell)
-    return [open_in_words(replace(alike[0], phase=joined([c.phase for c in alike]))) for alike in lines.values()]
+        groups.setdefault(_without_phase(cell), []).append(cell)
+    return [open_in_words(replace(group[0], phase=joined([c.phase for c in group]))) for group in groups.values()]
+
+
+def _without_phase(cell: OpenCell) -> tuple:
+    """What `open_in_words` shows of a cell beside its phase, with numbers to the digit that it shows."""
+    numbers = (round(x, DECIMALS) for x in (cell.over_floor, cell.from_s, cell.to_s))
+    return cell.channel, cell.band_hz, cell.flight, cell.floor, cell.follows, *numbers
 
 
 def open_in_words(cell: OpenCell) -> str:
     """What stays open, as `lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv`."""
     follows = f"; follows {joined(list(cell.follows))}" if cell.follows else ""
     floor = "that of the rest of the flight" if cell.floor == REST_OF_FLIGHT else "the floor"
-    return (f"{CHANNEL_WORDS[cell.channel]}, {band_in_words(cell)}, {cell.phase}: up to {cell.over_floor:.1f} times "
-            f"{floor} from {cell.from_s:.1f} to {cell.to_s:.1f} s of {Path(cell.flight).name}{follows}")
+    return (f"{CHANNEL_WORDS[cell.channel]}, {band_in_words(cell)}, {cell.phase}: up to {cell.over_floor:.{DECIMALS}f} "
+            f"times {floor} from {cell.from_s:.{DECIMALS}f} to {cell.to_s:.{DECIMALS}f} s of {Path(cell.flight).name}"
+            f"{follows}")
 
 
 def nearest_in_words(diagnosis: Diagnosis) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.answer.advice import steps as next_steps
+from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses

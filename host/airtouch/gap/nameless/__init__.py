@@ -1,7 +1,8 @@
-"""What no named effect explains: the nameless model of the residual that a hypothesis leaves.
+"""The nameless model: what may be left of the residual beside the effects named, without saying why.
 
-`model` asks how much it gains on held-out data. First comes the `regression` of the residual on `columns`: the spectra
-of the flight's own signals (`basis`); on top of it come free `powers` of every cell. `naming.select` asks for its
-gain, which decides on `unknown`, and `naming.passing_effect` for that of the height alone; `nominal.calibrate` measures
-how coefficients and powers scatter in nominal flights.
+- `model`: how much it gains on held-out data. `naming.select` asks for that, which decides on `unknown`, and
+  `naming.passing_effect` for the gain of the height alone; `nominal.calibrate` asks how coefficients and powers scatter
+  in nominal flights.
+- `regression`: its first part, of the residual on `columns`, the spectra of the flight's own signals (`basis`).
+- `powers`: its second part, a free factor on the power of every cell.
 """

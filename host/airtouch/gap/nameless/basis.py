@@ -9,11 +9,18 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-# Scales that make columns of order one in flights of some 20 s near the floor; all are chosen.
-LAG_S = 0.05  #: s, multiplies the derivatives of thrust
-TIME_S = 20.0  #: s, divides the time
-HEIGHT_M = 0.05  #: m, height of a rotor at which its ground effect (HEIGHT_M / height)^2 is 1, as at any lower one
-LOW_M = 0.2  #: m above the floor at which 1 / (1 + (height / LOW_M)^2), a force that fades slowly, is a half
+# Scales that make columns of order one in flights of some 20 s near the ground; all are chosen. Those of thrust and
+# time only scale a column, and its coefficient the other way; those of the height say how fast a force fades with it.
+LAG_S = 0.05  #: s, multiplies the derivatives of thrust; a larger number makes their columns larger
+TIME_S = 20.0  #: s, divides the time; a larger number makes its columns smaller
+#: m, height of a rotor at which its ground effect (HEIGHT_M / height)^2 is 1, as at any lower one; a larger number
+#: makes the column larger, and flat up to a greater height
+HEIGHT_M = 0.05
+#: m above the ground at which 1 / (1 + (height / LOW_M)^2), a force that fades slowly, is a half; with a larger number
+#: it fades at greater heights
+LOW_M = 0.2
+#: names of the columns: "in_air" is 1 in the air; "near" and its products are of the rotors' ground effect, "low" of
+#: LOW_M
 BASIS = ("one", "in_air", "thrust", "roll", "pitch", "yaw", "d_thrust", "d_roll", "d_pitch", "d_yaw", "vx", "vy",
          "vz", "speed", "world_x", "world_y", "world_z", "time", "time_thrust", "near",
          "near_roll", "near_pitch", "low", "height")

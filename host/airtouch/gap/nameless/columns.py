@@ -24,17 +24,19 @@ from airtouch.gap.signatures.term import Term
 CHANNELS = 9  #: the first channels, which are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques whose loop is modelled; yaw torque is mostly gyro noise
 TURNS = (1.0, 1.0j)  #: factors on the spectrum of the commands: in phase with them, and a quarter turn off
-LOOP_HZ = BANDS_HZ[1:]  #: limits of the bands above the means, to which no law of the response applies
+LOOP_HZ = BANDS_HZ[1:]  #: limits of the bands above that of the means, Hz; the response has no law for the means
 LOOP_COLUMNS = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
 WIDEST = len(BASIS) + LOOP_COLUMNS  #: most columns of a channel, without offsets
-NOTHING = 1e-9  #: variance that a coefficient or a power without scatter is given; chosen
+#: variance of the prior of a coefficient, or of a logarithm of a power, without scatter in nominal flights; chosen,
+#: next to none. A larger number lets each flight have some of its own
+LEAST_VARIANCE = 1e-9
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
 
 
 @dataclass(frozen=True)
 class NamelessFloor:
-    """Scatter of nominal flights.
+    """Scatter of nominal flights in the nameless model, the width of its priors.
 
     columns (CHANNELS, WIDEST): rms of the coefficients; power (2, CELLS): mean and rms of the natural logarithm of the
     power over the expected one.
@@ -70,7 +72,7 @@ class Regressors:
 
     def precision(self, floor: NamelessFloor) -> np.ndarray:
         """Inverse variances (free + offsets,) of the priors: of coefficients as in nominal flights, and of offsets."""
-        nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
+        nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, LEAST_VARIANCE)
         return np.concatenate([1.0 / nominal, 1.0 / self.offset_stds ** 2])
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, above_means, band_cells, channel_cells, sensor_cells
-from airtouch.gap.nameless.columns import NOTHING, NamelessFloor
+from airtouch.gap.nameless.columns import LEAST_VARIANCE, NamelessFloor
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 
 #: nominal flights that the scatter pooled over a band's channels counts for, beside a channel's own flights; chosen. A
@@ -15,10 +15,13 @@ POOLED_WEIGHT = 2.0
 #: least standard deviation of log power between flights, simulated and recorded, as no effect's spectrum, and no
 #: recorded flight's air, is modelled any better; chosen. A larger number counts more of a change as nominal
 LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
-#: nats that a column, or a cell's power, must gain on the half that it is fitted to; chosen, chance gives about one
+#: nats that a column, or a cell's power, must gain on the half that it is fitted to; chosen, chance gives about one. A
+#: larger number leaves more to chance, and finds less of what is missing
 LEAST_COLUMN_GAIN = 4.0
-UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen
-LONGEST = 1.5  #: longest of these steps, of the natural logarithm of the power; chosen
+UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen. A larger number takes more time
+#: longest of these steps, of the natural logarithm of the power; chosen. A larger number needs fewer steps, and one may
+#: overshoot
+LONGEST_STEP = 1.5
 SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) for each cell the number of the first cell of its view and sensor
 ABOVE_MEANS = above_means()  #: (CELLS,) bool
 NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and standard deviation of a prior that says nothing
@@ -63,17 +66,17 @@ def power_factors(powers: Powers, prior_mean: np.ndarray, prior_std: np.ndarray)
     e, nu, tail_scale, cell = powers
     out = prior_mean.copy()
     count = np.bincount(cell, minlength=CELLS)
-    precision = 1.0 / np.maximum(prior_std ** 2, NOTHING)
+    precision = 1.0 / np.maximum(prior_std ** 2, LEAST_VARIANCE)
     known = np.bincount(cell, information(nu), CELLS)
     for _ in range(UPDATES):
         scaled = e * np.exp(-out[cell])
         push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail_scale + scaled) - 1.0), CELLS)
         step = (push - (out - prior_mean) * precision) / (OVERLAP_WEIGHT * known + precision)
-        out += np.clip(step, -LONGEST, LONGEST)
+        out += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
     out[count == 0] = prior_mean[count == 0]
     scaled = e * np.exp(-out[cell])
-    level = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail_scale)), CELLS)
-    return out, level - 0.5 * (out - prior_mean) ** 2 * precision
+    log_posterior = np.bincount(cell, -OVERLAP_WEIGHT * (out[cell] + (nu + 1.0) * np.log1p(scaled / tail_scale)), CELLS)
+    return out, log_posterior - 0.5 * (out - prior_mean) ** 2 * precision
 
 
 def power_gain(trained: Powers, held_out: Powers, floor: NamelessFloor, simulated: bool) -> float:

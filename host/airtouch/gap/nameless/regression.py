@@ -11,11 +11,17 @@ from airtouch.gap.nameless.powers import LEAST_COLUMN_GAIN, Powers, gain_at_even
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
 from airtouch.gap.signatures.term import Term
 
-REWEIGHTINGS = 3  #: iterations of the weights of a fit of the columns that flights share; chosen
-OWN_ROUNDS = 2  #: iterations of the weights of a fit of a flight's own coefficients; chosen
-RIDGE, LEAST_RIDGE = 1e-9, 1e-12  #: added to a normal matrix to invert it: fraction of its diagonal, and least; chosen
-MOST_COLUMNS = 4  #: most columns of one channel that are used; chosen
-SURE = 3.0  #: standard errors by which coefficients' mean square must exceed that of chance to count; chosen
+#: iterations of the weights, of a fit of the columns that flights share and of one of a flight's own coefficients;
+#: chosen. Larger numbers take more time, and the weights settle further
+REWEIGHTINGS, OWN_REWEIGHTINGS = 3, 2
+#: added to a normal matrix to invert it: fraction of its diagonal, and least; chosen, next to none. Larger numbers draw
+#: coefficients to 0
+RIDGE, LEAST_RIDGE = 1e-9, 1e-12
+#: columns of one channel that are used at most; chosen. A larger number follows the flight more closely
+MOST_COLUMNS = 4
+#: standard errors by which the mean square of nominal flights' coefficients must exceed that of chance to count as
+#: scatter; chosen. With a larger number fewer columns have any
+LEAST_ERRORS = 3.0
 
 
 class BlockResiduals:
@@ -58,7 +64,7 @@ class BlockResiduals:
         indices, free = regressors.indices, regressors.free
         target = self.residual[indices] - regressors.columns[:, :free] @ fitted[:free]
         residual, precision = target, regressors.precision(floor)
-        for _ in range(OWN_ROUNDS):
+        for _ in range(OWN_REWEIGHTINGS):
             normal, right = self.normal_equations(regressors, target, residual)
             x = np.linalg.solve(normal + np.diag(precision), right)
             residual = target - regressors.columns @ x
@@ -161,7 +167,7 @@ def column_floor(flights: Sequence[BlockResiduals]) -> np.ndarray:
             estimate, variance = _one_by_one(flight, regressors)
             beyond_chance[regressors.channel, :regressors.free] += (estimate ** 2 - variance) / (n - 1)
             over_chance[regressors.channel, :regressors.free] += estimate ** 2 / variance / n
-    beyond_chance[over_chance < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
+    beyond_chance[over_chance < 1.0 + LEAST_ERRORS * np.sqrt(2.0 / n)] = 0.0
     of_another = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
     return np.sqrt(np.maximum(of_another * beyond_chance, 0.0))
 

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.forward import Search
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection, Step
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
@@ -42,11 +42,11 @@ def selection_by_relations(search: Search, inference: Inference, rank_all: bool 
         judged = round_of(search.trial, variants, steps[-1] if steps else None, search.progress, promising=(effect,))
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
-    not_fitted = {name: Candidate(name, (), 0.0, full=False) for name in search.candidates}
+    not_fitted = {name: Hypothesis(name, (), 0.0, full=False) for name in search.candidates}
     return Selection(
         single_effects=search.single_effects if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
-        halves=search.trial.halves, least_nats=search.least_nats, assumed=False, inference=inference,
-        policy=search.trial.policy)
+        halves=search.trial.halves, least_nats=search.least_nats, spectrum_is_assumed=False,
+        inference=inference, policy=search.trial.policy)
 
 
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:

@@ -18,33 +18,33 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.naming.judging import at_bound
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
 
-def with_evidence(scatter: Scatter | None, best: Mapping[str, Candidate], base_gain: float) -> dict[str, Candidate]:
-    """The candidates, by name, each with its evidence.
+def with_evidence(scatter: Scatter | None, best: Mapping[str, Hypothesis], base_gain: float) -> dict[str, Hypothesis]:
+    """The best hypothesis of each candidate, by name, with its evidence.
 
     scatter: of strengths in nominal flights, None where none were measured; base_gain: nats that the base gains.
     """
-    return {name: replace(c, evidence=min(c.gain - base_gain, _limit(scatter, c))) for name, c in best.items()}
+    return {name: replace(h, evidence=min(h.gain - base_gain, _limit(scatter, h))) for name, h in best.items()}
 
 
-def _limit(scatter: Scatter | None, candidate: Candidate) -> float:
-    """Nats of evidence that the strength of a candidate allows; infinite where nothing limits it."""
-    own, strength = _own_term(candidate), candidate.strength
+def _limit(scatter: Scatter | None, hypothesis: Hypothesis) -> float:
+    """Nats of evidence that the strength of a hypothesis' newest effect allows; infinite where nothing limits it."""
+    own, strength = _own_term(hypothesis), hypothesis.strength
     if own.shows_in == MEAN and at_bound(own, strength.mean).any():
         return 0.0
     if scatter is None:
         return np.inf
-    return scatter.evidence(candidate.name, strength.mean, strength.covariance, strength.half_difference)
+    return scatter.evidence(hypothesis.name, strength.mean, strength.covariance, strength.half_difference)
 
 
-def _own_term(candidate: Candidate) -> Term:
-    """The term of a candidate's newest effect whose strength it has."""
-    of_its_name = [t for t in candidate.terms if t.name == candidate.name]
+def _own_term(hypothesis: Hypothesis) -> Term:
+    """The term whose strength that of a hypothesis' newest effect is."""
+    of_its_name = [t for t in hypothesis.terms if t.name == hypothesis.name]
     with_random_part = of_its_name[-1].companion
     return strength_term(of_its_name[-2:]) if with_random_part else of_its_name[-1]

@@ -7,15 +7,16 @@ baseline of another drone a bias or a wind may gain held-out likelihood and yet 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from airtouch.gap.evidence.clock import unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
-from airtouch.gap.naming.records import Selection, TakenBack
+from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnName
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
 
 
-def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
+def least_shrink(data: Data, selection: Selection, gap: float) -> float | None:
     """Fraction of the gap that effects must close to be named; None where they need not close any.
 
     gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
@@ -27,39 +28,40 @@ def least_closed(data: Data, selection: Selection, gap: float) -> float | None:
     of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named_steps)
     if not selection.policy.must_close_gap or hypothesis is None or of_known_seconds:
         return None
-    if names_one_of_the_loop(data, selection):
+    if is_one_loop_effect(data, selection):
         return LEAST_CLOSED
     if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in hypothesis.terms):
         return None
-    return LEAST_CLOSED if names_one_that_passes(selection) else 0.0
+    return LEAST_CLOSED if is_one_passing_effect(selection) else 0.0
 
 
-def closes_too_little(data: Data, selection: Selection, gap: float, closed: float) -> bool:
-    """Whether the effects named take away less of the gap than they must, or nothing.
+def closes_too_little(data: Data, selection: Selection, gap: float, shrink: float) -> bool:
+    """Whether the effects named close less of the gap than they must, or nothing.
 
-    gap: as for `least_closed`; closed: fraction of it that they take away.
+    gap: as for `least_shrink`; shrink: fraction of it that they close.
     """
-    least = least_closed(data, selection, gap)
-    return least is not None and (closed < least or closed <= 0.0)
+    least = least_shrink(data, selection, gap)
+    return least is not None and (shrink < least or shrink <= 0.0)
 
 
-def with_none_named(selection: Selection, closed: float) -> Selection:
+def with_names_withdrawn(data: Data, selection: Selection, shrink: float) -> Selection:
     """The selection with no effect named, as those that were named close too little of the gap.
 
-    closed: fraction of the gap that they close. Beside none the nameless model gains what it gains over none.
+    shrink: fraction of the gap that they close. Without them the nameless model gains what it gains over no effect, and
+    no fault of the logged times is explained.
     """
-    nameless = replace(selection.nameless, over_last_step=selection.nameless.over_none)
-    first = selection.named_steps[0].name
-    return replace(selection, steps=(), nameless=nameless, assumed=False, taken_back=TakenBack(first, closed))
+    over_none = selection.nameless.over_none
+    return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, unexplained_clock_gain(data, ())),
+                   spectrum_is_assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, shrink))
 
 
-def names_one_that_passes(selection: Selection) -> bool:
+def is_one_passing_effect(selection: Selection) -> bool:
     """Whether one effect is named, and it is a passing one."""
     hypothesis = selection.named_hypothesis
     return hypothesis is not None and len(selection.named_steps) == 1 and all(t.gate for t in hypothesis.terms)
 
 
-def names_one_of_the_loop(data: Data, selection: Selection) -> bool:
+def is_one_loop_effect(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
     hypothesis = selection.named_hypothesis
     return hypothesis is not None and len(selection.named_steps) == 1 and _of_the_loop(data, hypothesis.terms)
@@ -78,12 +80,12 @@ def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
     return others if len(others) < len(names) else []
 
 
-def loop_closes_too_little(closed: float, closed_by_others: float) -> bool:
+def loop_closes_too_little(shrink: float, shrink_of_others: float) -> bool:
     """Whether effects of the control loop close less than LEAST_CLOSED beyond what those beside them close alone.
 
-    closed: fraction of the gap that all take away; closed_by_others: that the others take away, judged without them.
+    shrink: fraction of the gap that all close; shrink_of_others: that the others close, judged without them.
     """
-    return closed - closed_by_others < LEAST_CLOSED
+    return shrink - shrink_of_others < LEAST_CLOSED
 
 
 def _of_the_loop(data: Data, terms: Sequence[Term]) -> bool:

@@ -7,7 +7,8 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
            - price_of                           PRICE of each free parameter of a term beyond its first; a random part
                                                 or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
-           + certainty_refund                   what effects lose beside the first random one, given back (`Charges`)
+           + uncertain_floor_loss               nats that effects lose beside the first random one, only because the
+                                                commands' floor counts as less certain there (`Charges`)
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.judge import cell_gains, judge
 from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
-from airtouch.gap.naming.records import Candidate, Charges, Strength
+from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
@@ -86,7 +87,7 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
     return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
 
-def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None, brief: bool = False) -> Candidate:
+def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | None, brief: bool = False) -> Hypothesis:
     """The hypothesis that adds a variant to those effects of a base, fitted on each half and judged on the other.
 
     base: None for no effect; brief: the fits are cut short, to see whether whole ones promise anything.
@@ -103,19 +104,19 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Candidate | None
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)
-    return Candidate(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
+    return Hypothesis(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
 
 
-def _charges(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Charges:
+def _charges(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> Charges:
     """The charges of a base and a variant.
 
-    Beside the first random effect the commands' floor is less certain, so that the effects before it gain less. It is
-    not charged with that (`Charges.certainty_refund`).
+    Beside the first random effect the commands' floor is less certain, so that the effects before it gain less. The
+    random effect is not charged with that (`Charges.uncertain_floor_loss`).
     """
     before = base.charges if base else Charges()
     if base is None or not base.fits or random_of(base.terms) or not random_of(variant.terms):
         return before.with_effect(variant.choice_cost)
-    return before.with_effect(variant.choice_cost, lost_beside_random(trial, base.fits))
+    return before.with_effect(variant.choice_cost, uncertain_floor_loss(trial, base.fits))
 
 
 def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
@@ -124,10 +125,10 @@ def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, o
     fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
     """
     held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), of_clock)
-    return held_out + (charges.certainty_refund - price_of(fits[0].terms) - charges.choice_cost)
+    return held_out + (charges.uncertain_floor_loss - price_of(fits[0].terms) - charges.choice_cost)
 
 
-def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Candidate | None, brief: bool) -> FittedTerms:
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Hypothesis | None, brief: bool) -> FittedTerms:
     """Effects fitted on a half, from where those of a base ended there.
 
     The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
@@ -144,7 +145,7 @@ def price_of(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.shows_in != CLOCK)
 
 
-def lost_beside_random(trial: Trial, fits: Sequence[FittedTerms]) -> float:
+def uncertain_floor_loss(trial: Trial, fits: Sequence[FittedTerms]) -> float:
     """Held-out nats that effects, fitted on each half, lose where the commands' floor is as beside a random effect."""
     return sum(gain_of(trial, test, fits[train].terms) - gain_of(trial, test, fits[train].terms, uncertain_floor=True)
                for train, test in TWO_FOLDS)
@@ -160,7 +161,7 @@ def gain_of(trial: Trial, half: int, terms: Sequence[Term], uncertain_floor: boo
     return judge(trial.data, trial.halves[half], terms, uncertain_floor) - null[half]
 
 
-def held_out_cell_gains(trial: Trial, hypothesis: Candidate) -> np.ndarray:
+def held_out_cell_gains(trial: Trial, hypothesis: Hypothesis) -> np.ndarray:
     """Nats (CELLS,) that a fitted hypothesis gains over none in each cell, fitted on one half, judged on the other."""
     return np.sum([cell_gains(trial.data, trial.halves[test], hypothesis.fits[train].terms)
                    for train, test in TWO_FOLDS], axis=0)
@@ -206,7 +207,7 @@ def _refine(data: Data, blocks: BlockSet, fitted: FittedTerms) -> FittedTerms:
     return fit(data, blocks, terms, mean_parameters(terms))
 
 
-def _start(base: Candidate | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
+def _start(base: Hypothesis | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
     """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit."""
     if base is None or not base.fits:
         return None

@@ -1,7 +1,7 @@
 """What each of several effects adds to the others: its leave-one-out gain.
 
-The gains of all effects and of all but one are those of `judging.cross_validated`: effects before the first random one
-are not charged with what they gain less once the commands' floor is less certain.
+The gains of all effects and of all but one are those of `judging.cross_validated`: `Charges.uncertain_floor_loss` is
+added to both.
 """
 
 from collections.abc import Hashable, Sequence
@@ -10,7 +10,7 @@ from dataclasses import replace
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import TWO_FOLDS
-from airtouch.gap.naming.judging import Trial, gain_of, lost_beside_random, price_of
+from airtouch.gap.naming.judging import Trial, gain_of, price_of, uncertain_floor_loss
 from airtouch.gap.naming.records import Step, new_terms
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.candidates import random_of
@@ -45,12 +45,12 @@ def _gain_without(trial: Trial, steps: Sequence[Step], index: int) -> float:
         return gain - cost_of_others
     refits = [_refit(trial, half, _without(last.fits[half].terms, dropped)) for half in (0, 1)]
     gain += sum(gain_of(trial, test, refits[train].terms) for train, test in TWO_FOLDS)
-    gain += _certainty_refund(trial, steps, index)
+    gain += _loss_without(trial, steps, index)
     return gain - price_of(refits[-1].terms) - cost_of_others
 
 
-def _certainty_refund(trial: Trial, steps: Sequence[Step], index: int) -> float:
-    """`Charges.certainty_refund` of the last step's hypothesis without the effect of the step at an index.
+def _loss_without(trial: Trial, steps: Sequence[Step], index: int) -> float:
+    """`Charges.uncertain_floor_loss` of the last step's hypothesis without the effect of the step at an index.
 
     It is 0 where no other effect stands before the first random one, or none is random: nothing lost certainty. It is
     that of the last step where the dropped effect came after the first random one, which it did not change. Else the
@@ -63,10 +63,10 @@ def _certainty_refund(trial: Trial, steps: Sequence[Step], index: int) -> float:
     if not earlier:
         return 0.0
     if index > first_random:
-        return steps[-1].charges.certainty_refund
+        return steps[-1].charges.uncertain_floor_loss
     later = frozenset().union(*(_new_slots(steps, i) for i in range(len(steps)) if i not in earlier))
     refits = [_refit(trial, half, _without(steps[-1].fits[half].terms, later)) for half in (0, 1)]
-    return lost_beside_random(trial, refits)
+    return uncertain_floor_loss(trial, refits)
 
 
 def _refit(trial: Trial, half: int, terms: Sequence[Term]) -> FittedTerms:

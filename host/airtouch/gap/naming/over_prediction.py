@@ -5,10 +5,10 @@ import numpy as np
 from airtouch.gap.evidence.cells import CELLS, channel_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
-from airtouch.gap.naming.records import Candidate, OverPrediction
+from airtouch.gap.naming.records import Hypothesis, OverPrediction
 
 
-def over_prediction_of(trial: Trial, hypothesis: Candidate | None) -> OverPrediction:
+def over_prediction_of(trial: Trial, hypothesis: Hypothesis | None) -> OverPrediction:
     """Nats that the effects named lose by over-prediction; 0 nats and no cell where they lose nothing.
 
     hypothesis: these effects together, None where none is named.

@@ -9,16 +9,16 @@ from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
-from airtouch.gap.naming.records import Candidate, Charges, Step, Strength, Unsteadiness
+from airtouch.gap.naming.records import Charges, Hypothesis, Step, Strength, UnsteadinessRarity
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
-from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, unsteady
+from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, log_entropies
 from airtouch.gap.signatures.scatter import Scatter, size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
-    """The passing effect that explains most; None if no passing effect passes the tests below.
+def passing_effect(search: Search, without: Sequence[str]) -> Hypothesis | None:
+    """The passing effect that explains most, as a hypothesis; None where none meets the conditions below.
 
     It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
     what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
@@ -29,28 +29,28 @@ def passing_effect(search: Search, without: Sequence[str]) -> Candidate | None:
     if data.study.scatter is None:
         return None
     least = height_gain(data, trial.halves) + PASSING_GAIN
-    passing = [g for g in passing_effects(data, without).values()
-               if g.gain >= least and passing_evidence(data, g.key, g.gain, g.strength) >= PASSING_GAIN]
-    if passing:  # else what always acts need not be judged
-        always = [c.gain for name, c in search.single_effects.items() if c.evidence >= search.least_nats[name]]
-        passing = [g for g in passing if g.gain >= max(always, default=0.0) + PASSING_GAIN]
-    if not passing:
+    effects = [e for e in passing_effects(data, without).values()
+               if e.gain >= least and passing_evidence(data, e.key, e.gain, e.strength) >= PASSING_GAIN]
+    if effects:  # else what always acts need not be judged
+        steady_gains = [h.gain for name, h in search.single_effects.items() if h.evidence >= search.least_nats[name]]
+        effects = [e for e in effects if e.gain >= max(steady_gains, default=0.0) + PASSING_GAIN]
+    if not effects:
         return None
-    overhead = [g for g in passing if g.key == KNOWN_OVERHEAD]
-    return _hypothesis_of(trial, max(overhead or passing, key=lambda g: g.gain))
+    overhead = [e for e in effects if e.key == KNOWN_OVERHEAD]
+    return _hypothesis_of(trial, max(overhead or effects, key=lambda e: e.gain))
 
 
-def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Candidate:
+def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Hypothesis:
     """A passing effect as a hypothesis; it is fitted on both halves, as it may act in one alone."""
     terms = effect.fitted.terms
     gain = sum(gain_of(trial, half, terms) for half in (0, 1)) - effect.cost
     evidence = passing_evidence(trial.data, effect.key, effect.gain, effect.strength)
-    return Candidate(effect.name, terms, gain, (effect.fitted, effect.fitted),
+    return Hypothesis(effect.name, terms, gain, (effect.fitted, effect.fitted),
                      charges=Charges().with_effect(effect.cost), strength=Strength(effect.strength), evidence=evidence,
                      passing_key=effect.key)
 
 
-def as_in_nominal_flights(data: Data, passing: Candidate, steps: Sequence[Step]) -> bool:
+def as_in_nominal_flights(data: Data, passing: Hypothesis, steps: Sequence[Step]) -> bool:
     """Whether a passing effect adds no more to the effects beside it than in nominal flights."""
     key = passing.passing_key
     assert key is not None  # it is a passing effect
@@ -68,18 +68,19 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
     assert data.study.scatter is not None  # no passing effect is looked for without nominal flights
     sizes = {key: size_of(gain / data.seconds, strength)}
     if key == OVERHEAD:
-        of_wakes = {UNSTEADY_TORQUE: unsteady(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
+        of_wakes = {UNSTEADY_TORQUE: log_entropies(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
         sizes |= _of_known_scatter(data.study.scatter, of_wakes)
     return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))
 
 
-def unsteadiness_of(data: Data) -> Unsteadiness:
+def unsteadiness_rarity(data: Data) -> UnsteadinessRarity:
     """How much less steady flights are than nominal ones; 0 nats where it is not known how steady those are."""
     scatter = data.study.scatter
-    if scatter is None:
-        return Unsteadiness()
-    sizes = _of_known_scatter(scatter, unsteady(data))
-    return Unsteadiness(*scatter.rarity(sizes)) if sizes else Unsteadiness()
+    entropies = {} if scatter is None else _of_known_scatter(scatter, log_entropies(data))
+    if scatter is None or not entropies:
+        return UnsteadinessRarity()
+    rarest = max(entropies, key=lambda name: scatter.rarity({name: entropies[name]})[0])
+    return UnsteadinessRarity(*scatter.rarity(entropies), rarest)
 
 
 def _of_known_scatter(scatter: Scatter, sizes: Mapping[str, float]) -> dict[str, float]:

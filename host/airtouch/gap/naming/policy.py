@@ -131,13 +131,13 @@ class UnknownLimit:
     share_over_none: float = 0.0
     nominal_gain: float = 0.0
 
-    def nats(self, gain: float, over_none: float, assumed: bool) -> float:
+    def nats(self, gain: float, over_none: float, spectrum_is_assumed: bool) -> float:
         """The limit, nats: the largest of what each field allows.
 
-        gain: of the effects named; over_none: of the nameless model over no effect; assumed: whether the spectrum of
-        one effect is assumed.
+        gain: of the effects named; over_none: of the nameless model over no effect; spectrum_is_assumed: whether
+        that of one effect is assumed.
         """
-        share = self.assumed_share if assumed else self.share
+        share = self.assumed_share if spectrum_is_assumed else self.share
         return max(self.least, share * gain, self.share_over_none * over_none, self.nominal_gain)
 
 

@@ -1,4 +1,8 @@
-"""The result of a selection of effects: the candidates with what they gain, and the steps."""
+"""The result of a selection of effects: hypotheses with what they gain, and the steps.
+
+A *candidate* is an effect that is tried, and has a name. A `Hypothesis` is one candidate or several together, in one
+variant each, with what they gain.
+"""
 
 from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,32 +42,33 @@ class Strength:
 
 @dataclass(frozen=True)
 class Charges:
-    """What the gain of a hypothesis is charged with beside its parameters, and what is given back to it, nats.
+    """What is subtracted from the gain of a hypothesis beside the price of its parameters, and what is added, nats.
 
-    choice_cost: charged for the choice among the variants of each of its effects, all together; newest_choice_cost: of
-    these, for the newest effect. certainty_refund: given back to the effects before the first random one. Beside that
-    the commands' floor is less certain, by which they lose as much without being any less right.
+    choice_cost: subtracted for the choice among the variants of each of its effects, all together; newest_choice_cost:
+    of these, for the newest effect; uncertain_floor_loss: added. With the first random effect the floor of the commands
+    counts as less certain, so that the effects before it gain less by this much, though they are no less right.
     """
 
     choice_cost: float = 0.0
     newest_choice_cost: float = 0.0
-    certainty_refund: float = 0.0
+    uncertain_floor_loss: float = 0.0
 
-    def with_effect(self, choice_cost: float, refund: float = 0.0) -> "Charges":
+    def with_effect(self, choice_cost: float, uncertain_floor_loss: float = 0.0) -> "Charges":
         """The charges with those of a further effect."""
-        return Charges(choice_cost + self.choice_cost, choice_cost, self.certainty_refund + refund)
+        return Charges(choice_cost + self.choice_cost, choice_cost, self.uncertain_floor_loss + uncertain_floor_loss)
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A hypothesis of one effect or several, with what it gains.
+class Hypothesis:
+    """One effect or several that may act together, with what they gain.
 
-    name: its newest effect; terms: of all its effects, with their values; gain: held-out nats over no effect, after
-    `charges`; fits: of its terms in the spectra to each half, none where it has no such term or was only screened;
-    full: whether it was fitted to the end, not screened or fitted briefly. Of the newest effect: strength; evidence:
-    nats that it gains over the hypothesis before, but no more than its strength says beyond the scatter of nominal
-    flights; passing_key: of a passing effect, the entry of `Scatter.passing` that it is compared with,
-    else None.
+    name: the effect that it adds to those of its base, its newest; terms: of all its effects, with their values; gain:
+    held-out nats over no effect, after `charges`; fits: of its terms in the spectra to each half, none where it has no
+    such term or was only screened; full: whether it was fitted to the end, not screened or fitted briefly.
+
+    Of the newest effect alone: strength; evidence: nats that it gains over the base, but no more than its strength says
+    beyond the scatter of nominal flights; passing_key: of a passing effect, the entry of `Scatter.passing` that it is
+    compared with, else None.
     """
 
     name: str
@@ -83,8 +88,8 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Step(Candidate):
-    """A candidate that a selection has added to the steps before it.
+class Step(Hypothesis):
+    """A hypothesis that a selection has added: its effects are those of the step before, and a newest one.
 
     is_named: whether its evidence is enough for a name; if not, the newest effect is a deviation that nominal flights
     have as well, and stands beside the effects named. leave_one_out_gain: what the newest adds to the others, nats: of
@@ -95,9 +100,9 @@ class Step(Candidate):
     leave_one_out_gain: float | None = None
 
     @classmethod
-    def of(cls, candidate: Candidate, is_named: bool = True) -> "Step":
-        """The step that adds a candidate."""
-        return cls(**vars(candidate), is_named=is_named)
+    def of(cls, hypothesis: Hypothesis, is_named: bool = True) -> "Step":
+        """The step that adds a hypothesis."""
+        return cls(**vars(hypothesis), is_named=is_named)
 
 
 @dataclass(frozen=True)
@@ -120,47 +125,50 @@ class OverPrediction(NamedTuple):
     worst_cell: int | None = None
 
 
-class Unsteadiness(NamedTuple):
-    """Nats by which flights are less steady than nominal ones, and their limit, which one nominal in a hundred exceeds.
+class UnsteadinessRarity(NamedTuple):
+    """How rare it is that nominal flights are as unsteady; 0 nats where that is not judged.
 
-    See `passing.unsteadiness`; 0 nats where that is not judged.
+    nats: log likelihood by which the flights are less steady than nominal ones (`passing.unsteadiness`,
+    `Scatter.rarity`); limit: nats that one nominal flight in a hundred exceeds; rarest: which is rarest of the measures
+    of `unsteadiness.COLUMNS`.
     """
 
     nats: float = 0.0
     limit: float = 1.0
+    rarest: str = ""
 
 
-class TakenBack(NamedTuple):
-    """An effect that was named and is no more, as it closes too little of recorded flights' gap, and the shrink."""
+class WithdrawnName(NamedTuple):
+    """An effect whose name was withdrawn, as its shrink of recorded flights' gap is too small; "" for none."""
 
     name: str = ""
-    closed: float = 0.0
+    shrink: float = 0.0
 
 
 @dataclass(frozen=True)
 class Selection:
     """The result of a selection of effects; gains are in held-out nats.
 
-    single_effects: the best variant of every candidate, by name, beside the deviations alone; steps: effects added one
-    after another; nameless: what the nameless model gains; halves: the blocks that effects were fitted and judged on;
-    least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely than
-    none; policy: what the flights must show; assumed: whether the spectrum of an effect of the last step is assumed, as
-    it is random or changes the loop of recorded flights; over_prediction: over-prediction of the effects named;
-    inference: what named the effects, where the relations of signals did; taken_back: what recorded flights name no
-    more; unsteadiness: how much less steady the flights are than nominal ones.
+    single_effects: the best hypothesis of every candidate, by name, beside the deviations alone; steps: effects added
+    one after another; nameless: what the nameless model gains; halves: the blocks that effects were fitted and judged
+    on; least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely
+    than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
+    as the effect is random or changes the loop of recorded flights; over_prediction: that of the effects named;
+    inference: what named the effects, where the relations of signals did; withdrawn: a name that was withdrawn;
+    unsteadiness_rarity: how much less steady the flights are than nominal ones.
     """
 
-    single_effects: Mapping[str, Candidate]
+    single_effects: Mapping[str, Hypothesis]
     steps: tuple[Step, ...]
     nameless: NamelessGain
     halves: tuple[BlockSet, BlockSet]
     least_nats: Mapping[str, float]
     policy: NamingPolicy
-    assumed: bool
+    spectrum_is_assumed: bool
     over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
-    taken_back: TakenBack = TakenBack()
-    unsteadiness: Unsteadiness = Unsteadiness()
+    withdrawn: WithdrawnName = WithdrawnName()
+    unsteadiness_rarity: UnsteadinessRarity = UnsteadinessRarity()
 
     @property
     def last_step(self) -> Step | None:
@@ -174,7 +182,7 @@ class Selection:
         return tuple(sorted(steps, key=lambda s: (s.of_the_log, -(s.leave_one_out_gain or 0.0))))
 
     @property
-    def named_hypothesis(self) -> Candidate | None:
+    def named_hypothesis(self) -> Hypothesis | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
         last, slots = self.last_step, self.named_slots
         if last is None or not slots:
@@ -187,9 +195,9 @@ class Selection:
         """Slots (`Term.slot`) of the terms of the effects named: a deviation may have the same name."""
         return frozenset(t.slot for i, s in enumerate(self.steps) if s.is_named for t in new_terms(self.steps, i))
 
-    def gained(self, candidate: Candidate) -> float:
-        """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
-        return float(self.inference.evidence[candidate.name] if self.inference is not None else candidate.gain)
+    def gain(self, hypothesis: Hypothesis) -> float:
+        """Nats that a single effect gains: of held-out data, or of the relations of signals where these decide."""
+        return float(self.inference.evidence[hypothesis.name] if self.inference is not None else hypothesis.gain)
 
 
 def new_terms(steps: Sequence[Step], index: int) -> list[Term]:

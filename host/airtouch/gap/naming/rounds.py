@@ -12,15 +12,15 @@ import numpy as np
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
 from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, LONGER_GAIN, PROMISING
-from airtouch.gap.naming.records import Candidate, Strength
+from airtouch.gap.naming.records import Hypothesis, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.signature import COMPANIONS
 from airtouch.gap.signatures.term import Terms
 
 
-def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Candidate | None,
-             progress: Callable[[str], None] = lambda _: None, promising: Container[str] = ()) -> dict[str, Candidate]:
+def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypothesis | None,
+             progress: Callable[[str], None] = lambda _: None, promising: Container[str] = ()) -> dict[str, Hypothesis]:
     """The best hypothesis of every candidate beside a base, by name, with its evidence.
 
     candidates: variants by name; base: None for no effect; progress: called with every name; promising: names that are
@@ -33,7 +33,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Cand
     return with_evidence(trial.data.study.scatter, best, start.gain)
 
 
-def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Candidate]:
+def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Hypothesis]:
     """The best hypothesis of every candidate alone, by name, for the strength that it seems to have; no evidence.
 
     Every random effect is fitted, and every fit is one in full. Each parameter's strength is that of the variant which
@@ -49,7 +49,7 @@ def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> d
 
 def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
             progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
-            every_random: bool = False) -> tuple[list[PricedVariant], list[Candidate]]:
+            every_random: bool = False) -> tuple[list[PricedVariant], list[Hypothesis]]:
     """The variants that are worth a fit, and hypotheses of the others.
 
     candidates, progress, promising: as for `round_of`; every_random: as for `screen_random`.
@@ -62,7 +62,7 @@ def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     return [*screened.fit_only, *random, *means_to_fit], not_fitted
 
 
-def _fit_variant(trial: Trial, variant: PricedVariant, base: Candidate | None) -> Candidate:
+def _fit_variant(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> Hypothesis:
     """A variant fitted beside a base.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
@@ -75,42 +75,42 @@ def _fit_variant(trial: Trial, variant: PricedVariant, base: Candidate | None) -
     return fit() if briefly.gain - before > PROMISING else briefly
 
 
-def _best_variants(means: Sequence[Candidate]) -> list[Candidate]:
+def _best_variants(means: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The best variant of each name and number of terms, best first, as `means` are."""
-    best: dict[tuple[str, int], Candidate] = {}
-    for candidate in means:
-        best.setdefault((candidate.name, len(candidate.terms)), candidate)
+    best: dict[tuple[str, int], Hypothesis] = {}
+    for hypothesis in means:
+        best.setdefault((hypothesis.name, len(hypothesis.terms)), hypothesis)
     return list(best.values())
 
 
-def _by_promise(screened: Sequence[Candidate], gain: float, promising: Container[str],
-                ) -> tuple[list[Candidate], list[Candidate]]:
+def _by_promise(screened: Sequence[Hypothesis], gain: float, promising: Container[str],
+                ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """The hypotheses that are worth a full fit, and the others.
 
     screened: to first order, those of mean effects first, the best first: of the first BEST_SCREENED those are worth a
     fit that gain PROMISING over the gain of the base, nats; promising: names that are worth one at any gain.
     """
     worth_a_fit, others = [], []
-    for rank, candidate in enumerate(screened):
-        gains_enough = rank < BEST_SCREENED and candidate.gain - gain > PROMISING
-        (worth_a_fit if gains_enough or candidate.name in promising else others).append(candidate)
+    for rank, hypothesis in enumerate(screened):
+        gains_enough = rank < BEST_SCREENED and hypothesis.gain - gain > PROMISING
+        (worth_a_fit if gains_enough or hypothesis.name in promising else others).append(hypothesis)
     return worth_a_fit, others
 
 
-def best_of_each(candidates: Sequence[Candidate], before: int) -> dict[str, Candidate]:
+def best_of_each(hypotheses: Sequence[Hypothesis], before: int) -> dict[str, Hypothesis]:
     """The best hypothesis of each candidate, by name, those that only their companion carries put behind it.
 
     before: number of terms of the base.
     """
-    best: dict[str, Candidate] = {}
-    for new in sorted(candidates, key=lambda c: len(c.terms)):
+    best: dict[str, Hypothesis] = {}
+    for new in sorted(hypotheses, key=lambda h: len(h.terms)):
         old = best.get(new.name)
         if old is None or _is_better(new, old):
             best[new.name] = new
     return _behind_companion(best, before)
 
 
-def _behind_companion(best: Mapping[str, Candidate], before: int) -> dict[str, Candidate]:
+def _behind_companion(best: Mapping[str, Hypothesis], before: int) -> dict[str, Hypothesis]:
     """The best hypotheses by name, with the gain of an effect lowered where its companion alone gains nearly as much.
 
     An effect that gains less than COMPANION_GAIN over its companion explains nothing itself. Its gain is put
@@ -124,16 +124,16 @@ def _behind_companion(best: Mapping[str, Candidate], before: int) -> dict[str, C
     return out
 
 
-def _is_better(new: Candidate, old: Candidate) -> bool:
-    """Whether a hypothesis of a candidate replaces another of no more terms.
+def _is_better(new: Hypothesis, old: Hypothesis) -> bool:
+    """Whether a hypothesis of a candidate replaces another with no more terms.
 
     One that is fitted in full replaces one that is not; else one that gains more, by LONGER_GAIN if it has more terms,
     a random part or a companion.
     """
     if new.full != old.full:
         return new.full
-    need = LONGER_GAIN if len(new.terms) > len(old.terms) else 0.0
-    return new.gain > old.gain + need
+    margin = LONGER_GAIN if len(new.terms) > len(old.terms) else 0.0
+    return new.gain > old.gain + margin
 
 
 def _is_tried_alone(variant: PricedVariant) -> bool:
@@ -142,10 +142,11 @@ def _is_tried_alone(variant: PricedVariant) -> bool:
     return own.signature.alone_too and len(own.free) > 1
 
 
-def _one_by_one(best: Candidate, variants: Sequence[Candidate]) -> Candidate:
-    """A candidate with the strength that each of its k parameters has where it is free alone, and all of them free.
+def _one_by_one(best: Hypothesis, variants: Sequence[Hypothesis]) -> Hypothesis:
+    """The best hypothesis of a candidate, with the strength that each of its k parameters has where it is free alone.
 
-    variants: its fitted variants. It stays as it is where not each of several parameters was tried alone.
+    All of them are free in it. variants: of the candidate, as fitted. The hypothesis stays as it is where not each of
+    several parameters was tried alone.
     """
     of_one_parameter = [v.strength for v in variants if np.isfinite(v.strength.variance).sum() == 1]
     alone = {int(np.argmin(s.variance)): s for s in of_one_parameter}  # of another parameter the variance is infinite

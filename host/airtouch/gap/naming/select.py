@@ -18,9 +18,9 @@ from airtouch.gap.naming.forward import PartialSelection, Search, forward
 from airtouch.gap.naming.judging import Trial, trial_of
 from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.over_prediction import over_prediction_of
-from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, unsteadiness_of
+from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, unsteadiness_rarity
 from airtouch.gap.naming.policy import WAKE_SHARE
-from airtouch.gap.naming.records import Candidate, NamelessGain, Selection
+from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import Inference
@@ -81,7 +81,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     return _by_replay(search, partial)
 
 
-def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
+def replay_may_name(passing: Hypothesis | None, inference: Inference) -> bool:
     """Whether the replay is asked where the relations leave something unexplained. passing: the passing effect, if any.
 
     It is asked in three cases, the first two of a passing effect:
@@ -96,7 +96,7 @@ def replay_may_name(passing: Candidate | None, inference: Inference) -> bool:
     return inference.evidence.get(OVERHEAD, -np.inf) > WAKE_SHARE * most
 
 
-def _search_effects(search: Search, passing: Candidate | None) -> PartialSelection:
+def _search_effects(search: Search, passing: Hypothesis | None) -> PartialSelection:
     """Where a forward search ends, its steps with their leave-one-out gains.
 
     passing: the passing effect, its first step; the search is done again without it where beside the other effects it
@@ -119,15 +119,16 @@ def _by_replay(search: Search, partial: PartialSelection) -> Selection:
     selection = Selection(
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, unexplained_clock_gain(trial.data, last)),
-        policy=policy, assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)))
+        spectrum_is_assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)),
+        policy=policy)
     if policy.judges_unsteadiness:
-        selection = replace(selection, unsteadiness=unsteadiness_of(trial.data))
+        selection = replace(selection, unsteadiness_rarity=unsteadiness_rarity(trial.data))
     if policy.judges_over_prediction:
         selection = replace(selection, over_prediction=over_prediction_of(trial, selection.named_hypothesis))
     return selection
 
 
-def nameless_nats(trial: Trial, base: Candidate | None) -> float:
+def nameless_nats(trial: Trial, base: Hypothesis | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, those of the logged times included."""
     fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.halves, fits)), 0.0)

@@ -13,12 +13,12 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import LEAST_GAIN, MISFIT_SHARE_RANDOM
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signatures.candidates import is_random, mean_of, random_of
 from airtouch.gap.signatures.term import Term
 
 
-def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> float:
+def least_further_gain(trial: Trial, base: Hypothesis, extended: Hypothesis) -> float:
     """Held-out nats that a further effect must gain to be added.
 
     base: the hypothesis of the effects before it; extended: the same with the further one.
@@ -30,12 +30,12 @@ def least_further_gain(trial: Trial, base: Candidate, extended: Candidate) -> fl
     return misfit(trial, base, extended, share, everywhere=is_random(extended.name))
 
 
-def is_random_misfit(trial: Trial, base: Candidate, extended: Candidate) -> bool:
+def is_random_misfit(trial: Trial, base: Hypothesis, extended: Hypothesis) -> bool:
     """Whether a further effect is random and gains no more than the effects before it may be wrong by."""
     return is_random(extended.name) and extended.gain - base.gain < misfit(trial, base, extended, MISFIT_SHARE_RANDOM)
 
 
-def misfit(trial: Trial, base: Candidate, extended: Candidate, share: float, everywhere: bool = False) -> float:
+def misfit(trial: Trial, base: Hypothesis, extended: Hypothesis, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the models of those before it are wrong by a share of their gain.
 
     It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects on the logged times gain does

@@ -27,7 +27,7 @@ def counterevidence(selection: Selection) -> Counterevidence:
     if selection.inference is not None:
         return selection.inference.counterevidence
     gain = selection.last_step.gain if selection.last_step else 0.0
-    limit = selection.policy.unknown.nats(gain, selection.nameless.over_none, selection.assumed)
+    limit = selection.policy.unknown.nats(gain, selection.nameless.over_none, selection.spectrum_is_assumed)
     return Counterevidence(selection.nameless.over_last_step, limit, of_distance=False)
 
 
@@ -53,7 +53,7 @@ def unsteadiness_ratio(selection: Selection) -> float:
     hypothesis = selection.named_hypothesis
     if hypothesis is not None and any(t.shows_in == MEAN or t.gate for t in hypothesis.terms):
         return 0.0
-    return selection.unsteadiness.nats / selection.unsteadiness.limit
+    return selection.unsteadiness_rarity.nats / selection.unsteadiness_rarity.limit
 
 
 def against_over_limit(selection: Selection) -> float:

@@ -12,13 +12,13 @@ from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import at_bound, trial_of
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.naming.rounds import every_strength
 from airtouch.gap.naming.select import nameless_nats
 from airtouch.gap.nominal.consistency import of_one_trim
 from airtouch.gap.passing.gates import passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
-from airtouch.gap.passing.unsteadiness import unsteady
+from airtouch.gap.passing.unsteadiness import log_entropies
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
@@ -58,7 +58,7 @@ def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
     """Size of each passing effect but those of `without`; how unsteady flights are and how far pushes point down."""
     passing = passing_effects(data, without)
     sizes = {n: size_of(passing[n].gain / data.seconds, passing[n].strength) if n in passing else 0.0 for n in PASSING}
-    return {**sizes, **unsteady(data), DOWNWARD: downward(data)}
+    return {**sizes, **log_entropies(data), DOWNWARD: downward(data)}
 
 
 def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
@@ -78,8 +78,8 @@ def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Appare
     return apparent_strengths(Data(study, [flight]), without)
 
 
-def _strength_error(data: Data, judged: Candidate) -> np.ndarray:
-    """Standard deviation (k,) by chance of a candidate's strength."""
+def _strength_error(data: Data, judged: Hypothesis) -> np.ndarray:
+    """Standard deviation (k,) by chance of the strength of a candidate's best hypothesis."""
     term, strength = strength_term(judged.terms), judged.strength
     if term.shows_in == CLOCK:
         return np.zeros(len(strength.mean))
@@ -91,7 +91,7 @@ def _strength_error(data: Data, judged: Candidate) -> np.ndarray:
                     np.minimum(np.sqrt(strength.variance), NOBODY_KNOWS))
 
 
-def _random_error(data: Data, judged: Candidate, term: Term) -> np.ndarray:
+def _random_error(data: Data, judged: Hypothesis, term: Term) -> np.ndarray:
     """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)

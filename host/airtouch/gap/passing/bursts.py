@@ -1,4 +1,4 @@
-"""Bursts: stretches in which a vehicle is shaken far more than in the rest of the flight.
+"""Gates of bursts: the intervals in which a vehicle is shaken far more than in the rest of the flight.
 
 A wake that is flown through lasts shorter than a block, and the spectra of blocks would not show when. Two signals
 show it: the force along the thrust, and the yaw torque above the band in which the vehicle is steered. Rotors in a wake
@@ -13,17 +13,18 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.passing.stretches import ENDS, LEAST_BLOCKS, WHOLE, best_stretches, cost_of_stretch
+from airtouch.gap.passing.gate_search import ENDS, LEAST_BLOCKS, MOST_OF_FLIGHTS, best_intervals, interval_cost
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.study import Study
 from airtouch.simulation.effects.effect import Gate
 
 
 @dataclass(frozen=True)
-class Signal:
+class BurstSignal:
     """A channel of the residual (a column of `residual`), and its band, Hz, in pieces of so many seconds.
 
-    freedom: independent values in a piece; burst_ratio: power of a burst over the flight's median.
+    freedom: independent values in a piece; burst_ratio: power of a burst over the flight's median, chosen. With a
+    larger number weaker bursts are no gate, and one needs fewer pieces to gain more than its choice costs.
     """
 
     column: int
@@ -33,32 +34,39 @@ class Signal:
     burst_ratio: float = 6.0
 
 
-#: no number of the force has a source: all were chosen
-FORCE_BURSTS = Signal(COLUMN["force_z"], (1.0, 50.0), 0.16, 3.0)
-#: band and length of the pieces were chosen among six and two on wakes of recorded flights (host/docs/looks.md,
-#: 2026-11-25 20:55); freedom: twice the band's width times the piece's length
-YAW_BURSTS = Signal(COLUMN["torque_z"], (15.0, 40.0), 0.32, 16.0)
-LEAST_PIECES = 2 * LEAST_BLOCKS  #: pieces in the air, below which no burst is sought; chosen
+#: band, Hz, in which a vehicle is shaken and hardly steered, and length of its pieces, s. Chosen for the yaw torque
+#: among six bands and two lengths, on wakes of recorded flights (host/docs/looks.md, 2026-11-25 20:55), and for all
+#: torques and the lift among twelve sets of signals (2026-11-26 22:55). A lower end takes in more of what steers, a
+#: longer piece tells a short burst less well
+SHAKE_BAND_HZ, SHAKE_PIECE_S = (15.0, 40.0), 0.32
+#: band, Hz, piece, s, and freedom have no source: all were chosen. A longer piece tells a short push less well, more
+#: freedom gives each piece more nats
+FORCE_BURSTS = BurstSignal(COLUMN["force_z"], (1.0, 50.0), 0.16, 3.0)
+#: freedom: twice the band's width times the piece's length
+YAW_BURSTS = BurstSignal(COLUMN["torque_z"], SHAKE_BAND_HZ, SHAKE_PIECE_S, 16.0)
+#: pieces in the air, below which no burst is sought and no flight is unsteady; chosen. A larger number says nothing of
+#: short flights
+LEAST_PIECES = 2 * LEAST_BLOCKS
 
 
-def bursts(data: Data, signal: Signal) -> tuple[Gate, float]:
+def burst_gate(data: Data, signal: BurstSignal) -> tuple[Gate, float]:
     """The bursts of a signal in all flights, and nats that their choice costs; none where they fill the flights."""
     gate: list[tuple[str, float, float]] = []
     cost = 0.0
     for flight in data.flights:
-        gain = _gains(powers(data.study, flight, signal.column, signal.band_hz, signal.piece_s), signal)
+        gain = _gains(piece_powers(data.study, flight, signal.column, signal.band_hz, signal.piece_s), signal)
         known = int(np.isfinite(gain).sum())
         if known < LEAST_PIECES:
             continue
-        stretches = best_stretches(gain, np.zeros(len(gain), int), cost_of_stretch(known))
-        gate += [(flight.name, a * signal.piece_s, (b + 1) * signal.piece_s) for a, b in stretches]
-        cost += cost_of_stretch(known) * len(stretches)
-    seconds = sum(end - begin for _, begin, end in gate)
-    whole = seconds > WHOLE * data.seconds
-    return ((), 0.0) if whole else (tuple(gate), cost)
+        intervals = best_intervals(gain, np.zeros(len(gain), int), interval_cost(known))
+        gate += [(flight.name, a * signal.piece_s, (b + 1) * signal.piece_s) for a, b in intervals]
+        cost += interval_cost(known) * len(intervals)
+    duration_s = sum(end - begin for _, begin, end in gate)
+    return ((), 0.0) if duration_s > MOST_OF_FLIGHTS * data.seconds else (tuple(gate), cost)
 
 
-def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def residual_in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float],
+                     ) -> tuple[np.ndarray, np.ndarray]:
     """A column of the residual in a band (n,), and which of its samples count (n,).
 
     None counts on the ground, at take-off or landing, nor one that bridges lost rows; straight lines lead over them.
@@ -70,16 +78,16 @@ def in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, flo
     return (both_ways(lowpass(high), out) if high < 1.0 else out), counts
 
 
-def powers(study: Study, flight: Flight, column: int, band_hz: tuple[float, float], piece_s: float) -> np.ndarray:
+def piece_powers(study: Study, flight: Flight, column: int, band_hz: tuple[float, float], piece_s: float) -> np.ndarray:
     """Mean square (pieces,) of a column of the residual in a band; 0 in pieces with a sample that does not count."""
-    fast, counts = in_band(study, flight, column, band_hz)
+    values, counts = residual_in_band(study, flight, column, band_hz)
     size = round(piece_s / PERIOD_S)
-    pieces = len(fast) // size
-    power = (fast[:pieces * size].reshape(pieces, size) ** 2).mean(axis=1)
+    pieces = len(values) // size
+    power = (values[:pieces * size].reshape(pieces, size) ** 2).mean(axis=1)
     return np.where(counts[:pieces * size].reshape(pieces, size).all(axis=1), power, 0.0)
 
 
-def _gains(power: np.ndarray, signal: Signal) -> np.ndarray:
+def _gains(power: np.ndarray, signal: BurstSignal) -> np.ndarray:
     """Nats (pieces,) that a power `burst_ratio` times the median gains over the median; -inf where it is 0.
 
     It is the log likelihood ratio of a chi-square of `freedom`. A piece counts as if it were no stronger than that.

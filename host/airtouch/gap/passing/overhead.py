@@ -21,17 +21,22 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import runs
 from airtouch.simulation.effects.effect import Gate
 
-PLACE = ("x_m", "y_m", "z_m")
+POSITION = ("x_m", "y_m", "z_m")  #: columns of a log
 UNUSED = "the log of the other vehicle was not used: without {} no wake is judged"
-#: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
+#: m, where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %.
+#: Larger numbers count seconds in which hardly a wake acts
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
-#: The rule by which known seconds are compared with the rest of a flight was chosen among seven, on recorded flights
-#: (host/docs/looks.md, 2026-11-25 04:11). The numbers below have no source of their own: all were chosen.
-APART_S = 0.1  #: s, stretches with less between them are one
-LEAST_S = 0.05  #: s, shorter ones are none
-SHIFTS = 8  #: parts of a flight, by each of which but the last the known seconds are shifted: SHIFTS - 1 other places
-MARGIN_S = 0.25  #: s around the known seconds, in which a wake may already or still act
-LEAST_SHARE = 0.5  #: of the known seconds that shifted ones must hold
+# The rule by which known seconds are compared with the rest of a flight was chosen among seven, on recorded flights
+# (host/docs/looks.md, 2026-11-25 04:11). The numbers below have no source of their own: all were chosen.
+APART_S = 0.1  #: s, intervals with less between them are one; a larger number joins more of them
+LEAST_S = 0.05  #: s, shorter intervals are none; a larger number leaves out short passes
+#: parts of a flight, by each of which but the last the known seconds are shifted: SHIFTS - 1 other places. A larger
+#: number takes more time, and the median is that of more places
+SHIFTS = 8
+#: s around the known seconds, in which a wake may already or still act; a larger number leaves less to compare with
+MARGIN_S = 0.25
+#: fraction of the known seconds that shifted ones must hold to count; a larger number leaves out more places
+LEAST_FRACTION = 0.5
 
 
 def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -40,29 +45,29 @@ def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (np.hypot(apart[:, 0], apart[:, 1]) < SIDEWAYS_M) & (apart[:, 2] > ABOVE_M[0]) & (apart[:, 2] < ABOVE_M[1])
 
 
-def stretches_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Stretches, s from the first sample, of the samples (n,) that are True."""
+def intervals_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Intervals, s from the first sample, of the samples (n,) that are True."""
     return tuple((first * PERIOD_S, last * PERIOD_S) for first, last in runs(acts))
 
 
 def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[float, float], ...]:
-    """Stretches, s from the log's first row, in which one of the partners is overhead.
+    """Intervals, s from the log's first row, in which one of the partners is overhead.
 
     All logs hold t_s of one clock and positions in one frame. Raises AirTouchError where one of them has no such.
     """
     for each in (log, *partners):
-        if not each.has("t_s", *PLACE):
-            raise AirTouchError(f"{each.source}: no {', '.join(('t_s', *PLACE))}; a partner is found by both paths")
+        if not each.has("t_s", *POSITION):
+            raise AirTouchError(f"{each.source}: no {', '.join(('t_s', *POSITION))}; a partner is found by both paths")
     begin = log["t_s"][0]
     time = np.arange(begin, log["t_s"][-1], PERIOD_S)
 
     def path(one: FlightLog) -> np.ndarray:
         """Position (n, 3) at the times, m; NaN where the log has none."""
-        return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in PLACE])
+        return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in POSITION])
 
     acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(path(log), path(p)) for p in partners)])
     out: list[tuple[float, float]] = []
-    for first, last in stretches_s(acts):
+    for first, last in intervals_s(acts):
         if out and first - out[-1][1] < APART_S:
             out[-1] = (out[-1][0], last)
         else:
@@ -90,8 +95,8 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
     if not seconds or study.scatter is None:
         return study
     data, duration = Data(study, [flight]), sum(b - a for a, b in seconds)
-    rest = [_outside(gate, seconds) for gate in _shift(flight, seconds)]
-    sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * duration]
+    rest = [_outside(gate, seconds) for gate in _shifted_gates(flight, seconds)]
+    sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_FRACTION * duration]
     middle, spread = study.scatter.passing[OVERHEAD]
     passing = {**study.scatter.passing, KNOWN_OVERHEAD: (float(np.median(sizes)) if sizes else middle, spread)}
     return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
@@ -105,7 +110,7 @@ def _size(data: Data, gate: Gate) -> float:
 
 
 def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
-    """What of a gate is farther than MARGIN_S from each of the stretches."""
+    """The gate without what is within MARGIN_S of the seconds."""
     out = list(gate)
     for begin, end in seconds:
         out = [(name, a, b) for name, first, last in out
@@ -114,8 +119,8 @@ def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
     return tuple(out)
 
 
-def _shift(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
-    """The same stretches at SHIFTS - 1 places beside the known one, around a flight, cut at its end."""
-    long = len(flight) * PERIOD_S
-    return [tuple((flight.name, (a + shift) % long, min((a + shift) % long + b - a, long)) for a, b in seconds)
-            for shift in np.arange(1, SHIFTS) * long / SHIFTS]
+def _shifted_gates(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
+    """Gates of the same seconds at SHIFTS - 1 places beside the known one, around a flight, cut at its end."""
+    length_s = len(flight) * PERIOD_S
+    return [tuple((flight.name, begin := (a + shift) % length_s, min(begin + b - a, length_s)) for a, b in seconds)
+            for shift in np.arange(1, SHIFTS) * length_s / SHIFTS]

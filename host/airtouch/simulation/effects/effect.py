@@ -114,7 +114,7 @@ class Effect:
         return out
 
 
-Gate = tuple[tuple[str, float, float], ...]  #: when an effect acts: stretches (flight, from_s, to_s)
+Gate = tuple[tuple[str, float, float], ...]  #: when an effect acts: intervals (flight, from_s, to_s)
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def test_each_half_is_fitted_by_its_own_push():
     (bias,) = terms("imu_bias")[:1]
     judged = judge_means(data, halves, [bias])
     acc_z = bias.free.index("acc_z")
-    of_halves = [x[acc_z] * bias.step("acc_z") for x in judged.fitted]
+    of_halves = [x[acc_z] * bias.step("acc_z") for x in judged.estimates]
     assert of_halves == pytest.approx([-0.2, -0.4], rel=0.03)
 
 

@@ -6,7 +6,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD
-from airtouch.gap.naming.records import Candidate
+from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.naming.screening.screen import addable, screen_random, start_of
 from airtouch.gap.signatures.candidates import all_candidates, random_of
 from hovers import FLOOR, hover
@@ -50,7 +50,7 @@ def test_mean_terms_about_as_good_are_fitted_with_the_random_part():
     variants = addable("ground_effect", CANDIDATES["ground_effect"], ())
     shapes = [v.terms for v in variants if not random_of(v.terms)][:3]
     gains = (20.0, 20.0 - 0.9 * ABOUT_AS_GOOD, 20.0 - 1.1 * ABOUT_AS_GOOD)
-    means = [Candidate("ground_effect", terms, gain) for terms, gain in zip(shapes, gains, strict=True)]
+    means = [Hypothesis("ground_effect", terms, gain) for terms, gain in zip(shapes, gains, strict=True)]
     _, fitted = screen_random(start, [v for v in variants if random_of(v.terms)], means, every_random=False)
     shape_of = {i: terms[0].values for i, terms in enumerate(shapes)}
     assert {i for v in fitted for i, values in shape_of.items() if v.terms[0].values == values} == {0, 1}

@@ -29,7 +29,7 @@ def show_false_alarms(flights: Path, tracks: list[Track], store: Path | None) ->
     """
     seconds_of: dict[Kind, list[Seconds]] = {}
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = overhead.stretches_s(overhead_at(t, tracks))
+        acts = overhead.intervals_s(overhead_at(t, tracks))
         if sum(b - a for a, b in acts) >= LEAST_S:
             seconds_of.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
     kind: dict[str, Kind] = {t.row["file"]: (t.row["vehicle"], t.row["manoeuvre"]) for t in tracks}

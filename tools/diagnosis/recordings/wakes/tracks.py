@@ -41,7 +41,7 @@ def track(folder: Path, row: swarm_cuts.Row) -> Track:
     fast = sosfiltfilt(butter(2, FORCE_HZ, "highpass", fs=1.0 / PERIOD_S, output="sos"), force)
     yaw = sosfiltfilt(butter(2, YAW_HZ, "bandpass", fs=1.0 / PERIOD_S, output="sos"),
                       np.where(usable, unexplained[:, 5], 0.0))
-    place = np.column_stack([flight.log[name] for name in overhead.PLACE])
+    place = np.column_stack([flight.log[name] for name in overhead.POSITION])
     return Track(row, place, force, fast, yaw, usable)
 
 

@@ -25,9 +25,14 @@ from airtouch.gap.evidence.random_strength import fit_strength
 from airtouch.gap.signatures.signature import MEAN
 from airtouch.gap.signatures.term import Term
 
-STEP = 0.25  #: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen
-REWEIGHTINGS = 3  #: least-squares fits, each with the weights of the residual of the one before; chosen
-NOTHING = 1e-9  #: change of a spectrum per natural step, unit/sqrt(Hz), that counts as none; chosen, far above rounding
+#: change of a scaled parameter, in natural steps, over which the slope of the spectra is taken; chosen. A larger number
+#: takes the slope over more of the curve, a smaller one is nearer to rounding
+STEP = 0.25
+#: least-squares fits, each with the weights of the residual of the one before; chosen. A larger number takes more time
+REWEIGHTINGS = 3
+#: change of a spectrum per natural step, unit/sqrt(Hz), up to which it counts as none; chosen, far above rounding. With
+#: a larger number more effects count as shown by the commands alone
+LEAST_CHANGE = 1e-9
 UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any that is fitted; chosen
 
 
@@ -35,11 +40,12 @@ UNBOUNDED = 1e6  #: bound of the scaled parameters of the base, larger than any 
 class FirstOrder:
     """Mean effects judged to first order.
 
-    gain: held-out nats; fitted, variances: for each half the k scaled parameters as fitted to it, and their variances.
+    gain: held-out nats; estimates, variances: for each half the k scaled parameters as fitted to it, and their
+    variances.
     """
 
     gain: float
-    fitted: Sequence[np.ndarray]
+    estimates: Sequence[np.ndarray]
     variances: Sequence[np.ndarray]
 
 
@@ -54,7 +60,7 @@ def judge_means(data: Data, halves: Sequence[JudgedBlocks], terms: Sequence[Term
               for half in halves]
     k = sum(len(t.free) for t in mean)
     bounds = _bounds(mean, len(tables[0]) - k)
-    gain, fitted, variances = 0.0, [], []
+    gain, estimates, variances = 0.0, [], []
     for train, test in TWO_FOLDS:
         x, variance = _least_squares(halves[train], tables[train], bounds)
         held_out = halves[test]
@@ -62,9 +68,9 @@ def judge_means(data: Data, halves: Sequence[JudgedBlocks], terms: Sequence[Term
         after, cost = without_offsets(held_out.problem, held_out.modelled.residual + moved, held_out.extra_power)
         gain += held_out.problem.likelihood(after, held_out.extra_power) - cost - held_out.log_likelihood \
             + held_out.offset_cost
-        fitted.append(x[:k])
+        estimates.append(x[:k])
         variances.append(variance[:k])
-    return FirstOrder(gain, fitted, variances)
+    return FirstOrder(gain, estimates, variances)
 
 
 def _in_the_replay(terms: Sequence[Term]) -> list[Term]:
@@ -92,7 +98,7 @@ def shows(data: Data, term: Term) -> bool:
 
     An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
     """
-    return any(np.abs(v).max(initial=0.0) > NOTHING for i in range(len(term.free))
+    return any(np.abs(v).max(initial=0.0) > LEAST_CHANGE for i in range(len(term.free))
                for flight in _change(data, term, i) for v in flight.values())
 
 

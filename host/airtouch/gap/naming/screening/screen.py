@@ -10,7 +10,7 @@ import numpy as np
 from airtouch.gap.evidence.judge import JudgedBlocks, judged_blocks
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
-from airtouch.gap.naming.records import Candidate, Charges, Strength
+from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.naming.screening.first_order import judge_means, judge_random, shows
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
@@ -31,7 +31,7 @@ class RoundStart:
     """What a round begins from: its base, None for no effect, and each half as judged under the fit to the other."""
 
     trial: Trial
-    base: Candidate | None
+    base: Hypothesis | None
     halves: Sequence[JudgedBlocks]
 
     @property
@@ -58,12 +58,12 @@ class Screened:
     `screen_random`; fit_only: those that only a fit can judge.
     """
 
-    means: list[Candidate] = field(default_factory=list)
+    means: list[Hypothesis] = field(default_factory=list)
     random: list[PricedVariant] = field(default_factory=list)
     fit_only: list[PricedVariant] = field(default_factory=list)
 
 
-def start_of(trial: Trial, base: Candidate | None) -> RoundStart:
+def start_of(trial: Trial, base: Hypothesis | None) -> RoundStart:
     """What a round begins from, each half judged under the fit to the other half."""
     fitted = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     halves = [judged_blocks(trial.data, blocks, fitted[1 - half]) for half, blocks in enumerate(trial.halves)]
@@ -107,7 +107,7 @@ def addable(name: str, variants: Sequence[Terms], base: Terms) -> list[PricedVar
             if identities.isdisjoint(t.identity for t in terms)]
 
 
-def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | None:
+def _screened_means(start: RoundStart, variant: PricedVariant) -> Hypothesis | None:
     """A variant of mean effects judged to first order; None where only the commands show them, which a fit judges."""
     if any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         return None
@@ -116,15 +116,15 @@ def _screened_means(start: RoundStart, variant: PricedVariant) -> Candidate | No
     return None if hopeless and _only_in_commands(start.trial, variant.terms) else judged
 
 
-def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Candidate:
+def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Hypothesis:
     """The hypothesis that adds mean effects, judged to first order, with the strength of the first of them."""
     terms, own, k = variant.terms, variant.terms[0], len(variant.terms[0].free)
     judged = judge_means(start.trial.data, start.halves, terms, start.terms)
     gain = judged.gain + (start.gain - price_of(terms) - variant.choice_cost)
-    of_halves = np.array(judged.fitted)[:, :k]
+    of_halves = np.array(judged.estimates)[:, :k]
     strength = Strength(own.among_all(of_halves.mean(axis=0)),
                         covariance_among_all(own, np.diag(_variance_of_mean(of_halves, judged.variances, k))))
-    return Candidate(variant.name, (*start.terms, *terms), gain, full=False,
+    return Hypothesis(variant.name, (*start.terms, *terms), gain, full=False,
                      charges=start.charges.with_effect(variant.choice_cost), strength=strength)
 
 
@@ -144,8 +144,8 @@ def _only_in_commands(trial: Trial, terms: Terms) -> bool:
         and not np.allclose(loop.ratio(one_step_off), 1.0)
 
 
-def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Candidate], every_random: bool,
-                  ) -> tuple[list[Candidate], list[PricedVariant]]:
+def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: Sequence[Hypothesis], every_random: bool,
+                  ) -> tuple[list[Hypothesis], list[PricedVariant]]:
     """Variants with a random term: of candidates that promise little as hypotheses, of others those to be fitted.
 
     A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it.
@@ -173,12 +173,12 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
     return unpromising, to_fit
 
 
-def _about_as_good(means: Sequence[Candidate], length: int) -> dict[str, list[Candidate]]:
+def _about_as_good(means: Sequence[Hypothesis], length: int) -> dict[str, list[Hypothesis]]:
     """By name, the best hypothesis of so many terms, and those of the same effect about as good (ABOUT_AS_GOOD).
 
     means: best first.
     """
-    out: dict[str, list[Candidate]] = {}
+    out: dict[str, list[Hypothesis]] = {}
     for mean in means:
         if len(mean.terms) == length:
             best = out.setdefault(mean.name, [])
@@ -217,11 +217,11 @@ def _variants_to_fit(best: PricedVariant, variants: Sequence[PricedVariant], goo
     return [v for v in variants if not good_means or any(_same(v.terms[0], mean) for mean in good_means)]
 
 
-def _hypothesis_of(start: RoundStart, screened: ScreenedRandom) -> Candidate:
+def _hypothesis_of(start: RoundStart, screened: ScreenedRandom) -> Hypothesis:
     """A screened random effect as a hypothesis, which gains nothing at most, as it is not fitted."""
     name, terms, cost = screened.variant
     strength = Strength(strength_term(terms).among_all(screened.strength))
-    return Candidate(name, (*start.terms, *terms), start.gain + min(screened.gain, 0.0), full=False,
+    return Hypothesis(name, (*start.terms, *terms), start.gain + min(screened.gain, 0.0), full=False,
                      charges=start.charges.with_effect(cost), strength=strength)
 
 
