@@ -14,6 +14,7 @@ from airtouch.logs.segments import KINDS
 
 DRAWS = 400  #: bootstrap samples of each phase: 20 lie beyond each end of a 90 % interval; chosen
 LEAST_FLIGHTS = 5  #: flights from which on the bootstrap draws flights; of fewer it draws blocks; chosen
+LEAST_SCATTER = 2  #: flights between which there is a scatter
 LEAST_SECONDS = 0.3  #: seconds that a cell needs; one with less is left out; chosen
 INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
 #: degrees of freedom of a block at most, as blocks differ by more than chance; chosen. With it the intervals hold the
@@ -131,8 +132,9 @@ def floors_of(nominal: Sums, sensor: np.ndarray) -> Floors:
         table = table_of(spread, phase, seed=FLOOR_SEED) if spread is not None else None
         if table is None:
             continue
-        whole = table.rms[:1], table.high[:1]  # of the phase, for regimes in which no nominal flight was
-        enough = (table.seconds >= LEAST_SECONDS)[:, None, None]
+        whole = table.rms[:1], table.high[:1]  # of the phase, for regimes in which too few nominal flights were
+        enough = np.repeat((table.seconds >= LEAST_SECONDS)[:, None, None], len(MAP_BANDS_HZ), axis=1)
+        enough[:, 0, 0] &= _long_flights(source, phase) >= LEAST_SCATTER
         own = table.rms, table.high
         level, top = (np.where(enough, *pair) for pair in zip(own, whole, strict=True))
         level, top = (np.where(np.isfinite(v), v, least) for v in (level, top))
@@ -169,7 +171,8 @@ def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
 def _without_common(nominal: Sums, phase: int) -> Sums | None:
     """The sums of one phase of the baseline without the mean that all its flights share in the lowest band.
 
-    None where no flight has the phase. The variance is unbiased: over one flight less than have the phase.
+    None where no flight has the phase. The mean is that of each regime, and the variance is unbiased: over one flight
+    less than have the regime. Of a regime that one flight has, nothing is left but what varies within that flight.
     """
     rows = nominal.phase == phase
     if not rows.any():
@@ -178,6 +181,16 @@ def _without_common(nominal: Sums, phase: int) -> Sums | None:
     total = np.maximum(weight.sum(axis=0), 1.0)[:, None]
     common = mean.sum(axis=0) / total
     spread = power[:, :, 0] - 2.0 * common * mean + weight[:, :, None] * common ** 2
-    count = len(np.unique(nominal.flight[rows]))
-    power[:, :, 0] = np.maximum(spread, 0.0) * (count / (count - 1.0) if count > 1 else 1.0)
+    count = _long_flights(nominal, phase)
+    unbiased = np.where(count > 1, count / np.maximum(count - 1.0, 1.0), 1.0)
+    power[:, :, 0] = np.maximum(spread, 0.0) * unbiased[:, None]
     return Sums(nominal.phase[rows], nominal.flight[rows], weight, power, mean - weight[:, :, None] * common)
+
+
+def _long_flights(sums: Sums, phase: int) -> np.ndarray:
+    """Number (regimes,) of flights with LEAST_SECONDS or more of each regime in a phase."""
+    rows = sums.phase == phase
+    flights, row = np.unique(sums.flight[rows], return_inverse=True)
+    weight = np.zeros((len(flights), len(REGIMES)))
+    np.add.at(weight, row.ravel(), sums.weight[rows])
+    return (weight >= LEAST_SECONDS / PERIOD_S).sum(axis=0)
