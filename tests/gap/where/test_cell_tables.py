@@ -41,8 +41,8 @@ def test_rms_is_the_mean_weighted_by_samples():
     for band in range(1, len(MAP_BANDS_HZ)):
         squares = sums.power[:, 0, band, 0] / sums.weight[:, 0]
         assert table.rms[0, band, 0] == pytest.approx(np.sqrt(np.average(squares, weights=sums.weight[:, 0])))
-    assert table.seconds[0] == pytest.approx(0.01 * 200 * scale.sum()) and table.seconds[1] == 0
-    assert table.flights[0] == 3 and table.blocks[0] == 15
+    assert table.seconds[0] == pytest.approx(0.01 * 200 * scale.sum()) and not table.seconds[1].any()
+    assert (table.flights[0] == 3).all() and (table.blocks[0] == 15).all()
 
 
 @pytest.mark.parametrize(("flights", "blocks"), [(1, 12), (8, 4)])
