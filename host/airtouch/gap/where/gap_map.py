@@ -174,7 +174,7 @@ def visible(phase: int, baseline: bool) -> np.ndarray:
     """Mask (bands, COUNT) of the cells that mean something in a phase, a place in KINDS.
 
     Rates hold turns that were flown, so in the air they are only held against baseline flights;
-    commands are judged in all bands but the lowest and the highest (0.6 to 30 Hz).
+    commands are judged in all bands but the lowest and the highest (0.5 to 25 Hz).
     """
     at_rest = phase == GROUND
     out = np.ones((len(MAP_BANDS_HZ), COUNT), bool)
