@@ -168,7 +168,7 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, f
     channels = (("force_z", "m/s^2"), *((f"torque_{a}", "rad/s^2") for a in "xyz"))
     cells = [Cell(c, BAND_HZ, "hover", float(abs(gap[i]) * unit[i]), float(floor[i] * unit[i]), u,
                   flights=flights, after=float(abs(after[i]) * unit[i])) for i, (c, u) in enumerate(channels)]
-    return tuple(sorted(cells, key=lambda c: -c.gap / c.floor))
+    return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
 def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
+from airtouch.gap.result import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
@@ -25,7 +25,6 @@ from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
-from airtouch.gap.where.summary import SMALLEST_FLOOR
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
