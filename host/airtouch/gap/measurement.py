@@ -19,7 +19,7 @@ from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell_words import in_words
-from airtouch.gap.where.command_power import CommandPower, MeanSpectra, command_power, mean_spectra
+from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import FlightLog
@@ -86,7 +86,7 @@ class MeasuredFlight:
     """
 
     parts: tuple[Part, ...]
-    power: CommandPower
+    power: SummedPower
     speeds: np.ndarray | None
     notes: tuple[str, ...]
     cannot: tuple[str, ...]

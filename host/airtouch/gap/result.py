@@ -114,6 +114,9 @@ class RankedCandidate:
         return {"name": self.name, "probability": self.probability, "shrink": shrink, **more}
 
 
+SMALLEST_FLOOR = 1e-12  #: least floor that a gap is divided by, in a channel's unit; far below any measured
+
+
 @dataclass(frozen=True)
 class Cell:
     """One cell of the gap map: rms in a channel, band and phase, beside the floor.
@@ -136,6 +139,21 @@ class Cell:
     after: float | None = None  #: the same cell with the named effects in the model
     floor_high: float | None = None  #: upper end of the floor's interval
     by: str | None = None  #: of the named effects the one that alone takes most from it
+
+    @property
+    def ratio(self) -> float:
+        """The gap over the floor, which is SMALLEST_FLOOR at least."""
+        return self.gap / max(self.floor, SMALLEST_FLOOR)
+
+    @property
+    def ratio_after(self) -> float:
+        """The same with the named effects in the model; without them where none was tried."""
+        return (self.gap if self.after is None else self.after) / max(self.floor, SMALLEST_FLOOR)
+
+    @property
+    def upper_floor(self) -> float:
+        """The upper end of the floor's interval, the floor where it has none; SMALLEST_FLOOR at least."""
+        return max(self.floor if self.floor_high is None else self.floor_high, SMALLEST_FLOOR)
 
 
 BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"

@@ -11,7 +11,7 @@ from airtouch.gap.answer.words import format_of, leading, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
-from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, ratio, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, short
 from airtouch.report.columns import WithInterval
 
 
@@ -87,11 +87,11 @@ def capital(text: str) -> str:
 
 def heat_map_cell(cell: Cell) -> dict[str, str]:
     """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
-    times, significant = ratio(cell), summary.significant(cell)
+    times, significant = cell.ratio, summary.significant(cell)
     shade = next(s for s in SHADES if times >= s.least) if significant else AT_FLOOR
     title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, floor {short(cell.floor)} {cell.unit}, "
              f"{cell.blocks} blocks of {cell.flights} flights")
-    after = "" if cell.after is None or not significant else f"{short(summary.ratio_after(cell))}×"
+    after = "" if cell.after is None or not significant else f"{short(cell.ratio_after)}×"
     return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": shade.background,
             "ink": shade.ink, "title": title, "after": after}
 
@@ -100,7 +100,7 @@ def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[di
     """Rows of the largest cells, in their units, with the effect that takes most from each beside its unit."""
     return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": short(c.gap),
              "interval": interval(c), "after": "-" if c.after is None else short(c.after), "floor": short(c.floor),
-             "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(ratio(c))} for c in cells]
+             "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(c.ratio)} for c in cells]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:

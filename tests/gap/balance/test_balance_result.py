@@ -1,5 +1,6 @@
 """The answer of a hover's balance from probabilities of known size: a weight has two names, other names compete."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 
 from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
+from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
 from airtouch.gap.result import Closure, Quantity
+from gap_flights import VEHICLE, flight, noise
 
 
 def test_the_hypotheses_of_a_name_count_together():
@@ -30,14 +33,14 @@ def test_a_weight_on_the_vehicle_and_off_centre_count_as_one(total, answer):
 
 def test_the_other_name_of_a_weight_is_counted_with_the_answer():
     closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("none", "mass", "com_offset")}
-    ranking = balance_result._ranking("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, closures)
+    ranking = balance_result.ranking_of("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, closures)
     assert [(r.name, round(r.probability, 6)) for r in ranking] == [("mass", 0.8), ("none", 0.2), ("com_offset", 0.0)]
     assert ranking[2].why.startswith("counted with mass") and ranking[1].why == "4 times less probable than mass"
 
 
 def test_a_weight_whose_probability_underflows_is_not_counted_with_another_effect():
     closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("slung_load", "mass")}
-    ranking = balance_result._ranking("slung_load", {"slung_load": 1.0, "mass": 0.0}, closures)
+    ranking = balance_result.ranking_of("slung_load", {"slung_load": 1.0, "mass": 0.0}, closures)
     assert ranking[1].why.endswith("times less probable than slung_load")
 
 
@@ -50,5 +53,34 @@ def test_names_of_half_the_probability_fit_alike():
 def test_the_wrong_effect_of_the_control_is_improbable():
     closures = {n: Closure(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
     total = {"com_offset": 0.2, "slung_load": 0.05, "mass": 0.7, "weak_motor": 0.05}
-    assert balance_result._control(total, "mass", closures).name == "slung_load"
-    assert balance_result._control({"mass": 0.8, "com_offset": 0.2}, "mass", closures) is None
+    assert balance_result.control_of(total, "mass", closures).name == "slung_load"
+    assert balance_result.control_of({"mass": 0.8, "com_offset": 0.2}, "mass", closures) is None
+
+
+def hovering(seed, lift=1.0):
+    """A hover without a gyro whose rotors all give `lift` times the thrust at a command of 40000."""
+    made = flight(20.0, noise(20.0, 0.1, seed), name=str(seed))
+    commands = np.linspace(0.0, 65535.0, 3000)
+    level = np.interp(lift * VEHICLE.thrust(np.array([40000.0]))[0], VEHICLE.thrust(commands), commands)
+    return replace(made, rates=None, pwm=level + np.random.default_rng(seed).normal(0.0, 300.0, made.pwm.shape))
+
+
+@pytest.mark.parametrize(("left_out", "named"), [((), True), (("com_offset",), True), (("mass",), False)])
+def test_a_centred_weight_is_named_unless_it_is_left_out_itself(left_out, named):
+    """15 % more lift: with the shift of the centre left out, a weight that shifts none is still a candidate."""
+    nominal = [hovering(seed) for seed in (1, 2, 3)]
+    result = balance_result.diagnosis([hovering(4, 1.15)], nominal, VEHICLE, without=left_out)
+    assert not {r.name for r in result.ranking} & set(left_out)
+    mass = [e.parameters["fraction"] for e in result.effects if e.name == "mass"]
+    assert bool(mass) == named
+    if named:
+        assert [e.name for e in result.effects] == ["mass"] and mass[0].low < 0.15 < mass[0].high
+
+
+def test_without_the_shift_of_the_centre_a_weight_loads_all_rotors_alike():
+    """By hand: all four give as much more as the weight adds, so that only the lift changes."""
+    weight = next(h for h in hypotheses(VEHICLE, without=["com_offset"]) if h.name == "mass")
+    (name, drawn), = weight.effects
+    thrust = np.repeat(1.0 + drawn["fraction"][:, None], 4, axis=1)
+    assert name == "mass"
+    np.testing.assert_allclose(weight.change, commanded_change(thrust), atol=1e-12)

@@ -36,11 +36,14 @@ def test_the_lift_at_one_volt_is_that_at_the_voltage_flown_times_its_power():
     np.testing.assert_allclose(at_one - as_flown, [1.2 * np.log(VOLTAGE_V), 0.0, 0.0, 0.0], atol=1e-9)
 
 
-def test_corrections_are_the_steps_of_the_velocity_that_no_acceleration_makes():
-    still = np.zeros((round(100 * SECONDS), 3))
+@pytest.mark.parametrize("lost", [0, 40])
+def test_corrections_are_the_steps_of_the_velocity_that_no_acceleration_makes(lost):
+    """At 1 g, of which the specific force of a hover is; rows without a velocity say nothing."""
+    hovering = np.tile([0.0, 0.0, 9.81], (round(100 * SECONDS), 1))
     velocity = noise(SECONDS, 0.01, 3)
-    hover = replace(noisy(**dict(zip(VELOCITY, velocity.T, strict=True))), acceleration=still)
-    with np.errstate(divide="ignore"):  # heave of no acceleration
+    velocity[np.random.default_rng(4).choice(len(velocity), lost, replace=False)] = np.nan
+    hover = replace(noisy(**dict(zip(VELOCITY, velocity.T, strict=True))), acceleration=hovering)
+    with np.errstate(divide="ignore"):  # heave of a constant acceleration
         corrections = hover_pattern(hover, VEHICLE).corrections
     np.testing.assert_allclose(10.0 ** corrections, [4e-4, 2e-4], rtol=0.15)  # two and one axis, twice the variance
     assert hover_pattern(noisy(), VEHICLE).corrections.tolist() == [LEAST_POWER, LEAST_POWER], "no velocity"

@@ -1,5 +1,7 @@
 """The gap map against closed forms: noise, offsets, tones and short phases of known size."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -82,14 +84,53 @@ def test_a_phase_shorter_than_a_block_keeps_what_is_in_it():
     assert cell(gap_map, "force_z", 4, "take-off").blocks == 1
 
 
-@pytest.mark.parametrize(("phase", "baseline", "no_gyro", "channel", "bands"), [
-    (HOVER, False, False, "force_x", [0, 1, 2, 3, 4, 5]), (HOVER, False, True, "torque_x", [0]),
-    (GROUND, False, True, "torque_x", []), (HOVER, False, False, "rate_x", []), (HOVER, True, False, "rate_x", [0]),
-    (GROUND, False, False, "rate_x", [0]), (HOVER, True, False, "command_roll", [1, 2, 3, 4]),
-    (GROUND, True, False, "command_roll", [])])
-def test_a_cell_is_shown_where_it_means_something(phase, baseline, no_gyro, channel, bands):
-    shown = maps.visible(phase, baseline, no_gyro)[:, [c.name for c in CHANNELS].index(channel)]
+@pytest.mark.parametrize(("phase", "baseline", "channel", "bands"), [
+    (HOVER, False, "force_x", [0, 1, 2, 3, 4, 5]), (HOVER, False, "rate_x", []), (HOVER, True, "rate_x", [0]),
+    (GROUND, False, "rate_x", [0]), (HOVER, True, "command_roll", [1, 2, 3, 4]), (GROUND, True, "command_roll", [])])
+def test_a_cell_is_shown_where_it_means_something(phase, baseline, channel, bands):
+    shown = maps.visible(phase, baseline)[:, [c.name for c in CHANNELS].index(channel)]
     assert np.flatnonzero(shown).tolist() == bands
+
+
+def turning(seed, gyro=True, rms=0.01, resting_s=2.0):
+    """Seconds of hover whose rates are white noise, and whose log has a gyro or not; on the ground before."""
+    made = flight(20.0, noise(20.0, 0.06, seed), noise(20.0, rms, seed + 100), name=str(seed), resting_s=resting_s)
+    return made if gyro else replace(made, rates=None)
+
+
+def turning_rms(*seeds, first=200, rms=0.01):
+    """Rms of the differences (rad/s^2) of the rates about x that `turning` draws, from a sample on."""
+    rates = np.array([noise(20.0, rms, seed + 100)[first:, 0] for seed in seeds])
+    return np.sqrt(np.mean(np.diff(rates, axis=1) ** 2)) / 0.01
+
+
+def test_without_a_gyro_torque_is_known_in_the_air_at_low_frequency_only():
+    shown = {(c.phase, c.band_hz) for c in maps.gap_map(study(), [turning(1, gyro=False)]).cells
+             if c.channel.startswith("torque")}
+    assert shown == {("hover", MAP_BANDS_HZ[0])}
+
+
+def test_a_flight_without_a_gyro_takes_no_part_in_the_mean_of_torque():
+    """Half of two flights: the cells are those of the flight that has it, in the gap as in the floor."""
+    flown, nominal = [turning(1), turning(2, gyro=False)], [turning(3), turning(4, gyro=False), turning(5)]
+    cells = maps.gap_map(study(), flown, nominal)
+    for phase in ("hover", "ground"):
+        torque = [cell(cells, "torque_x", b, phase) for b in range(1 if phase == "hover" else 0, 6)]
+        assert {c.flights for c in torque} == {1} and cell(cells, "force_x", 5, phase).flights == 2
+    hover = [cell(cells, "torque_x", b) for b in range(1, 6)]
+    assert np.sqrt(sum(c.gap ** 2 for c in hover)) == pytest.approx(turning_rms(1), rel=0.02)
+    assert np.sqrt(sum(c.floor ** 2 for c in hover)) == pytest.approx(turning_rms(3, 5), rel=0.02)
+    assert all(c.low < c.gap < c.high for c in hover)
+
+
+def test_the_floor_of_rates_is_what_nominal_flights_with_a_gyro_scatter_by():
+    """Offsets of -0.3 and 0.3 rad/s; a third flight without a gyro leaves their standard deviation as it is."""
+    nominal = [flight(20.0, gyro=o, name=str(o)) for o in (-0.3, 0.3)]
+    nominal.append(replace(flight(20.0), rates=None))
+    rate = cell(maps.gap_map(study(), [flight(20.0)], nominal), "rate_x", 0)
+    assert rate.floor == pytest.approx(np.std([-0.3, 0.3], ddof=1))
+    spread = maps.gap_map(study(), [flight(20.0, force=o, name=str(o)) for o in (0.0, 1.0)], [nominal[-1]])
+    assert not [c for c in spread.cells if c.channel == "rate_x"], "no nominal flight to hold it against"
 
 
 def test_lost_samples_do_not_count():

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.result import BASELINE, Cell, GapMap, NamedEffect
@@ -62,3 +64,19 @@ def test_cells_of_the_ground_that_got_worse_are_counted_in_its_phase():
              cell("force_y", "ground", 2.6, after=8.8)]
     ground = next(p for p in summary.phases(cells) if p.name == "ground")
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
+
+
+@pytest.mark.parametrize(("gap", "after"), [(1.0, 0.5), (1.0, 5e-13), (5e-13, 5e-13), (0.0, None)])
+@pytest.mark.parametrize("high", [0.0, None])
+def test_a_floor_of_0_is_the_smallest_one_in_all_that_is_said(gap, after, high):
+    """Every figure of a cell is that of the same cell with a floor of 1e-12, of its unit."""
+    none = replace(cell("force_z", "hover", gap, 0.0, after=after), floor_high=high)
+    least = replace(none, floor=1e-12, floor_high=1e-12 if high == 0.0 else None)
+    for figure in (summary.over_floor, summary.sure_ratio, summary.significant, summary.stays, summary.energy,
+                   summary.removed, summary.closes, lambda c: summary.overall([c]), lambda c: summary.phases([c])):
+        assert figure(none) == figure(least)
+
+
+def test_the_upper_end_of_a_floor_may_be_0():
+    """An interval that ends at 0 is one, and not an end that is not known."""
+    assert summary.stands_out(replace(cell("force_z", "hover", 0.1, 0.2), floor_high=0.0))

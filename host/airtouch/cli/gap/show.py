@@ -11,7 +11,7 @@ from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
-from airtouch.gap.where.cell_words import interval, ratio, short
+from airtouch.gap.where.cell_words import interval, short
 
 MOST_CELLS = 16  #: rows of a table of cells, largest first; no source: fits a terminal
 #: column of a table of cells -> (text of a cell, columns of the narrowest terminal that shows it)
@@ -24,7 +24,7 @@ CELL_COLUMNS: dict[str, tuple[Callable[[Cell], str], int]] = {
     "interval": (interval, 125),
     "unit": (lambda c: c.unit, 100),
     "floor": (lambda c: short(c.floor), 100),
-    "gap/floor": (lambda c: short(ratio(c)), 0),
+    "gap/floor": (lambda c: short(c.ratio), 0),
     "after": (lambda c: "" if c.after is None else short(c.after), 0),
 }
 NUMBERS = ("gap", "floor", "gap/floor", "after")

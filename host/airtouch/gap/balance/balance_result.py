@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
-from airtouch.gap.balance.hover_hypotheses import Hypothesis, hypotheses
+from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
 from airtouch.gap.balance.hover_posterior import (
     HIGH,
@@ -72,7 +72,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     pattern = mean_pattern([hover_pattern(f, vehicle, voltage) for f in flights])
     gap = base.difference(pattern)[BALANCE]
 
-    candidates = _candidates(vehicle, without)
+    candidates = hypotheses(vehicle, without=set(without))
     judged = evidence(pattern, base, candidates)
     probability_of = probabilities(judged, candidates)
     first, probability = answer_of(probability_of)
@@ -85,10 +85,10 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(_ranking(first, probability_of, closures)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None,
-        control=_control(probability_of, first, closures) if verdict == "effect" else None,
+        control=control_of(probability_of, first, closures) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
@@ -96,12 +96,6 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
         if pictures else None)
     return replace(answer, next=next_steps(answer, flights, vehicle))
-
-
-def _candidates(vehicle: Vehicle, without: Iterable[str]) -> list[Hypothesis]:
-    """The hypotheses in which none of the names `without` is."""
-    left_out = set(without)
-    return [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
 
 
 def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
@@ -131,14 +125,14 @@ def _gap(verdict: str, closure: Closure) -> OverallGap:
     return {"before": closure.before, "floor": 1.0, "after": closure.after if verdict == "effect" else closure.before}
 
 
-def _control(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
+def control_of(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
     """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
     wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, closures[wrong])
 
 
-def _ranking(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-             ) -> list[RankedCandidate]:
+def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
+               ) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
     together = _weights_together(first, probability_of)
     best = max(together.values())
@@ -174,7 +168,7 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, f
     channels = (("force_z", "m/s^2"), *((f"torque_{a}", "rad/s^2") for a in "xyz"))
     cells = [Cell(c, BAND_HZ, "hover", float(abs(gap[i]) * unit[i]), float(floor[i] * unit[i]), u,
                   flights=flights, after=float(abs(after[i]) * unit[i])) for i, (c, u) in enumerate(channels)]
-    return tuple(sorted(cells, key=lambda c: -c.gap / c.floor))
+    return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
 def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:

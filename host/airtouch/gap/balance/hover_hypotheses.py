@@ -5,7 +5,8 @@ yaw alike. A weight raises the lift and, off centre, moves commands between oppo
 leaves yaw as it is.
 """
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,20 @@ class Samples:
     half_side: float
 
 
-def hypotheses(vehicle: Vehicle, priors: Priors = PRIORS) -> list[Hypothesis]:
-    """No effect, one or two weak rotors, a weight at its place, a weight on a thread, something else."""
+def hypotheses(vehicle: Vehicle, priors: Priors = PRIORS, without: Collection[str] = ()) -> list[Hypothesis]:
+    """No effect, one or two weak rotors, a weight at its place, a weight on a thread, something else.
+
+    without: names that are no candidates. Without com_offset a weight on board stays one, at the centre of mass.
+    """
     samples = samples_of(vehicle, priors)
-    return [*no_effect(), *weak_rotors(samples, priors), weight_on_board(samples, priors),
-            weight_on_thread(samples, priors, vehicle.mass_kg), moved_centre(samples, priors), nameless_change(priors)]
+    weight = weight_on_board(samples, priors)
+    if "com_offset" in without:
+        centred = weight_on_board(replace(samples, x=np.zeros(SAMPLES), y=np.zeros(SAMPLES)), priors)
+        weight = replace(centred, effects=centred.effects[:1])
+    candidates = [*no_effect(), *weak_rotors(samples, priors), weight,
+                  weight_on_thread(samples, priors, vehicle.mass_kg), moved_centre(samples, priors),
+                  nameless_change(priors)]
+    return [h for h in candidates if h.name not in without]
 
 
 def samples_of(vehicle: Vehicle, priors: Priors) -> Samples:

@@ -113,13 +113,18 @@ def _mixed_thrust(flight: Flight, vehicle: Vehicle, at_one_volt: bool) -> np.nda
 
 
 def _stretch(mixed: np.ndarray, upwards: np.ndarray, corrections: np.ndarray) -> _Stretch:
-    """One hover, from mixed thrust (n, 4), vertical acceleration (n,) and corrections of the velocity (n - 1, 3)."""
+    """One hover, from mixed thrust (n, 4), vertical acceleration (n,) and corrections of the velocity (n - 1, 3).
+
+    A hover of whose velocity no two rows in succession are known has no correction, as one without velocity.
+    """
     from scipy.signal import welch  # slow to import, and seldom needed
 
     f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES, axis=0)
     f, of_heave = welch(upwards, 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES)
     heave = float(np.log10(of_heave[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
-    return _Stretch(len(mixed), mixed.mean(axis=0), _unsteadiness(f, of_commands), heave, corrections.var(axis=0))
+    known = corrections[np.isfinite(corrections).all(axis=1)]
+    variance = known.var(axis=0) if len(known) else np.zeros(3)
+    return _Stretch(len(mixed), mixed.mean(axis=0), _unsteadiness(f, of_commands), heave, variance)
 
 
 def _unsteadiness(f: np.ndarray, power: np.ndarray) -> float:
@@ -130,9 +135,12 @@ def _unsteadiness(f: np.ndarray, power: np.ndarray) -> float:
 
 
 def _corrections(flight: Flight) -> np.ndarray:
-    """What the estimated velocity changes from row to row beyond the acceleration, m/s (n - 1, 3); else zeros."""
+    """What the estimated velocity changes from row to row beyond the acceleration, m/s (n - 1, 3).
+
+    Each has the same share of gravity. NaN beside a row in which a velocity was lost; zeros where the log has none.
+    """
     if not all(flight.log.has(name) for name in VELOCITY):
         return np.zeros((len(flight) - 1, 3))
     velocity = np.column_stack([flight.log[name] for name in VELOCITY])
     world = np.einsum("nij,nj->ni", flight.body_to_world, flight.acceleration)
-    return np.nan_to_num(np.diff(velocity, axis=0) - 0.5 * PERIOD_S * (world[1:] + world[:-1]))
+    return np.diff(velocity, axis=0) - 0.5 * PERIOD_S * (world[1:] + world[:-1])

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.edges.edge_response import AFTER, BEFORE, COUNT, KINDS, EdgeFloor, edges_of, response
+from airtouch.gap.edges.edge_response import AFTER, BEFORE, COUNT, KINDS, EdgeFloor, edges_of, logged, response
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.signatures.candidates import terms
@@ -71,9 +71,9 @@ def response_per_step(floor: EdgeFloor, flight: Flight, effect: str, parameter: 
         stepped = {**neutral, parameter: neutral[parameter] + step}
         base = _simulated_responses(floor, crossing, ())
         with_effect = _simulated_responses(floor, crossing, (Active(term.effect, stepped),))
-        return {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k]) for k in KINDS}
+        return {k: floor.whiten(with_effect[k] - base[k], flight.log, k) for k in KINDS}
 
-    return floor.workspace.cached("templates", (effect, parameter, crossing), make)
+    return floor.workspace.cached("templates", (effect, parameter, crossing, logged(flight.log).tobytes()), make)
 
 
 def crossing_of(flight: Flight) -> Crossing:

@@ -1,9 +1,10 @@
 """What a flight does in the second after an edge passes under it: thrust, speed along its path, height.
 
-Nominal flights give the mean response and its scatter, by which a response is whitened.
+Nominal flights give the mean response and its scatter, by which a response is whitened. A response has COUNT numbers;
+those of a signal that a log has not are NaN, and 0 once it is whitened.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,16 +39,32 @@ RIDGE, LEAST_VARIANCE = 1e-12, 1e-9
 class EdgeFloor:
     """What nominal flights do at edges, and its scatter.
 
-    nominal: mean response (COUNT,) by kind, from `counts` edges each; whiten (COUNT, COUNT): turns a deviation from it
-    into independent standard normal numbers.
+    nominal: mean response (COUNT,) by kind, from `counts` edges each; covariance (COUNT, COUNT): of a response. Both
+    NaN in the numbers of a signal that one of the nominal flights does not log.
     """
 
     vehicle: Vehicle
     calibration: tuple[Active, ...]
     nominal: dict[str, np.ndarray]
     counts: dict[str, int]
-    whiten: np.ndarray
+    covariance: np.ndarray
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
+
+    def whiten(self, deviation: np.ndarray, log: FlightLog, kind: str) -> np.ndarray:
+        """A deviation (COUNT,) from the nominal response as independent standard normal numbers.
+
+        0 in the numbers that the log or one of the nominal flights does not have, of which the others know nothing.
+        """
+        known = logged(log) & np.isfinite(np.diag(self.covariance))
+
+        def make() -> np.ndarray:
+            """The inverse Cholesky factor of the covariance of the known numbers."""
+            return np.linalg.inv(np.linalg.cholesky(self.covariance[np.ix_(known, known)]))
+
+        out = np.zeros(COUNT)
+        out[known] = (self.workspace.cached("whiten", known.tobytes(), make) @ deviation[known]
+                      / np.sqrt(1.0 + 1.0 / self.counts[kind]))
+        return out
 
 
 def edges_of(flight: Flight) -> list[Edge]:
@@ -61,7 +78,10 @@ def edges_of(flight: Flight) -> list[Edge]:
 
 
 def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
-    """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
+    """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,).
+
+    NaN in numbers that the log does not have.
+    """
     window = slice(at - BEFORE, at + AFTER)
     thrust, speed, height = _thrust(log, vehicle, window), _speed(log, window), _height(log, window)
     out = []
@@ -72,26 +92,32 @@ def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
     return np.concatenate(out)
 
 
+def logged(log: FlightLog) -> np.ndarray:
+    """Which numbers (COUNT,) of a response a log has."""
+    height = log.has(POSITION[2]) or log.has("zrange_m")
+    return np.repeat([True, log.has(*VELOCITY[:2]), height], [n for _, n in BINS])
+
+
 def _thrust(log: FlightLog, vehicle: Vehicle, window: slice) -> np.ndarray:
     """Commanded thrust, N per motor."""
     return vehicle.thrust(interpolate_missing(log.stack(PWM)[window])).mean(axis=1)
 
 
 def _speed(log: FlightLog, window: slice) -> np.ndarray:
-    """Speed along the path before the edge, m/s; 0 where the log has none."""
+    """Speed along the path before the edge, m/s; NaN where the log has none."""
     if not log.has(*VELOCITY[:2]):
-        return np.zeros(BEFORE + AFTER)
+        return np.full(BEFORE + AFTER, np.nan)
     speed = interpolate_missing(log.stack(VELOCITY[:2])[window])
     heading = speed[:BEFORE].mean(axis=0)
     return speed @ (heading / max(float(np.hypot(*heading)), LEAST_MPS))
 
 
 def _height(log: FlightLog, window: slice) -> np.ndarray:
-    """Height, m: as logged, else the down range without its steps, else 0."""
+    """Height, m: as logged, else the down range without its steps, else NaN."""
     if log.has(POSITION[2]):
         return interpolate_missing(log[POSITION[2]][window])
     if not log.has("zrange_m"):
-        return np.zeros(BEFORE + AFTER)
+        return np.full(BEFORE + AFTER, np.nan)
     height = interpolate_missing(log["zrange_m"][window])
     step = np.diff(height, prepend=height[0])
     step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
@@ -109,9 +135,12 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
         without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges)]
     if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
         return None
-    covariance = _covariance(np.array(without_edge), responses)
+    known = np.isfinite(np.concatenate([without_edge, *responses.values()])).all(axis=0)
+    covariance = np.full((COUNT, COUNT), np.nan)
+    covariance[np.ix_(known, known)] = response_covariance(
+        np.compress(known, without_edge, axis=1), {k: np.compress(known, v, axis=1) for k, v in responses.items()})
     return EdgeFloor(vehicle, tuple(calibration), {k: np.mean(v, axis=0) for k, v in responses.items()},
-                     {k: len(v) for k, v in responses.items()}, np.linalg.inv(np.linalg.cholesky(covariance)))
+                     {k: len(v) for k, v in responses.items()}, covariance)
 
 
 def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
@@ -121,15 +150,15 @@ def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
             and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges)]
 
 
-def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]]) -> np.ndarray:
-    """Covariance (COUNT, COUNT) of a response: of stretches without an edge, and what edges scatter beyond them.
+def response_covariance(without_edge: np.ndarray, at_edges: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Covariance (k, k) of k numbers of a response: of stretches without an edge, and what edges scatter beyond them.
 
-    without_edge: responses (stretches, COUNT); at_edges: those of each kind of edge.
+    without_edge: responses (stretches, k); at_edges: those (edges, k) of each kind of edge.
     """
     spread = np.cov((without_edge - np.mean(without_edge, axis=0)).T)
     out = ((1.0 - SHRINKAGE) * spread + SHRINKAGE * np.diag(np.diag(spread))
-           + RIDGE * np.eye(COUNT) * max(np.trace(spread), LEAST_VARIANCE))
-    of_kinds = [np.array(v) - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1]
+           + RIDGE * np.eye(len(spread)) * max(np.trace(spread), LEAST_VARIANCE))
+    of_kinds = [v - np.mean(v, axis=0) for v in at_edges.values() if len(v) > 1]
     if of_kinds:
         deviations = np.concatenate(of_kinds)
         own = deviations.T @ deviations / max(sum(len(v) - 1 for v in at_edges.values()), 1)
@@ -140,4 +169,4 @@ def _covariance(without_edge: np.ndarray, at_edges: dict[str, list[np.ndarray]])
 def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
     """Response of one edge less the nominal one, whitened by its scatter, (COUNT,)."""
     raw = response(flight.log, floor.vehicle, edge.sample) - floor.nominal[edge.kind]
-    return floor.whiten @ raw / np.sqrt(1.0 + 1.0 / floor.counts[edge.kind])
+    return floor.whiten(raw, flight.log, edge.kind)

@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.missing import interpolate_over
-from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.channels import COUNT, TORQUE
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered
 from airtouch.gap.where.regimes import REGIMES, regimes
 from airtouch.vehicle import Vehicle
@@ -21,7 +21,8 @@ class Sums:
 
     phase (b,): place in `segments.KINDS`; flight (b,): number of the flight; weight (b, r):
     samples in each of REGIMES; power (b, r, bands, COUNT): sum of squares; mean
-    (b, r, COUNT): sum of the lowest band. NaN where a channel is missing.
+    (b, r, COUNT): sum of the lowest band. NaN where a channel is missing, as it may be in some of the flights: means
+    are over those that have it.
     """
 
     phase: np.ndarray
@@ -29,6 +30,11 @@ class Sums:
     weight: np.ndarray
     power: np.ndarray
     mean: np.ndarray
+
+    def of_phase(self, phase: int) -> "Sums":
+        """The rows of one phase."""
+        rows = self.phase == phase
+        return Sums(self.phase[rows], self.flight[rows], self.weight[rows], self.power[rows], self.mean[rows])
 
     def by_phase(self) -> "Sums":
         """One row for each phase of each flight."""
@@ -42,6 +48,25 @@ class Sums:
             return out
 
         return Sums(keys[:, 1], keys[:, 0], total(self.weight), total(self.power), total(self.mean))
+
+    def known_weight(self) -> np.ndarray:
+        """Samples (b, r, bands, COUNT) of each channel: the weight where it is known, else 0."""
+        return np.where(np.isfinite(self.power), self.weight[:, :, None, None], 0.0)
+
+    def mean_square(self) -> np.ndarray:
+        """Mean square (r, bands, COUNT) over the rows that have the channel; NaN where none has it."""
+        return _mean(self.power, self.known_weight())
+
+    def offset(self) -> np.ndarray:
+        """Mean (r, COUNT) of the lowest band over the rows that have the channel; NaN where none has it."""
+        return _mean(self.mean, self.known_weight()[:, :, 0])
+
+
+def _mean(sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Mean of values with these sums and weights, each (b, ...); 0 where the weight is 0, NaN where all are NaN."""
+    known = np.isfinite(sums)
+    total = np.where(known, sums, 0.0).sum(axis=0) / np.maximum(weight.sum(axis=0), 1.0)
+    return np.where(known.any(axis=0), total, np.nan)
 
 
 def join(parts: Sequence[Sums]) -> Sums:
@@ -63,6 +88,8 @@ def block_sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
         valid = ~flight.bridged[start:stop]
         values = interpolate_over(residual[start:stop], valid)
         bands = filtered(values)
+        if flight.rates is None:  # torque is known at low frequency only, and not at rest
+            bands[0 if flight.on_ground[start] else 1:, :, TORQUE] = np.nan
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
         for first, last in _blocks(flight.phase[start:stop]):
             here = slice(first, last)

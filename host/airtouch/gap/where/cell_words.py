@@ -13,7 +13,7 @@ PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "i
 
 def in_words(cell: Cell) -> str:
     """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
-    return f"{place_in_words(cell)}: {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
+    return f"{place_in_words(cell)}: {short(cell.gap)} {cell.unit}, {short(cell.ratio)} times the floor"
 
 
 def place_in_words(cell: Cell) -> str:
@@ -39,12 +39,12 @@ def short(value: float) -> str:
 
 def ratio(cell: Cell) -> float:
     """The cell's gap over its floor."""
-    return cell.gap / max(cell.floor, summary.SMALLEST_FLOOR)
+    return cell.ratio
 
 
 def change_in_words(cell: Cell) -> str:
     """The cell with what is left of it, as `at take-off in lift at 0-0.5 Hz (6.1 to 4 times the floor)`."""
-    before, after = short(ratio(cell)), short(summary.ratio_after(cell))
+    before, after = short(cell.ratio), short(cell.ratio_after)
     change = f"{before} to {after} times the floor" if after != before else f"{after} times the floor, as before"
     return f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} ({change})"
 

@@ -12,17 +12,17 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.vehicle import Vehicle
 
 
-class CommandPower(NamedTuple):
+class SummedPower(NamedTuple):
     """Power (bins, AXES) of the commands, N^2/Hz, summed over blocks, and the number of blocks."""
 
     total: np.ndarray
     blocks: int
 
 
-def command_power(flight: Flight, vehicle: Vehicle) -> CommandPower:
+def command_power(flight: Flight, vehicle: Vehicle) -> SummedPower:
     """The power of a flight's commands."""
     spectra = block_spectra(flight, vehicle)[1]
-    return CommandPower((np.abs(spectra) ** 2).sum(axis=0), len(spectra))
+    return SummedPower((np.abs(spectra) ** 2).sum(axis=0), len(spectra))
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class MeanSpectra:
                 **{axis: {"flown": power.tolist(), **of_nominal.get(axis, {})} for axis, power in self.flown.items()}}
 
 
-def mean_spectra(flown: Sequence[CommandPower], nominal: Sequence[CommandPower]) -> MeanSpectra | None:
+def mean_spectra(flown: Sequence[SummedPower], nominal: Sequence[SummedPower]) -> MeanSpectra | None:
     """Mean spectra of some flights and of nominal ones; None without a steady stretch in flight."""
     of_flown, of_nominal = _mean_by_axis(flown), _mean_by_axis(nominal)
     return MeanSpectra(command_frequencies(), of_flown, of_nominal) if of_flown else None
 
 
-def _mean_by_axis(powers: Sequence[CommandPower]) -> dict[str, np.ndarray]:
+def _mean_by_axis(powers: Sequence[SummedPower]) -> dict[str, np.ndarray]:
     """Mean power (bins,) over all blocks, by axis; empty without a block."""
     blocks = sum(p.blocks for p in powers)
     return dict(zip(AXES, (np.sum([p.total for p in powers], axis=0) / blocks).T, strict=True)) if blocks else {}

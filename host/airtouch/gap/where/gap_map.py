@@ -15,8 +15,8 @@ import numpy as np
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE
+from airtouch.gap.result import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
@@ -25,7 +25,6 @@ from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES
-from airtouch.gap.where.summary import SMALLEST_FLOOR
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause; chosen
@@ -38,7 +37,6 @@ class Part:
     name: str
     before: Sums
     after: Sums | None
-    has_gyro: bool
     alone: tuple[Sums, ...] = ()  #: sums with one of the effects in the model each, where there are several
 
 
@@ -86,7 +84,7 @@ def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     gap = study.residual(flight)
     after = _sums_with(study, flight, terms) if terms else None
-    return Part(flight.name, block_sums(flight, gap, study.vehicle), after, flight.rates is not None,
+    return Part(flight.name, block_sums(flight, gap, study.vehicle), after,
                 tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
@@ -99,12 +97,11 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     after = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
              else [after] if after is not None else [])
-    no_gyro = not any(p.has_gyro for p in parts)
     map_sums, cells = MapSums(joined, after, alone, effects), []
     for phase in range(len(KINDS)):
         tables = _phase_tables(phase, map_sums, phase_floor(floors, phase))
         if tables is not None:
-            cells += _cells(tables, visible(phase, bool(nominal), no_gyro))
+            cells += _cells(tables, visible(phase, bool(nominal)))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
 
 
@@ -137,13 +134,6 @@ def _random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> dict[s
     return out
 
 
-def _rms(of_sums: Sums, phase: int) -> np.ndarray:
-    """Root mean square (regimes, bands, COUNT) over one phase."""
-    rows = of_sums.phase == phase
-    samples = np.maximum(of_sums.weight[rows].sum(axis=0), 1.0)
-    return np.sqrt(of_sums.power[rows].sum(axis=0) / samples[:, None, None])
-
-
 def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
                  floor: np.ndarray) -> np.ndarray:
     """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
@@ -159,31 +149,31 @@ def _phase_tables(phase: int, of_map: MapSums, floor: tuple[np.ndarray, np.ndarr
     if table is None:
         return None
     table_after = table_of(of_map.after, phase, seed=phase) if of_map.after is not None else None
-    best = _best_effect([_rms(a, phase) for a in of_map.alone], of_map.effects, table.rms, floor[0]) \
-        if table_after else None
+    alone = [np.sqrt(a.of_phase(phase).mean_square()) for a in of_map.alone]
+    best = _best_effect(alone, of_map.effects, table.rms, floor[0]) if table_after else None
     return PhaseTables(KINDS[phase], table, table_after, *floor, best)
 
 
 def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
     """The cells of one phase; shown (bands, COUNT): those that mean something in it."""
     table, after, cells = phase.table, phase.after, []
-    long = table.seconds >= LEAST_SECONDS
-    for r, b, c in np.argwhere(long[:, None, None] & shown & np.isfinite(table.rms)):
+    known = (table.seconds >= LEAST_SECONDS) & np.isfinite(table.rms) & np.isfinite(phase.floor)
+    for r, b, c in np.argwhere(known & shown):
         cells.append(Cell(
             channel=CHANNELS[c].name, band_hz=MAP_BANDS_HZ[b], phase=phase.kind, gap=float(table.rms[r, b, c]),
             floor=float(phase.floor[r, b, c]), unit=CHANNELS[c].unit, low=float(table.low[r, b, c]),
-            high=float(table.high[r, b, c]), regime=REGIMES[r], blocks=int(table.blocks[r]),
-            flights=int(table.flights[r]), after=None if after is None else float(after.rms[r, b, c]),
+            high=float(table.high[r, b, c]), regime=REGIMES[r], blocks=int(table.blocks[r, b, c]),
+            flights=int(table.flights[r, b, c]), after=None if after is None else float(after.rms[r, b, c]),
             floor_high=float(phase.floor_high[r, b, c]),
             by=None if phase.best is None else phase.best[r, b, c] or None))
     return cells
 
 
-def visible(phase: int, baseline: bool, no_gyro: bool) -> np.ndarray:
+def visible(phase: int, baseline: bool) -> np.ndarray:
     """Mask (bands, COUNT) of the cells that mean something in a phase, a place in KINDS.
 
-    Rates hold turns that were flown, so in the air they are only held against baseline flights; without a gyro torque
-    is known at low frequency only; commands are judged in all bands but the lowest and the highest (0.6 to 30 Hz).
+    Rates hold turns that were flown, so in the air they are only held against baseline flights;
+    commands are judged in all bands but the lowest and the highest (0.5 to 25 Hz).
     """
     at_rest = phase == GROUND
     out = np.ones((len(MAP_BANDS_HZ), COUNT), bool)
@@ -192,8 +182,4 @@ def visible(phase: int, baseline: bool, no_gyro: bool) -> np.ndarray:
     out[0, COMMAND], out[-1, COMMAND] = False, False
     if at_rest:
         out[:, COMMAND] = False
-    if no_gyro:
-        out[1:, TORQUE] = False
-    if no_gyro and at_rest:
-        out[:, TORQUE] = False
     return out

@@ -18,14 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.result import Cell, GapMap
+from airtouch.gap.result import SMALLEST_FLOOR, Cell, GapMap
 from airtouch.logs.segments import KINDS
 
 GROUND_NAME = "ground"  #: a phase, of `segments.KINDS`
 MOST_SHOWN = 10  #: cells of a map that are listed as its largest; chosen
 MOST_REDUCED = 3  #: cells that are listed because the effects take most from them; chosen
 WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse; chosen
-SMALLEST_FLOOR = 1e-12  #: least floor that a gap is divided by, in a channel's unit; far below any measured
 HALF = 0.5  #: fraction of a cell's energy from which on the named effects close it; chosen
 
 
@@ -53,12 +52,7 @@ class Phase:
 
 def over_floor(cell: Cell, value: float | None = None) -> float:
     """The cell's gap, or another value in its unit, over the upper end of its floor."""
-    return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, SMALLEST_FLOOR)
-
-
-def ratio_after(cell: Cell) -> float:
-    """The cell's gap over its floor with the named effects in the model; the gap without them, where none was tried."""
-    return (cell.gap if cell.after is None else cell.after) / max(cell.floor, SMALLEST_FLOOR)
+    return (cell.gap if value is None else value) / cell.upper_floor
 
 
 def sure_ratio(cell: Cell) -> float:
@@ -85,7 +79,7 @@ def stays(cell: Cell) -> bool:
     if cell.after is None:
         return stands_out(cell)
     low = cell.after * (1.0 if cell.low is None else cell.low / max(cell.gap, SMALLEST_FLOOR))
-    return low > (cell.floor_high or cell.floor)
+    return low > cell.upper_floor
 
 
 def got_worse(cell: Cell) -> bool:
@@ -152,8 +146,8 @@ def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
         own = [c for c in cells if c.phase == kind and c.regime == "all"]
         if not own:
             continue
-        after = [c.after / max(c.floor, SMALLEST_FLOOR) for c in own if c.after is not None]
-        out.append(Phase(kind, rms([c.gap / max(c.floor, SMALLEST_FLOOR) for c in own]),
+        after = [c.ratio_after for c in own if c.after is not None]
+        out.append(Phase(kind, rms([c.ratio for c in own]),
                           rms(after) if len(after) == len(own) else None, len(own),
                           sum(stands_out(c) for c in own), sum(stays(c) for c in own),
                           sum(got_worse(c) for c in own), sum(energy(c) for c in own)))
@@ -186,7 +180,7 @@ def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
     chosen = largest(of_map.cells, count)
     ordered = largest(of_map.cells, len(of_map.cells))
     more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
-    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, SMALLEST_FLOOR), c) for c in ordered
+    reductions = [(over_floor(c, c.after - c.gap), c) for c in ordered
                   if c.after is not None and c.after < c.gap]
     more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:MOST_REDUCED]]
     others = {c for c in more if c is not None and c not in chosen}
@@ -195,7 +189,7 @@ def cells_to_show(of_map: GapMap, count: int = MOST_SHOWN) -> list[Cell]:
 
 def overall(cells: Iterable[Cell]) -> float:
     """Root mean square over all cells in the air of gap over floor, each with the same weight; NaN without any."""
-    ratios = [c.gap / c.floor for c in cells if c.regime == "all" and c.phase != GROUND_NAME and c.floor > 0.0]
+    ratios = [c.ratio for c in cells if c.regime == "all" and c.phase != GROUND_NAME]
     return rms(ratios) if ratios else float("nan")
 
 
