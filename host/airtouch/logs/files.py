@@ -10,12 +10,13 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.readings import without_impossible_values
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
-from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
+from airtouch.logs.formats import authors, canonical, crazypad, imrclab, ulog, usd, usd_old
 from airtouch.logs.table import Sheet, names_of, sheet
 
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the files in a folder that count as flights
+PARQUET = b"PAR1"  #: first bytes of a Parquet file
 MANIFEST = "manifest.csv"  #: of a folder: one row a flight, with the condition in which it was flown
 
 
@@ -57,15 +58,46 @@ def load_text(path: str | Path) -> bytes:
 
 
 def in_folder(folder: Path, below: bool = False) -> list[Path]:
-    """The flight logs of a folder by the ending of their names, in order, without its manifest.
+    """The flight logs of a folder, in order, without its manifest: by the ending of their names, in any case.
 
+    A file without an ending is one if its content is a uSD log, a ULog or Parquet: the card's names are `log00`.
     below: those of the folders in it too. Raises AirTouchError for a folder that cannot be listed.
     """
+    return [p for p in _files_of(folder, below) if _is_flight(p)]
+
+
+def flights_in(folder: Path) -> list[Path]:
+    """The flight logs of a folder, as `in_folder` has them. Raises AirTouchError for a folder without any."""
+    flights = in_folder(folder)
+    if not flights:
+        others = ignored(folder)
+        beside = f"; of {others} other files none is a uSD log" if others else ""
+        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)}){beside}")
+    return flights
+
+
+def ignored(folder: Path) -> int:
+    """Number of files in a folder that are no flight logs; its manifest and hidden files do not count."""
+    return sum(not _is_flight(p) for p in _files_of(folder) if p.name != MANIFEST and not p.name.startswith("."))
+
+
+def _files_of(folder: Path, below: bool = False) -> list[Path]:
     try:
-        inside = sorted(folder.rglob("*") if below else folder.iterdir())
+        return sorted(p for p in (folder.rglob("*") if below else folder.iterdir()) if p.is_file())
     except OSError as error:
         raise AirTouchError(f"{folder}: cannot be listed: {error.strerror}; check its rights") from None
-    return [p for p in inside if p.name.endswith(ENDINGS) and p.name != MANIFEST and p.is_file()]
+
+
+def _is_flight(path: Path) -> bool:
+    """True for a file whose ending, or without one whose first bytes, are those of a flight log."""
+    if path.suffix or path.name.startswith("."):
+        return path.name.lower().endswith(ENDINGS) and path.name != MANIFEST
+    try:
+        with path.open("rb") as file:
+            first = file.read(PIECE_BYTES)
+    except OSError:
+        return False
+    return first[:4] == PARQUET or first[:7] == ulog.MAGIC or first[:1] == bytes([usd.MAGIC]) or usd_old.matches(first)
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -133,13 +165,11 @@ def _by_content(data: bytes, source: str) -> FlightLog:
     """The log in a file's bytes; the first of them tell the format."""
     if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
-    if data[:4] == b"PAR1":
+    if data[:4] == PARQUET:
         from airtouch.logs.formats import parquet
 
         return parquet.read(data, source)
-    if data[:7] == b"ULog\x01\x12\x35":
-        from airtouch.logs.formats import ulog
-
+    if data[:7] == ulog.MAGIC:
         return ulog.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
