@@ -207,7 +207,7 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
     if not text.first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
     names = names_of(text.first)
-    if _numeric(names[0]):
+    if all(map(_numeric, names)):
         return authors.read(text, source)
     if any(name in COLUMNS for name in names):
         return canonical.read(text, source)
