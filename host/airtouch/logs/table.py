@@ -59,12 +59,14 @@ def check_names(names: list[str], place: str, before: int = 0) -> None:
                  "has too long a name" if len(name) > LONGEST_NAME else
                  "has another one's name" if name in names[:i] else "")
         if fault:
-            raise AirTouchError(f"{place}: column {before + i + 1} {fault} ('{printable(name)}'); give each its own short name")
+            raise AirTouchError(f"{place}: column {before + i + 1} {fault} ('{printable(name)}'); "
+                                "give each its own short name")
 
 
 def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.ndarray]:
-    """The columns (n,) of a CSV with a header, by name, without a first one that has none: pandas writes its row numbers.
+    """The columns (n,) of a CSV with a header, by name.
 
+    A first column without a name is left out: pandas writes its row numbers there.
     Raises AirTouchError for names that `check_names` and rows that `parse_table` refuses.
     """
     names = names_of(text.first)
