@@ -1,6 +1,7 @@
 """`read` and `write` flight logs. The format of a file is recognised by its content."""
 
 import os
+import secrets
 import tempfile
 import zlib
 from pathlib import Path
@@ -16,6 +17,7 @@ from airtouch.logs.table import Sheet, names_of, sheet
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the files in a folder that count as flights
+STREAMS = ("/dev/null", "/dev/stdout")  #: that are written to as they are
 PARQUET = b"PAR1"  #: first bytes of a Parquet file
 MANIFEST = "manifest.csv"  #: of a folder: one row a flight, with the condition in which it was flown
 
@@ -127,38 +129,54 @@ def make_folder(folder: Path) -> None:
 
 
 def check_free(path: Path | None, force: bool) -> None:
-    """Raise AirTouchError for a file that exists (without `force`) and a folder that cannot be made or written to.
+    """Raise AirTouchError for a file that `write_bytes` would refuse, and a folder that cannot be made or written to.
 
     Call it before the work, so that a long run does not end in a refusal.
     """
-    if path is None:
+    if path is None or str(path) in STREAMS:
         return
-    if path.is_dir():
-        raise AirTouchError(f"{path}: is a folder; give the name of a file")
-    if path.exists() and not force:
-        raise AirTouchError(f"{path}: exists already; use --force to replace it")
-    make_folder(path.parent)
+    target = _target(path, force)
+    make_folder(target.parent)
     try:  # rights alone do not tell: a file system may refuse root as well
-        tempfile.TemporaryFile(dir=path.parent).close()
+        tempfile.TemporaryFile(dir=target.parent).close()
     except OSError as error:
-        raise AirTouchError(f"{path.parent}: cannot be written to: {error.strerror}; choose another folder") from None
+        raise AirTouchError(f"{target.parent}: cannot be written to: {error.strerror}; "
+                            "choose another folder") from None
 
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
-    """Write bytes to a temporary file beside `path` and rename it. Raises AirTouchError as `write` does."""
-    if os.path.exists(path) and not force:
-        raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    """Write bytes to a temporary file beside `path` and rename it; a link stays, and the file it leads to is written.
+
+    Data for `/dev/null` and `/dev/stdout` go there. Raises AirTouchError as `write` does, and for any other device or
+    pipe.
+    """
     temporary = None
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
+        if str(path) in STREAMS:
+            with open(path, "ab", buffering=0) as stream:
+                stream.write(data)
+            return
+        target = _target(path, force)
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        with temporary.open("xb") as file:
             file.write(data)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        temporary.replace(target)
     except OSError as error:
-        if temporary and os.path.exists(temporary):
+        if temporary and os.path.exists(temporary):  # Path.exists raises for a name that is too long
             os.unlink(temporary)
         raise AirTouchError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _target(path: Path, force: bool) -> Path:
+    """The file that a path, through links, leads to. Raises AirTouchError where it must not be replaced."""
+    if os.path.isdir(path):
+        raise AirTouchError(f"{path}: is a folder; give the name of a file")
+    if os.path.exists(path):
+        if not os.path.isfile(path):
+            raise AirTouchError(f"{path}: is a device or a pipe, not a file; give the name of a file")
+        if not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    return Path(os.path.realpath(path))
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
