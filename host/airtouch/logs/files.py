@@ -59,6 +59,17 @@ def load_text(path: str | Path) -> bytes:
     return _text(load_bytes(path), str(path))
 
 
+def read_text(path: str | Path) -> str:
+    """The text of a file in UTF-8. Raises AirTouchError for a file that cannot be read and for one that is no text."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise AirTouchError(f"{path}: no text in UTF-8 (at byte {error.start}); save it as UTF-8 or give another "
+                            "file") from None
+    except (OSError, ValueError) as error:
+        raise AirTouchError(_unreadable(path, error)) from None
+
+
 def in_folder(folder: Path, below: bool = False) -> list[Path]:
     """The flight logs of a folder, in order, without its manifest: by the ending of their names, in any case.
 
@@ -213,11 +224,15 @@ def _bytes(path: str | Path) -> bytes:
             while len(parts) <= LARGEST_BYTES // PIECE_BYTES and (piece := file.read(PIECE_BYTES)):
                 parts.append(piece)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise AirTouchError(f"{path}: cannot be read: {reason}; check the name and the rights") from None
+        raise AirTouchError(_unreadable(path, error)) from None
     if len(parts) > LARGEST_BYTES // PIECE_BYTES:
         raise AirTouchError(f"{path}: more than 1 GiB is too large for a flight log; split it")
     return b"".join(parts)
+
+
+def _unreadable(path: str | Path, error: Exception) -> str:
+    reason = getattr(error, "strerror", None) or error
+    return f"{path}: cannot be read: {reason}; check the name and the rights"
 
 
 def _by_header(text: Sheet, source: str) -> FlightLog:
