@@ -92,7 +92,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     """Write flights in the canonical schema, SI units in the column names.
 
     Nothing is resampled unless --rate is given: then a low-pass comes first when
-    going down, and gaps of more than 0.1 s become NaN.
+    going down, and gaps longer than both 0.1 s and 1.5 sample periods become NaN.
 
     \b
     Example:
