@@ -244,7 +244,7 @@ def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:
 
     Raises AirTouchError for a flight that cannot be read and for a folder without one.
     """
-    from airtouch.logs.files import ENDINGS, in_folder
+    from airtouch.logs.files import flights_in
     from airtouch.logs.formats.rosbag import is_bag
 
     logs = []
@@ -253,10 +253,7 @@ def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:
         if folder is None or not folder.is_dir() or is_bag(folder):
             logs.append(read(flight))
             continue
-        files = in_folder(folder)
-        if not files:
-            raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)})")
-        logs += [read(f) for f in files]
+        logs += [read(f) for f in flights_in(folder)]
     return logs
 
 

@@ -59,16 +59,43 @@ def test_a_check_as_json_holds_rate_edges_and_files_left_out(folder):
 
 def test_every_command_takes_the_same_files_of_a_folder_for_flights(tmp_path):
     """`evaluate` once saw no flight in a folder of ULog files, and `logs info` passed over uSD logs."""
-    taken = ["a.ulg", "b.usd", "c.bin", "d.csv", "e.csv.gz", "f.parquet"]
-    for name in (*taken, "manifest.csv", "notes.txt", "map.geojson"):
-        (tmp_path / name).write_text("file\n")
+    taken = ["A.CSV", "a.ulg", "b.usd", "c.bin", "d.csv", "e.csv.gz", "f.parquet", "log00", "log01", "log02"]
+    for name in (*taken, "manifest.csv", "notes.txt", "map.geojson", "LICENSE", "blank"):
+        (tmp_path / name).write_text("file\n" if name != "blank" else "")
+    (tmp_path / "log00").write_bytes(b"\xbc\x02")  # Bitcraze's card writes no ending
+    (tmp_path / "log01").write_bytes(b"\x02tick(I),acc.x(f),")  # firmware of 2019
+    (tmp_path / "log02").write_bytes(b"ULog\x01\x12\x35")
     (tmp_path / "g.csv").mkdir()
     expected = [tmp_path / name for name in taken]
     assert files.in_folder(tmp_path) == expected
     assert [f.path for f in dataset.collect([tmp_path])] == expected
     assert gap_files.files_of([str(tmp_path)]) == expected
-    failed = json.loads(call("info", tmp_path, "--json").stdout)["left_out"]
-    assert [f["file"] for f in failed] == [str(p) for p in expected]
+    result = call("info", tmp_path, "--json")
+    assert [f["file"] for f in json.loads(result.stdout)["left_out"]] == [str(p) for p in expected]
+    assert f"{tmp_path}: 4 other files in this folder" in result.stderr
+
+
+def test_a_folder_without_flights_is_the_same_error_everywhere(folder):
+    """`logs info` had nothing to say of it and ended with 0."""
+    empty, notes = folder / "none", folder / "notes"
+    for place in (empty, notes):
+        place.mkdir()
+    (notes / "README").write_text("flights are on the card\n")
+    for place in (empty, notes):
+        for command_line in (("info", place), ("check", place), ("convert", place, "--out", folder / "out")):
+            result = call(*command_line)
+            assert result.exit_code == 2 and f"{place}: no flights in this folder" in result.stderr
+        for collect in (dataset.collect, gap_files.files_of):
+            with pytest.raises(AirTouchError, match=f"{place}: no flights in this folder"):
+                collect([str(place)])
+    result = call("info", empty, folder / "good.csv")
+    assert result.exit_code == 2 and "1 flight read, 1 left out" in result.stderr and "good.csv" in result.stdout
+
+
+def test_a_name_in_capitals_is_converted_to_one_with_the_new_ending(folder):
+    (folder / "good.csv").rename(folder / "GOOD.CSV")
+    assert call("convert", folder / "GOOD.CSV", "--out", folder / "out", "--format", "csv").exit_code == 0
+    assert len(logs.read(folder / "out" / "GOOD.csv")) == 600
 
 
 def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):

@@ -18,12 +18,20 @@ def test_a_fast_imu_is_averaged_over_each_ten_milliseconds():
     np.testing.assert_allclose(log["gyro_x_radps"][1:-1], 3.0 * log["t_s"][1:-1], atol=3.0 * 0.00051)
 
 
-def test_a_slow_signal_repeats_its_last_value_and_no_longer_than_the_limit():
-    times = np.arange(0.0, 1.0, 0.01)
-    log = aligned_log({"acc_x_mps2": (times, times), "vbat_V": (np.array([0.2]), np.array([4.0]))}, META)
-    held_value = (log["t_s"] >= 0.2 - 1e-6) & (log["t_s"] <= 0.2 + HOLD_S + 1e-6)
-    assert (log["vbat_V"][held_value] == 4.0).all() and np.isnan(log["vbat_V"][~held_value]).all()
+@pytest.mark.parametrize(("name", "limit_s"), [("zrange_m", HOLD_S), ("x_m", HOLD_S), ("vbat_V", 5.0)])
+def test_a_slow_signal_repeats_its_last_value_and_no_longer_than_the_limit(name, limit_s):
+    times = np.arange(0.0, 7.0, 0.01)
+    log = aligned_log({"acc_x_mps2": (times, times), name: (np.array([0.2]), np.array([4.0]))}, META)
+    held_value = (log["t_s"] >= 0.2 - 1e-6) & (log["t_s"] <= 0.2 + limit_s + 1e-6)
+    assert (log[name][held_value] == 4.0).all() and np.isnan(log[name][~held_value]).all()
     np.testing.assert_array_equal(log["acc_x_mps2"], times)  # 100 Hz stays as it is
+
+
+def test_a_battery_logged_once_a_second_has_a_value_at_every_sample():
+    """Three of four samples were missing."""
+    times, seconds = np.arange(0.0, 10.0, 0.01), np.arange(0.0, 10.0)
+    log = aligned_log({"acc_x_mps2": (times, times), "vbat_V": (seconds, 4.0 - 0.01 * seconds)}, META)
+    np.testing.assert_allclose(log["vbat_V"], 4.0 - 0.01 * np.floor(log["t_s"] + 1e-6))
 
 
 def test_the_clock_begins_with_the_imu_and_samples_without_a_time_are_left_out():

@@ -27,6 +27,20 @@ def test_rows_lost_from_the_beginning_do_not_fly():
     assert airborne(log(**dict.fromkeys(PWM, power))).tolist() == [False, False, True]
 
 
+def test_a_motor_that_was_not_logged_at_a_sample_is_left_out_of_its_mean():
+    """One motor without a reading kept the drone as it was in the row before."""
+    motors = np.array([[0.0] * 4, [np.nan, 20000, 20000, 20000], [np.nan, 10000, 10000, 10000], [1, np.nan, 2, 3]])
+    assert airborne(log(**dict(zip(PWM, motors.T, strict=True)))).tolist() == [False, True, False, False]
+
+
+def test_a_motor_that_was_never_logged_leaves_the_range_to_tell():
+    """A column of NaN kept the drone on the ground for the whole flight."""
+    motors = dict.fromkeys(PWM, [40000.0] * 4) | {PWM[2]: [np.nan] * 4}
+    assert airborne(log(**motors, zrange_m=[0.0, 0.3, 0.4, 0.0])).tolist() == [False, True, True, False]
+    height = {"zrange_m": [np.nan] * 4, "z_m": [0.0, 0.3, 0.4, 0.0]}
+    assert airborne(log(**motors, **height)).tolist() == [False, True, True, False]
+
+
 def test_without_motors_the_range_says_from_where_to_where():
     flying = airborne(log(zrange_m=[0.02, 0.3, 0.05, np.nan, 0.2, 0.03]))
     assert flying.tolist() == [False, True, True, True, True, False]

@@ -21,3 +21,10 @@ def test_a_line_that_is_no_object_is_named(line, tmp_path):
     path.write_text('{"flight": "a"}\n' + line + "\n")
     with pytest.raises(AirTouchError, match="line 2 is no JSON object; remove"):
         json_lines.read(path)
+
+
+def test_bytes_that_are_no_text_are_one_line(tmp_path):
+    path = tmp_path / "kept.jsonl"
+    path.write_bytes(b'{"flight": "a"}\n{"flight": "\xff"}\n')
+    with pytest.raises(AirTouchError, match="kept.jsonl: no text in UTF-8 .at byte 28"):
+        json_lines.read(path)

@@ -36,6 +36,15 @@ def test_gaps_are_not_filled():
     assert new.meta["resampled"]["lost_samples"] == 55
 
 
+def test_one_period_of_a_slow_log_is_no_gap():
+    """At 5 Hz samples are 0.2 s apart, more than the 0.1 s that a gap may have in a faster log."""
+    time = np.r_[0.2 * np.arange(20), 4.2 + 0.2 * np.arange(20)]  # one sample lost before 4.2 s
+    new = logs.resample(FlightLog({"t_s": time, "x_m": time}, {"source": "made"}), 10.0)
+    lost = (new["t_s"] > 3.8 + 1e-6) & (new["t_s"] < 4.2 - 1e-6)
+    assert np.isnan(new["x_m"][lost]).all() and lost.sum() == 3
+    np.testing.assert_allclose(new["x_m"][~lost], new["t_s"][~lost], atol=1e-9)
+
+
 def test_arrival_times_are_not_taken_for_sample_times():
     rng = np.random.default_rng(0)
     arrival = np.arange(1000) * 0.01 + rng.exponential(0.003, 1000)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import parse
 from airtouch.logs.table import check_names, named_table, names_of, parse_table, sheet
 
 CELL = st.one_of(st.floats(allow_nan=False).map(repr), st.integers(-10**9, 10**9).map(str), st.just(""),
@@ -84,3 +85,22 @@ def test_columns_have_the_headers_names_and_empty_cells_are_nan():
     assert list(table) == ["x", "y"]
     np.testing.assert_array_equal(table["x"], [1, 3])
     np.testing.assert_array_equal(table["y"], [2, np.nan])
+
+
+def test_a_first_column_without_a_name_is_left_out():
+    """pandas' to_csv writes its row numbers so; the file was taken for one without a header."""
+    frame = pandas_csv({"t_s": [0.0, 0.01], "acc_x_mps2": [1.5, 2.5]})
+    assert frame.startswith(b",t_s,")
+    log = parse(frame, "made.csv")
+    assert log.meta["format"] == "canonical" and log.meta["warnings"] == []
+    assert {name: values.tolist() for name, values in log.columns.items()} == {"t_s": [0.0, 0.01],
+                                                                               "acc_x_mps2": [1.5, 2.5]}
+    with pytest.raises(AirTouchError, match="column 3 has another one's name"):
+        parse(frame.replace(b"acc_x_mps2", b"t_s"), "made.csv")
+    with pytest.raises(AirTouchError, match="unknown header"):
+        parse(pandas_csv({"time": [0.0, 0.01], "ax": [1.5, 2.5]}), "made.csv")
+
+
+def pandas_csv(columns):
+    pandas = pytest.importorskip("pandas")
+    return pandas.DataFrame(columns).to_csv().encode()

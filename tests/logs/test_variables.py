@@ -76,6 +76,19 @@ def test_the_pitch_rate_gets_the_sign_of_the_logged_attitude(sign):
     assert not meta["warnings"]
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_missing_pitch_rate_costs_its_own_sample(sign):
+    """One NaN took the whole pitch rate with it."""
+    angles, table = attitude(seed=2)
+    turns = Rotation.from_euler("ZYX", angles[:, ::-1])
+    rates = np.vstack([np.zeros(3), (turns[:-1].inv() * turns[1:]).as_rotvec()]) / 0.01
+    mrad = 1e3 * rates * (1.0, sign, 1.0)
+    mrad[7, 1], rates[7, 1] = np.nan, np.nan
+    columns, _ = converted(**table, stateEstimateZ__rateRoll=mrad[:, 0], stateEstimateZ__ratePitch=mrad[:, 1],
+                           stateEstimateZ__rateYaw=mrad[:, 2])
+    np.testing.assert_allclose(columns["gyro_y_radps"], rates[:, 1], atol=1e-9)
+
+
 def test_a_pitch_rate_without_attitude_is_left_out():
     columns, meta = converted(**{f"stateEstimateZ__rate{a}": [1.0, 2.0] for a in ("Roll", "Pitch", "Yaw")})
     assert "gyro_y_radps" not in columns and "gyro left out" in meta["warnings"][0]

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import in_folder, write
+from airtouch.logs.files import flights_in, ignored, write
 from airtouch.logs.formats.rosbag import is_bag
 
 RERUN = "rrd"  #: ending of Rerun files, which are only written
@@ -92,7 +92,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     """Write flights in the canonical schema, SI units in the column names.
 
     Nothing is resampled unless --rate is given: then a low-pass comes first when
-    going down, and gaps of more than 0.1 s become NaN.
+    going down, and gaps longer than both 0.1 s and 1.5 sample periods become NaN.
 
     \b
     Example:
@@ -135,8 +135,13 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
 
 def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], list[dict[str, str]]]:
     """Call `act` on every file. Returns the results, and the failed files with their reasons."""
-    paths = list(_expand(files))
+    paths: list[Path] = []
     results, left_out = [], []
+    for name in files:
+        try:
+            paths += _expand(Path(name))
+        except AirTouchError as error:
+            left_out.append({"file": name, "reason": str(error)})
     for path in _progress(paths):
         try:
             results.append(act(path))
@@ -145,12 +150,15 @@ def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], 
     return results, left_out
 
 
-def _expand(files: Iterable[str]) -> Iterator[Path]:
-    for name in files:
-        if not os.path.isdir(name) or is_bag(name):
-            yield Path(name)
-            continue
-        yield from in_folder(Path(name))
+def _expand(path: Path) -> list[Path]:
+    """The flight logs that a name stands for. Says how many files of a folder are none."""
+    if not os.path.isdir(path) or is_bag(path):
+        return [path]
+    flights, others = flights_in(path), ignored(path)
+    if others:
+        click.echo(f"airtouch: {path}: {others} other {'file' if others == 1 else 'files'} in this folder, "
+                   "by name and content no flight logs", err=True)
+    return flights
 
 
 def _progress(paths: list[Path]) -> Iterable[Path]:
@@ -223,4 +231,4 @@ def _finish(done: int, left_out: list[dict[str, str]], verb: str) -> None:
 
 def _stem(path: Path) -> str:
     endings = (".csv.gz", ".csv", ".parquet", ".gz")
-    return next((path.name.removesuffix(e) for e in endings if path.name.endswith(e)), path.name)
+    return next((path.name[:-len(e)] for e in endings if path.name.lower().endswith(e)), path.name)

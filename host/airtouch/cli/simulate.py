@@ -79,6 +79,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     """
     from airtouch import vehicle as vehicles
     from airtouch.crazyflie import mission
+    from airtouch.logs.files import read_text
     from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
     from airtouch.simulation.flight import choose, refuse_off
@@ -86,9 +87,10 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
 
     if flights < 1 or seed < 0 or (workers is not None and workers < 1):
         raise AirTouchError("--flights and --workers must be 1 or more, --seed 0 or more")
-    plugins = [_read(path) for path in files]
+    plugins = []
     for path in files:
         effects.load_file(path)
+        plugins.append(read_text(path))
     scene = mission.scene_or_scenario(scenario)
     craft = vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
@@ -143,9 +145,3 @@ def _write(results, count: int, out: Path, name: str) -> None:
             if result is not None:
                 store.save(out, name, result)
             bar.advance(task)
-
-
-def _read(path: str) -> str:
-    if not Path(path).is_file():
-        raise AirTouchError(f"{path}: no such file of effects")
-    return Path(path).read_text(encoding="utf-8")

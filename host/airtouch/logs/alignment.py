@@ -9,6 +9,7 @@ from airtouch.logs.flight_log import ACC, GYRO, FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
 
 HOLD_S = 0.25  #: s for which the last value of a signal is repeated; after that the sample is NaN
+HOLD_BATTERY_S = 5.0  #: s, the same of the battery, which is often logged at 1 Hz or less and changes slowly; chosen
 Signal = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)
 
 
@@ -16,8 +17,8 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> Fl
     """The flight log at 100 Hz of signals {column: (times, values)}.
 
     Accelerations and rates that were sampled faster than 100 Hz are averaged over each 10 ms. Any other signal repeats
-    its last value for at most HOLD_S. The clock starts with the first acceleration or rate. Raises AirTouchError if
-    there is neither.
+    its last value for at most HOLD_S, the battery for HOLD_BATTERY_S. The clock starts with the first acceleration or
+    rate. Raises AirTouchError if there is neither.
     """
     signals = {name: _sorted(*signal) for name, signal in signals.items() if len(signal[0])}
     imu_times = [signals[name][0] for name in (*GYRO, *ACC) if name in signals]
@@ -30,7 +31,8 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> Fl
     columns = {"t_s": clock - begin}
     for name, (times, values) in signals.items():
         fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * SAMPLE_PERIOD_S if len(times) > 1 else False
-        columns[name] = _average(times, values, clock) if fast else _hold(times, values, clock)
+        hold_s = HOLD_BATTERY_S if name == "vbat_V" else HOLD_S
+        columns[name] = _average(times, values, clock) if fast else _hold(times, values, clock, hold_s)
     return FlightLog(columns, {"condition": "", "warnings": [], **meta})
 
 
@@ -47,11 +49,11 @@ def _average(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.nda
     usable = (tick >= 0) & (tick < len(clock)) & np.isfinite(values)
     count = np.bincount(tick[usable], minlength=len(clock))
     total = np.bincount(tick[usable], values[usable], minlength=len(clock))
-    return np.where(count > 0, total / np.maximum(count, 1), _hold(times, values, clock))
+    return np.where(count > 0, total / np.maximum(count, 1), _hold(times, values, clock, HOLD_S))
 
 
-def _hold(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """The last value before each tick, (m,); NaN where it is older than HOLD_S or missing."""
+def _hold(times: np.ndarray, values: np.ndarray, clock: np.ndarray, longest_s: float) -> np.ndarray:
+    """The last value before each tick, (m,); NaN where it is older than `longest_s` or missing."""
     last = np.searchsorted(times, clock + 1e-9, side="right") - 1
-    recent = (last >= 0) & (clock - times[np.maximum(last, 0)] <= HOLD_S)
+    recent = (last >= 0) & (clock - times[np.maximum(last, 0)] <= longest_s)
     return np.where(recent, values[np.maximum(last, 0)], np.nan)

@@ -1,6 +1,7 @@
 """`read` and `write` flight logs. The format of a file is recognised by its content."""
 
 import os
+import secrets
 import tempfile
 import zlib
 from pathlib import Path
@@ -10,12 +11,14 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.readings import without_impossible_values
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
-from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
+from airtouch.logs.formats import authors, canonical, crazypad, imrclab, ulog, usd, usd_old
 from airtouch.logs.table import Sheet, names_of, sheet
 
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the files in a folder that count as flights
+STREAMS = ("/dev/null", "/dev/stdout")  #: that are written to as they are
+PARQUET = b"PAR1"  #: first bytes of a Parquet file
 MANIFEST = "manifest.csv"  #: of a folder: one row a flight, with the condition in which it was flown
 
 
@@ -56,16 +59,58 @@ def load_text(path: str | Path) -> bytes:
     return _text(load_bytes(path), str(path))
 
 
-def in_folder(folder: Path, below: bool = False) -> list[Path]:
-    """The flight logs of a folder by the ending of their names, in order, without its manifest.
+def read_text(path: str | Path) -> str:
+    """The text of a file in UTF-8. Raises AirTouchError for a file that cannot be read and for one that is no text."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise AirTouchError(f"{path}: no text in UTF-8 (at byte {error.start}); save it as UTF-8 or give another "
+                            "file") from None
+    except (OSError, ValueError) as error:
+        raise AirTouchError(_unreadable(path, error)) from None
 
+
+def in_folder(folder: Path, below: bool = False) -> list[Path]:
+    """The flight logs of a folder, in order, without its manifest: by the ending of their names, in any case.
+
+    A file without an ending is one if its content is a uSD log, a ULog or Parquet: the card's names are `log00`.
     below: those of the folders in it too. Raises AirTouchError for a folder that cannot be listed.
     """
+    return [p for p in _files_of(folder, below) if _is_flight(p)]
+
+
+def flights_in(folder: Path) -> list[Path]:
+    """The flight logs of a folder, as `in_folder` has them. Raises AirTouchError for a folder without any."""
+    flights = in_folder(folder)
+    if not flights:
+        others = ignored(folder)
+        beside = f"; of {others} other files none is a uSD log" if others else ""
+        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)}){beside}")
+    return flights
+
+
+def ignored(folder: Path) -> int:
+    """Number of files in a folder that are no flight logs; its manifest and hidden files do not count."""
+    return sum(not _is_flight(p) for p in _files_of(folder) if p.name != MANIFEST and not p.name.startswith("."))
+
+
+def _files_of(folder: Path, below: bool = False) -> list[Path]:
     try:
-        inside = sorted(folder.rglob("*") if below else folder.iterdir())
+        return sorted(p for p in (folder.rglob("*") if below else folder.iterdir()) if p.is_file())
     except OSError as error:
         raise AirTouchError(f"{folder}: cannot be listed: {error.strerror}; check its rights") from None
-    return [p for p in inside if p.name.endswith(ENDINGS) and p.name != MANIFEST and p.is_file()]
+
+
+def _is_flight(path: Path) -> bool:
+    """True for a file whose ending, or without one whose first bytes, are those of a flight log."""
+    if path.suffix or path.name.startswith("."):
+        return path.name.lower().endswith(ENDINGS) and path.name != MANIFEST
+    try:
+        with path.open("rb") as file:
+            first = file.read(PIECE_BYTES)
+    except OSError:
+        return False
+    return first[:4] == PARQUET or first[:7] == ulog.MAGIC or first[:1] == bytes([usd.MAGIC]) or usd_old.matches(first)
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -95,51 +140,65 @@ def make_folder(folder: Path) -> None:
 
 
 def check_free(path: Path | None, force: bool) -> None:
-    """Raise AirTouchError for a file that exists (without `force`) and a folder that cannot be made or written to.
+    """Raise AirTouchError for a file that `write_bytes` would refuse, and a folder that cannot be made or written to.
 
     Call it before the work, so that a long run does not end in a refusal.
     """
-    if path is None:
+    if path is None or str(path) in STREAMS:
         return
-    if path.is_dir():
-        raise AirTouchError(f"{path}: is a folder; give the name of a file")
-    if path.exists() and not force:
-        raise AirTouchError(f"{path}: exists already; use --force to replace it")
-    make_folder(path.parent)
+    target = _target(path, force)
+    make_folder(target.parent)
     try:  # rights alone do not tell: a file system may refuse root as well
-        tempfile.TemporaryFile(dir=path.parent).close()
+        tempfile.TemporaryFile(dir=target.parent).close()
     except OSError as error:
-        raise AirTouchError(f"{path.parent}: cannot be written to: {error.strerror}; choose another folder") from None
+        raise AirTouchError(f"{target.parent}: cannot be written to: {error.strerror}; "
+                            "choose another folder") from None
 
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
-    """Write bytes to a temporary file beside `path` and rename it. Raises AirTouchError as `write` does."""
-    if os.path.exists(path) and not force:
-        raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    """Write bytes to a temporary file beside `path` and rename it; a link stays, and the file it leads to is written.
+
+    Data for `/dev/null` and `/dev/stdout` go there. Raises AirTouchError as `write` does, and for any other device or
+    pipe.
+    """
     temporary = None
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
+        if str(path) in STREAMS:
+            with open(path, "ab", buffering=0) as stream:
+                stream.write(data)
+            return
+        target = _target(path, force)
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        with temporary.open("xb") as file:
             file.write(data)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        temporary.replace(target)
     except OSError as error:
-        if temporary and os.path.exists(temporary):
+        if temporary and os.path.exists(temporary):  # Path.exists raises for a name that is too long
             os.unlink(temporary)
         raise AirTouchError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _target(path: Path, force: bool) -> Path:
+    """The file that a path, through links, leads to. Raises AirTouchError where it must not be replaced."""
+    if os.path.isdir(path):
+        raise AirTouchError(f"{path}: is a folder; give the name of a file")
+    if os.path.exists(path):
+        if not os.path.isfile(path):
+            raise AirTouchError(f"{path}: is a device or a pipe, not a file; give the name of a file")
+        if not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    return Path(os.path.realpath(path))
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
     """The log in a file's bytes; the first of them tell the format."""
     if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
-    if data[:4] == b"PAR1":
+    if data[:4] == PARQUET:
         from airtouch.logs.formats import parquet
 
         return parquet.read(data, source)
-    if data[:7] == b"ULog\x01\x12\x35":
-        from airtouch.logs.formats import ulog
-
+    if data[:7] == ulog.MAGIC:
         return ulog.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
@@ -165,11 +224,15 @@ def _bytes(path: str | Path) -> bytes:
             while len(parts) <= LARGEST_BYTES // PIECE_BYTES and (piece := file.read(PIECE_BYTES)):
                 parts.append(piece)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise AirTouchError(f"{path}: cannot be read: {reason}; check the name and the rights") from None
+        raise AirTouchError(_unreadable(path, error)) from None
     if len(parts) > LARGEST_BYTES // PIECE_BYTES:
         raise AirTouchError(f"{path}: more than 1 GiB is too large for a flight log; split it")
     return b"".join(parts)
+
+
+def _unreadable(path: str | Path, error: Exception) -> str:
+    reason = getattr(error, "strerror", None) or error
+    return f"{path}: cannot be read: {reason}; check the name and the rights"
 
 
 def _by_header(text: Sheet, source: str) -> FlightLog:
@@ -177,7 +240,7 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
     if not text.first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
     names = names_of(text.first)
-    if _numeric(names[0]):
+    if all(map(_numeric, names)):
         return authors.read(text, source)
     if any(name in COLUMNS for name in names):
         return canonical.read(text, source)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import read_text
 
 
 def read(path: Path | None) -> list[dict[str, Any]]:
@@ -13,7 +14,7 @@ def read(path: Path | None) -> list[dict[str, Any]]:
     if path is None or not path.exists():
         return []
     objects = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         try:
             one = json.loads(line)
         except ValueError:

@@ -6,7 +6,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
-LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN
+LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN, unless they are within LONGEST_BRIDGE_PERIODS
+LONGEST_BRIDGE_PERIODS = 1.5  #: sample periods that are always bridged: one of a slow log exceeds 0.1 s
 CUTOFF = 0.4  #: corner of the anti-aliasing low-pass as a fraction of the new rate
 HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels, resampled by holding the last value, unfiltered
 ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
@@ -19,7 +20,8 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
 
     To a lower rate a zero-phase Butterworth low-pass (8th order, forward and backward, corner at
     0.4 of the new rate) prevents aliasing. Values are interpolated linearly; ranges and battery
-    hold their last value. Gaps of more than 0.1 s become NaN. meta["resampled"] describes this.
+    hold their last value. Gaps longer than both 0.1 s and 1.5 sample periods become NaN.
+    meta["resampled"] describes this.
     Samples without a time, or out of order, are left out; a warning counts them.
     Raises AirTouchError for a rate outside 0.2 to 10000 Hz, a clock that stands still, and a
     result of more than 100 samples for each logged one or more than 1 GiB.
@@ -88,9 +90,9 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
 
 def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, hold: bool,
         low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
-    """Channels (k, n) at the new times, (k, m); NaN in gaps longer than LONGEST_BRIDGE_S."""
+    """Channels (k, n) at the new times, (k, m); NaN in gaps longer than both limits of a bridge."""
     new = np.full((len(values), len(new_time)), np.nan)
-    bridge = max(LONGEST_BRIDGE_S, 1.5 * period)
+    bridge = max(LONGEST_BRIDGE_S, LONGEST_BRIDGE_PERIODS * period)
     bounds = np.r_[0, np.flatnonzero(np.diff(time_s) > bridge) + 1, len(time_s)]
     for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
         if stop == start:

@@ -47,8 +47,11 @@ def names_of(header: bytes) -> list[str]:
     return [name.strip() for name in header.decode("utf-8", "replace").split(",", MOST_COLUMNS)]
 
 
-def check_names(names: list[str], place: str) -> None:
-    """Raise AirTouchError for more than 256 columns and for a name that is empty, repeated, long or not printable."""
+def check_names(names: list[str], place: str, before: int = 0) -> None:
+    """Raise AirTouchError for more than 256 columns and for a name that is empty, repeated, long or not printable.
+
+    before: number of columns before the first name.
+    """
     if len(names) > MOST_COLUMNS:
         raise AirTouchError(f"{place}: more than {MOST_COLUMNS} columns; leave out those that are no readings")
     for i, name in enumerate(names):
@@ -56,18 +59,21 @@ def check_names(names: list[str], place: str) -> None:
                  "has too long a name" if len(name) > LONGEST_NAME else
                  "has another one's name" if name in names[:i] else "")
         if fault:
-            raise AirTouchError(f"{place}: column {i + 1} {fault} ('{printable(name)}'); give each its own short name")
+            raise AirTouchError(f"{place}: column {before + i + 1} {fault} ('{printable(name)}'); "
+                                "give each its own short name")
 
 
 def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.ndarray]:
     """The columns (n,) of a CSV with a header, by name.
 
+    A first column without a name is left out: pandas writes its row numbers there.
     Raises AirTouchError for names that `check_names` and rows that `parse_table` refuses.
     """
     names = names_of(text.first)
-    check_names(names, f"{source}:{text.line}")
+    unnamed = int(len(names) > 1 and not names[0])
+    check_names(names[unnamed:], f"{source}:{text.line}", unnamed)
     rows = parse_table(text.rest, source, len(names), text.line + 1, warnings)
-    return dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
+    return dict(zip(names[unnamed:], np.ascontiguousarray(rows.T[unnamed:]), strict=True))
 
 
 def parse_table(body: bytes, source: str, columns: int, first_line: int,

@@ -92,8 +92,8 @@ def _rates(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta
     if GYRO[0] in columns or not all(name in table for name in names):
         return
     pitch, turned = 1e-3 * table[names[1]], _pitch_rate(columns)
-    fits = float(np.sum(pitch[1:] * turned)) if turned is not None else 0.0
-    if not fits:
+    fits = float(np.nansum(pitch[1:] * turned)) if turned is not None else 0.0
+    if not fits or not np.isfinite(fits):
         meta["warnings"].append("the sign of stateEstimateZ.ratePitch is unknown without attitude: gyro left out")
         return
     columns |= dict(zip(GYRO, (1e-3 * table[names[0]], np.sign(fits) * pitch, 1e-3 * table[names[2]]), strict=True))

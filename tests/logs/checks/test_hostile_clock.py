@@ -42,6 +42,19 @@ def test_a_wrong_time_among_the_others_does_not_take_the_rest_with_it():
     assert any("2 of 300 samples" in w for w in new.meta["warnings"])
 
 
+@pytest.mark.parametrize("error_s", [-1.0, -0.3, 1.0])
+@pytest.mark.parametrize("length", [1, 3])
+def test_a_wrong_time_is_no_loss_of_samples(error_s, length):
+    """One time 1 s too early counted as 100 lost samples, and moved the rest of the flight by 1 s."""
+    time = 0.01 * np.arange(600)
+    time[300:300 + length] += error_s
+    assert clock.lost_samples(time, 0.01) == []
+    stated = FlightLog({"t_s": time, "acc_x_mps2": np.arange(600.0)}, {"source": "made", "sample_period_s": 0.01})
+    np.testing.assert_array_equal(clock.regular_time(stated)[0], np.arange(600) * 0.01)
+    time[400:] += 0.05  # a real loss behind it
+    assert [(gap.sample, gap.lost) for gap in clock.lost_samples(time, 0.01)] == [(400, 5)]
+
+
 def test_most_samples_in_order_are_kept():
     """Against all subsets of a few samples."""
     rng = np.random.default_rng(3)
@@ -50,9 +63,13 @@ def test_most_samples_in_order_are_kept():
         times[rng.random(7) < 0.1] = np.nan
         rising = clock.rising_subsequence(times)
         assert (np.diff(times[rising]) > 0).all() and not np.isnan(times[rising]).any()
-        subsets = (np.flatnonzero([bits >> i & 1 for i in range(7)]) for bits in range(128))
+        subsets = [np.flatnonzero([bits >> i & 1 for i in range(7)]) for bits in range(128)]
         in_order = [s for s in subsets if (np.diff(times[s]) > 0).all() and not np.isnan(times[s]).any()]
         assert len(rising) == max(map(len, in_order))
+        level = clock.rising_subsequence(times, repeats=True)
+        assert (np.diff(times[level]) >= 0).all() and not np.isnan(times[level]).any()
+        not_falling = [s for s in subsets if (np.diff(times[s]) >= 0).all() and not np.isnan(times[s]).any()]
+        assert len(level) == max(map(len, not_falling))
 
 
 def test_a_clock_that_is_not_in_seconds_is_refused_with_the_remedy():

@@ -50,3 +50,19 @@ def test_metadata_that_cannot_be_is_left_out():
     readings = without_impossible_values(log(t_s=[0.0, 0.01], meta={"sample_period_s": True, "acc_frame": "moon"}))
     assert "sample_period_s" not in readings.meta and readings.meta["acc_frame"] == "body"
     assert len(readings.meta["warnings"]) == 2
+
+
+@pytest.mark.parametrize(("logged_s", "warned"), [(0.02, True), (0.0106, True), (0.0094, True), (0.0104, False),
+                                                  (0.0096, False)])
+def test_a_clock_that_contradicts_the_stated_period_is_told(logged_s, warned):
+    """Times at 50 Hz beside a stated 100 Hz were resampled from 100 Hz without a word."""
+    made = log(t_s=7.0 + logged_s * np.arange(300), meta={"sample_period_s": 0.01})
+    once = without_impossible_values(made)
+    notes = [w for w in once.meta["warnings"] if "sample_period_s" in w]
+    assert len(notes) == warned and (not warned or f"{logged_s:.4g} s a sample" in notes[0])
+    assert without_impossible_values(once).meta["warnings"] == once.meta["warnings"]
+
+
+def test_late_bursts_contradict_no_period():
+    arrival = 0.01 * np.arange(600) + np.where(np.arange(600) % 100 < 30, 0.3, 0.0)
+    assert without_impossible_values(log(t_s=arrival, meta={"sample_period_s": 0.01})).meta["warnings"] == []

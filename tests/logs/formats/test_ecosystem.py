@@ -176,6 +176,32 @@ def test_a_wrong_name_in_a_map_gets_the_nearest(theirs, tmp_path, name, typo, me
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize(("right", "wrong", "message"), [
+    ('from = "motor 1"', "from = 5", r"\[columns.m1_pwm\]: from is 5, a name"),
+    ("scale = 1e-6", 'scale = "1e-6"', r"\[columns.t_s\]: scale is '1e-6', a number"),
+    ("offset = 0.5", "offset = true", "offset is True, a number"), ("offset = 0.5", "offset = inf", "offset is inf"),
+    ("vehicle =", "warnings = 3\nvehicle =", "warnings is not for a map"),
+    ('"crazyflie-2.1"', "21", "vehicle is 21, a text"),
+    ('[columns.t_s]\nfrom = "time_us"\nscale = 1e-6', '[columns]\nt_s = "time"',
+     r"\[columns.t_s\] is 'time'; give a table with from")])
+def test_a_wrong_type_in_a_map_is_named(theirs, tmp_path, right, wrong, message):
+    assert right in MAP
+    (tmp_path / "map.toml").write_text(MAP.replace(right, wrong))
+    with pytest.raises(AirTouchError, match=message):
+        mapped.read(theirs, tmp_path / "map.toml")
+
+
+def test_cells_that_are_no_numbers_are_counted(theirs, tmp_path):
+    (tmp_path / "map.toml").write_text(MAP)
+    rows = theirs.read_text().splitlines()
+    rows[3], rows[5], rows[7], rows[8] = ("20000,fast,1.0,0.5", "40000,1,off,0.5", "60000,,NaN,0.5", "70000,slow,1,1")
+    theirs.write_text("\n".join(rows) + "\n")
+    log = mapped.read(theirs, tmp_path / "map.toml")
+    assert log.meta["warnings"] == ["gyro_x_radps: 2 of 50 cells are no numbers, the first 'fast'; taken as missing",
+                                    "acc_z_mps2: 1 of 50 cells are no numbers, the first 'off'; taken as missing"]
+    assert np.flatnonzero(np.isnan(log["gyro_x_radps"])).tolist() == [2, 6, 7]
+
+
 def test_a_plain_csv_is_a_header_and_numbers(theirs, tmp_path):
     (tmp_path / "map.toml").write_text(MAP)
     result = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv",

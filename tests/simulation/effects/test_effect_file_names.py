@@ -1,6 +1,7 @@
 """A wrong name in a user's effect file: told with its line and the nearest right ones, before numba sees it."""
 
 import pytest
+from click.testing import CliRunner
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import effects, plant
@@ -69,3 +70,15 @@ def test_what_compiled_code_would_not_notice_is_refused_with_its_line(name, repl
     with pytest.raises(AirTouchError) as error:
         effects.load_text(FILE.replace(name, replacement), "mine.py")
     assert message in str(error.value)
+
+
+def test_a_file_that_is_no_text_is_one_line(tmp_path):
+    from airtouch.cli.simulate import command
+
+    file = tmp_path / "mine.py"
+    file.write_bytes(FILE.replace("half-way", "h\u00e4lftig").encode("latin-1"))
+    with pytest.raises(AirTouchError, match="mine.py: no text in UTF-8"):
+        effects.load_file(file)
+    result = CliRunner().invoke(command, ["paper-low", "--out", str(tmp_path / "out"), "--effect-file", str(file)])
+    assert isinstance(result.exception, AirTouchError) and "mine.py: no text in UTF-8" in str(result.exception)
+    assert not (tmp_path / "out").exists()

@@ -8,7 +8,7 @@ import click
 
 from airtouch import logs, vehicle
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import MANIFEST, in_folder
+from airtouch.logs.files import MANIFEST, flights_in
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.rosbag import is_bag
 from airtouch.vehicle import Vehicle
@@ -43,7 +43,7 @@ class Flights:
 def files_of(names: Sequence[str]) -> list[Path]:
     """Files named, logs in folders named, and what patterns match; each once, in order.
 
-    Raises AirTouchError for a name that is none of these.
+    Raises AirTouchError for a name that is none of these, and for a folder without a log.
     """
     files: dict[Path, None] = {}
     for name in names:
@@ -51,7 +51,7 @@ def files_of(names: Sequence[str]) -> list[Path]:
         if path.is_dir() and is_bag(path):
             paths = [path]
         elif path.is_dir():
-            paths = in_folder(path)
+            paths = flights_in(path)
         elif path.exists():
             if path.name == MANIFEST:  # which a shell's *.csv names too
                 if len(names) == 1:

@@ -1,6 +1,6 @@
 """The clock of a log: sample period, lost samples, and samples with rising times."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,7 @@ def true_period(time_s: np.ndarray) -> float | None:
 
 
 def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
-    """Gaps in which samples were lost. Samples without a time are skipped. period: s.
+    """Gaps in which samples were lost. Samples without a time, or with one out of order, are skipped. period: s.
 
     Arrival times are late in bursts and then catch up; that is no loss. Samples are lost where
     the least delay of the next WINDOW samples is at least 0.7 periods above that of the WINDOW before.
@@ -61,6 +61,7 @@ def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
     time_s = np.asarray(time_s, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         place = np.flatnonzero(np.abs(time_s) <= LATEST_S)
+    place = place[rising_subsequence(time_s[place], repeats=True)]
     if len(place) < 3:
         return []
     time_s = time_s[place]
@@ -99,17 +100,22 @@ def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
     return (np.arange(len(log)) + np.cumsum(shift)) * period, gaps
 
 
-def rising_subsequence(time_s: np.ndarray) -> np.ndarray:
-    """Indices of the longest subsequence with rising times: a wrong time costs its own sample and no other."""
+def rising_subsequence(time_s: np.ndarray, repeats: bool = False) -> np.ndarray:
+    """Indices of the longest subsequence with rising times: a wrong time costs its own sample and no other.
+
+    repeats: samples with equal times stay, too.
+    """
     place = np.flatnonzero(np.isfinite(time_s))
     times = time_s[place]
-    if not (np.diff(times) <= 0).any():
+    steps = np.diff(times)
+    if not ((steps < 0) if repeats else (steps <= 0)).any():
         return place
-    ends: list[float] = []  # ends[k]: least last time of a rising sequence of k + 1 samples
+    bisect = bisect_right if repeats else bisect_left
+    ends: list[float] = []  # ends[k]: least last time of such a sequence of k + 1 samples
     last: list[int] = []  # which sample that is
     before = np.empty(len(times), dtype=np.intp)
     for i, time in enumerate(times.tolist()):
-        length = bisect_left(ends, time)
+        length = bisect(ends, time)
         before[i] = last[length - 1] if length else -1
         ends[length:length + 1], last[length:length + 1] = [time], [i]
     path, i = [], last[-1]

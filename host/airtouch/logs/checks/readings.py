@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError, printable
-from airtouch.logs.checks.clock import FASTEST_S, LATEST_S, SLOWEST_S
+from airtouch.logs.checks.clock import FASTEST_S, LATEST_S, SLOWEST_S, true_period
 from airtouch.logs.flight_log import FlightLog
 
+MOST_CONTRADICTION = 0.05  #: of the stated sample period, largest difference from the clock's without a warning; chosen
 LARGEST = float(np.finfo(np.float32).max)  #: the firmware's variables are float32 or smaller
 
 
@@ -27,6 +28,7 @@ def without_impossible_values(log: FlightLog) -> FlightLog:
     if "t_s" in columns:
         columns["t_s"] = _without(columns["t_s"], _impossible_times(columns["t_s"], log.source),
                                   "t_s: not of this flight", warnings)
+        _compare_periods(columns["t_s"], meta, warnings)
     return FlightLog(columns, meta | {"warnings": warnings})
 
 
@@ -56,6 +58,17 @@ def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
         raise AirTouchError(f"{source}: {_step(possible):g} s from sample to sample, and {wrong.sum()} of "
                             f"{len(time_s)} times cannot be; give t_s in seconds, correct it or leave it out")
     return wrong
+
+
+def _compare_periods(time_s: np.ndarray, meta: dict[str, Any], warnings: list[str]) -> None:
+    """Add a warning where the stated sample period is not that of the clock (n,) s."""
+    stated, logged = meta.get("sample_period_s"), true_period(time_s)
+    if stated is None or logged is None or abs(logged / stated - 1.0) <= MOST_CONTRADICTION:
+        return
+    note = (f"sample_period_s is {stated:g} s, but t_s rises by {logged:.4g} s a sample: correct it or leave it out, "
+            "unless many samples are lost")
+    if note not in warnings:  # of the file that this one was converted from
+        warnings.append(note)
 
 
 def _step(time_s: np.ndarray) -> float:

@@ -14,61 +14,94 @@
 
 import csv
 import io
+import math
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, nearest
-from airtouch.logs.checks.readings import without_impossible_values
+from airtouch.errors import AirTouchError, nearest, printable
+from airtouch.logs.checks.readings import LARGEST, without_impossible_values
 from airtouch.logs.files import load_text
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 KEYS = ("from", "scale", "offset")
+OURS = ("source", "format", "warnings")  #: metadata that the reader sets
+MISSING = ("nan", "+nan", "-nan", "na", "n/a", "null", "none")  #: words that other programs write for no value
 
 
 def load(path: str | Path) -> dict:
-    """The column map in a TOML file. Raises AirTouchError with a wrong column or key and the nearest right ones."""
+    """The column map in a TOML file.
+
+    Raises AirTouchError with a wrong column or key and the nearest right ones, and for a value of a wrong type.
+    """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise AirTouchError(f"{path}: cannot be read as a column map: {error}") from None
+    for key in table:
+        if key in OURS:
+            raise AirTouchError(f"{path}: {key} is not for a map to say; leave it out")
+    if not isinstance(table.get("vehicle", ""), str):
+        raise AirTouchError(f"{path}: vehicle is {table['vehicle']!r}, a text is needed")
     columns = table.get("columns")
     if not isinstance(columns, dict) or not columns:
         raise AirTouchError(f"{path}: no [columns.NAME] in it; give one for each column, with from = \"their name\"")
     for name, how in columns.items():
         if name not in COLUMNS:
             raise AirTouchError(f"{path}: [columns.{name}] is no column of the flight log{nearest(name, COLUMNS)}")
-        for key in how:
-            if key not in KEYS:
-                raise AirTouchError(f"{path}: [columns.{name}] has no key {key!r}{nearest(key, KEYS)}")
-        if "from" not in how:
-            raise AirTouchError(f"{path}: [columns.{name}] needs from = \"their name\"")
+        _check_column(how, f"{path}: [columns.{name}]")
     return table
+
+
+def _check_column(how: Any, place: str) -> None:
+    """Raise AirTouchError, with the place, for a column of a map with a wrong key or a value of a wrong type."""
+    if not isinstance(how, dict):
+        raise AirTouchError(f"{place} is {how!r}; give a table with from = \"their name\"")
+    for key in how:
+        if key not in KEYS:
+            raise AirTouchError(f"{place} has no key {key!r}{nearest(key, KEYS)}")
+    if "from" not in how:
+        raise AirTouchError(f"{place} needs from = \"their name\"")
+    if not isinstance(how["from"], str):
+        raise AirTouchError(f"{place}: from is {how['from']!r}, a name in quotation marks is needed")
+    for key in ("scale", "offset"):
+        value = how.get(key, 1.0)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
+            raise AirTouchError(f"{place}: {key} is {value!r}, a number is needed, without quotation marks")
 
 
 def read(path: str | Path, mapping: str | Path) -> FlightLog:
     """The flight log of a CSV with a header line, by a column map (a TOML file).
 
-    Raises AirTouchError for columns that the CSV lacks.
+    Cells that are no numbers become NaN; a warning counts them. Raises AirTouchError for columns that the CSV lacks.
     """
     table = load(mapping)
-    rows = list(csv.reader(io.StringIO(load_text(path).decode("utf-8", "replace"))))
+    try:
+        rows = list(csv.reader(io.StringIO(load_text(path).decode("utf-8", "replace"))))
+    except csv.Error as error:
+        raise AirTouchError(f"{path}: cannot be read as CSV: {error}") from None
     rows = [r for r in rows if r and not r[0].startswith("#")]
     if len(rows) < 2:
         raise AirTouchError(f"{path}: no header and rows in it")
     header = [name.strip() for name in rows[0]]
-    columns = {}
+    columns, warnings = {}, []
     for name, how in table["columns"].items():
         if how["from"] not in header:
             raise AirTouchError(f"{path}: no column {how['from']!r}{nearest(how['from'], header)} ({mapping}: "
                                 f"[columns.{name}])")
         place = header.index(how["from"])
-        theirs = np.array([_number(r[place]) if place < len(r) else np.nan for r in rows[1:]])
-        columns[name] = (theirs + how.get("offset", 0.0)) * how.get("scale", 1.0)
+        cells = [r[place].strip() if place < len(r) else "" for r in rows[1:]]
+        theirs, texts = np.array([_number(cell) for cell in cells]), [cell for cell in cells if _is_text(cell)]
+        if texts:
+            warnings.append(f"{name}: {len(texts)} of {len(cells)} cells are no numbers, the first "
+                            f"'{printable(texts[0], 20)}'; taken as missing")
+        with np.errstate(invalid="ignore", over="ignore"):
+            columns[name] = (theirs + how.get("offset", 0.0)) * how.get("scale", 1.0)
     meta = {k: v for k, v in table.items() if k != "columns"}
     log = FlightLog({n: columns[n] for n in COLUMNS if n in columns},
-                    {"source": str(path), "format": "mapped", "condition": "", "warnings": [], **meta})
+                    {"source": str(path), "format": "mapped", "condition": "", "warnings": warnings, **meta})
     return without_impossible_values(log)
 
 
@@ -77,3 +110,8 @@ def _number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return np.nan
+
+
+def _is_text(cell: str) -> bool:
+    """True for a cell that is neither empty, nor a number, nor a word for a missing one."""
+    return bool(cell) and cell.lower() not in MISSING and math.isnan(_number(cell))

@@ -2,6 +2,7 @@
 
 Messages are recognised by their type, not by the name of the topic. Axes are those of REP 103 (x forward, y left,
 z up), as in a FlightLog. Motors are an array of four numbers on a topic with "motor", "pwm" or "actuator" in its name.
+Each column comes from one topic.
 """
 
 from collections import defaultdict
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, printable
 from airtouch.extras import need
 from airtouch.logs.alignment import aligned_log
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
@@ -19,6 +20,9 @@ from airtouch.logs.quaternion import euler
 METADATA = "metadata.yaml"
 MOTOR_NAMES = ("motor", "pwm", "actuator")
 ARRAYS = ("UInt16MultiArray", "UInt32MultiArray", "Int32MultiArray", "Float32MultiArray", "Float64MultiArray")
+DOWN_NAMES = ("down", "bottom", "zrange")  #: in the topic or the frame id of the range sensor that looks down
+MOST_SHARE = 2.0  #: largest value of motor commands from 0 to 1, which may overshoot; chosen
+PULSE_US = (800.0, 2200.0)  #: us, shortest and longest pulse of motors that take 1000 to 2000 us; chosen
 
 
 def is_bag(path: str | Path) -> bool:
@@ -32,22 +36,50 @@ def read(path: str | Path) -> FlightLog:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    rows: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    rows: dict[str, dict[str, list[tuple[float, float]]]] = defaultdict(lambda: defaultdict(list))
+    kinds: dict[str, str] = {}  # of each topic, in the order of their first messages
+    frames: dict[str, str] = {}
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             for connection, stamp, raw in reader.messages():
-                kind = connection.msgtype.rpartition("/")[2]
-                if kind in READERS or (kind in ARRAYS and _is_motor(connection.topic)):
+                topic, kind = connection.topic, connection.msgtype.rpartition("/")[2]
+                if kind in READERS or (kind in ARRAYS and _is_motor(topic)):
                     message = reader.deserialize(raw, connection.msgtype)
                     time = _time(message, stamp)
+                    kinds.setdefault(topic, kind)
+                    frames.setdefault(topic, str(getattr(getattr(message, "header", None), "frame_id", "")))
                     for name, value in (READERS.get(kind) or _motors)(message):
-                        rows[name].append((time, value))
+                        rows[name][topic].append((time, value))
     except AirTouchError:
         raise
     except Exception as error:  # a damaged bag makes the library raise any of many
         raise AirTouchError(f"{path}: not a whole ROS 2 bag: {type(error).__name__}: {error}") from None
-    signals = {name: tuple(np.array(pairs).T) for name, pairs in rows.items()}
-    return aligned_log(signals, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body"})
+    chosen = {name: min(topics, key=lambda topic: _rank(topic, kinds, frames)) for name, topics in rows.items()}
+    signals = {name: tuple(np.array(rows[name][topic]).T) for name, topic in chosen.items()}
+    if PWM[0] in signals:
+        pwm = _pwm(np.array([signals[name][1] for name in PWM]), kinds[chosen[PWM[0]]])
+        signals |= {name: (signals[name][0], values) for name, values in zip(PWM, pwm, strict=True)}
+    return aligned_log(signals, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body",
+                                 "warnings": _ignored(rows, chosen)})
+
+
+def _rank(topic: str, kinds: dict[str, str], frames: dict[str, str]) -> tuple[int, bool, int]:
+    """Place of a topic among those of a column: by type, then range sensors that look down, then the first."""
+    kind = kinds[topic]
+    down = any(word in name.lower() for name in (topic, frames[topic]) for word in DOWN_NAMES)
+    by_type = list(READERS).index(kind) if kind in READERS else len(READERS)
+    return by_type, kind == "Range" and not down, list(kinds).index(topic)
+
+
+def _ignored(rows: dict[str, dict[str, Any]], chosen: dict[str, str]) -> list[str]:
+    """A warning for each topic that has values of a column which comes from another one."""
+    columns: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for name, topic in chosen.items():
+        for other in rows[name]:
+            if other != topic:
+                columns[other, topic].append(name)
+    return [f"{printable(other)} is left out of {', '.join(names)}: read from {printable(topic)}"
+            for (other, topic), names in columns.items()]
 
 
 def _is_motor(topic: str) -> bool:
@@ -90,9 +122,20 @@ def _pose(message: Any) -> list[tuple[str, float]]:
 
 def _motors(message: Any) -> list[tuple[str, float]]:
     values = np.asarray(message.data, float)
-    scale = 65535.0 if values.max(initial=0.0) <= 1.0 else 1.0
-    return list(zip(PWM, (scale * values).tolist(), strict=True)) if len(values) == 4 else []
+    return list(zip(PWM, values.tolist(), strict=True)) if len(values) == 4 else []
 
 
-READERS = {"Imu": _imu, "Odometry": _odometry, "PoseStamped": _pose, "Range": lambda m: [("zrange_m", float(m.range))],
+def _pwm(commands: np.ndarray, kind: str) -> np.ndarray:
+    """PWM (4, n) of a topic's motor commands (4, n): 0 to 1 in floating point, pulses of 1000 to 2000 us, or PWM."""
+    there = commands[np.isfinite(commands) & (commands != 0.0)]
+    most = there.max(initial=0.0)
+    if kind.startswith("Float") and most <= MOST_SHARE:
+        return 65535.0 * np.clip(commands, 0.0, 1.0)
+    if len(there) and there.min() >= PULSE_US[0] and most <= PULSE_US[1]:
+        return 65535.0 * np.clip((commands - 1000.0) / 1000.0, 0.0, 1.0)
+    return commands
+
+
+#: message type -> reader of its columns; of two types with the same column the one that comes first is read
+READERS = {"Odometry": _odometry, "PoseStamped": _pose, "Imu": _imu, "Range": lambda m: [("zrange_m", float(m.range))],
            "BatteryState": lambda m: [("vbat_V", float(m.voltage))]}

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from airtouch.errors import AirTouchError, nearest, unknown
+from airtouch.logs.files import read_text
 from airtouch.simulation.effects import names
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
@@ -116,10 +117,13 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
 
 
 def load_file(path: str | Path) -> list[Effect]:
-    """Register every `Effect` that a Python file defines at its top level, and return them."""
+    """Register every `Effect` that a Python file defines at its top level, and return them.
+
+    Raises AirTouchError for a file that is not there or no text.
+    """
     if not Path(path).is_file():
         raise AirTouchError(f"{path}: no such file of effects")
-    loaded = load_text(Path(path).read_text(encoding="utf-8"), str(path))
+    loaded = load_text(read_text(path), str(path))
     _SOURCE.update(dict.fromkeys((e.name for e in loaded), str(path)))
     return loaded
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import MANIFEST, make_folder
+from airtouch.logs.files import MANIFEST, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
@@ -32,7 +32,7 @@ def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -
     text = json.dumps(request, indent=1, sort_keys=True)
     make_folder(folder)
     known = folder / REQUEST
-    if known.is_file() and known.read_text() == text:
+    if known.is_file() and known.read_bytes() == text.encode():  # bytes, as a damaged one may be no text
         return
     old = [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]
     if old or known.is_file():
@@ -59,10 +59,13 @@ def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
 
 
 def failures(folder: Path) -> list[dict[str, Any]]:
-    """Flights that diverged, by number; a line cut short by a kill is skipped."""
+    """Flights that diverged, by number; a line cut short by a kill is skipped.
+
+    Raises AirTouchError for a file that is no text.
+    """
     path = folder / FAILED
     entries = {}
-    for line in path.read_text().splitlines() if path.is_file() else []:
+    for line in read_text(path).splitlines() if path.is_file() else []:
         try:
             entry = json.loads(line)
         except json.JSONDecodeError:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import ENDINGS, MANIFEST, in_folder
+from airtouch.logs.files import MANIFEST, flights_in, in_folder
 from airtouch.logs.flight_log import FlightLog
 
 MOST_MPS = 100.0  #: m/s, above any commanded speed
@@ -127,17 +127,14 @@ def day_of(path: Path) -> str | None:
 
 def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
     """The clean flights of a folder's manifest, or all logs in it without one. Raises AirTouchError without any."""
-    if listed:
-        files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
-    else:
-        files = in_folder(folder)
-    if not files and listed:
+    if not listed:
+        return flights_in(folder)
+    files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
+    if not files:
         uses = Counter(str(condition.use) for condition in listed.values())
         raise AirTouchError(f"{folder}: no clean flight in its manifest, but "
                             f"{', '.join(f'{count} {use}' for use, count in uses.items())}; name the logs themselves "
                             "to take them")
-    if not files:
-        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)})")
     return files
 
 
