@@ -16,6 +16,9 @@ name = "short"
 do = "take-off"
 height_m = 0.4
 time_s = 1.0
+[[mission.step]]
+do = "hover"
+time_s = 0.5
 """
 REQUEST = {"scenario": "short", "seed": 3}
 
