@@ -11,6 +11,7 @@ from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import find_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.progress import Bar
+from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import demo_flights
@@ -50,6 +51,8 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     report = out / "report.html"
     if report.exists() and not force:
         raise AirTouchError(f"{report}: exists already; use --force to replace it")
+    if not force and any((out / "model").glob("*")):
+        raise AirTouchError(f"{out / 'model'}: holds a model already; use --force to replace it")
     make_folder(out)
     steps = Steps(started)
 
@@ -84,7 +87,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     write_report(report, f"AirTouch demo: {origin}", scored,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
-                 command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
+                 command=typed(), left_out=left_out, force=True)
     click.echo(f"  written: {report} (open it in a browser), {out / 'model'}")
     click.echo(f"\ndone in {time.monotonic() - started:.0f} s")
 

@@ -1,7 +1,5 @@
 """`airtouch adapt`: a detector for the drone that flew some flights."""
 
-import shlex
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import Any
 import click
 
 from airtouch.cli.shared.progress import Bar
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
@@ -71,10 +70,9 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
                                  seed=seed, bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")
-    typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
         adapted = adapt.adapt(usable, twin.scenario, twin.vehicle, work, start=start, seed=seed, hold_out=hold_out,
-                              withhold=withhold_range, progress=stages, command=typed)
+                              withhold=withhold_range, progress=stages, command=typed())
     adapted.model.save(out, force)
     _say(adapted, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")

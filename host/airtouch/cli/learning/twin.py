@@ -129,7 +129,8 @@ def _check_free(fit_file: Path, results: Sequence[Path], resume: bool, force: bo
                                 "replace it")
 
 
-def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, command_line: str) -> dict[str, Any]:
+def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any,
+             command_line: str) -> dict[str, Any]:
     """The content of the report as plain values for JSON."""
     return {"command": command_line, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
             "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.diverged,
