@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.flights import SPEED_MPS, find_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
@@ -34,7 +34,7 @@ COMPILES = "the first time compiles the simulator, which takes a minute"
               help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
               help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
-@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of flights without one in their manifest.")
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from airtouch.cli.shared.flights import SPEED_MPS
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -27,8 +28,8 @@ MORE = 5  #: further flights whose benefit is estimated
               f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
-@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
-              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
+              help="Commanded speed of flights without one in their manifest; else from the logs.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
@@ -55,6 +56,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
+    from airtouch.detector.evaluation.data.folds import in_folds
     from airtouch.twin import adapt, adapt_report
 
     need("train", "training")
@@ -63,7 +65,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     if twin_folder and vehicle:
         raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
-    usable = _read([f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds])
+    usable = _read(in_folds(dataset.collect(flights, speed), folds))
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
     twin = adapt_report.twin_for(usable, twin_folder, vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed,

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from airtouch.cli.shared.flights import SPEED_MPS
 from airtouch.cli.shared.folders import made_folder
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
@@ -25,8 +26,8 @@ SUMMARY, REPORT = "twin.json", "report.html"
               help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True,
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
-@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
-              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
+              help="Commanded speed of flights without one in their manifest; else from the logs.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
