@@ -20,6 +20,7 @@ from airtouch.logs.files import MANIFEST, make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
+from airtouch.tables import is_number
 
 REQUEST, FAILED = "run.json", "diverged.jsonl"
 HEAD = "file,use,fold,height,angle_deg,wind,speed_mps"  #: first line of the manifest
@@ -130,7 +131,7 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
     lines = [HEAD]
     for number, path in _flights(folder, scenario.name, seed).items():
         values = draw_flight(scenario, seed, number).values
-        height = f"{1000 * values['clearance']:.0f}mm" if "clearance" in values else ""
+        height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
         cells = [path.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
         lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
