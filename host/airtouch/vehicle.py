@@ -1,6 +1,5 @@
 """A vehicle: mass, geometry, thrust curve and noise, read from a TOML file."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from importlib import resources
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import tables
 from airtouch.errors import AirTouchError, unknown
 from airtouch.parameters import DEFAULT
 
@@ -71,6 +71,9 @@ FILE = "VEHICLE.toml"  #: in advised commands: the file of a vehicle that is not
 TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are texts
 #: field -> length, of fields that are lists of numbers
 LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
+#: fields that must be more than 0
+POSITIVE = {"mass_kg", "arm_m", "motor_time_constant_s", "rotor_radius_m", "gravity_mps2", "nominal_voltage_v",
+            "battery_cells", "battery_capacity_ah", "range_drift_time_s", "flow_noise_time_s"}
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
@@ -117,10 +120,7 @@ def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
 
 def parse(text: str, source: str) -> Vehicle:
     """The vehicle in a TOML text. `source` is its name in messages. Raises AirTouchError as `load` does."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    table = tables.parse(text, source)
     values = numbers(table, source)
     try:
         vehicle = Vehicle(**values)
@@ -143,19 +143,15 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, value in table.items():
         if name in LISTS:
-            if not (isinstance(value, list) and len(value) == LISTS[name] and all(_is_number(v) for v in value)):
-                raise AirTouchError(f"{source}: {name} must be {LISTS[name]} numbers")
-            values[name] = tuple(float(v) for v in value)
+            values[name] = tables.number_list(table, name, source, LISTS[name])
         elif name in TEXTS:
             if not isinstance(value, str):
                 raise AirTouchError(f"{source}: {name} must be a text in quotes")
             values[name] = value
-        elif _is_number(value):
-            values[name] = float(value)
         else:
-            raise AirTouchError(f"{source}: {name} must be a number")
-    if values.get("mass_kg", 1.0) <= 0 or min(values.get("inertia_kg_m2", (1.0,))) <= 0:
-        raise AirTouchError(f"{source}: mass and inertia must be positive")
+            values[name] = tables.number(table, name, source, above=0.0 if name in POSITIVE else -np.inf)
+    if min(values.get("inertia_kg_m2", (1.0,))) <= 0:
+        raise AirTouchError(f"{source}: inertia must be positive")
     return values
 
 
@@ -169,7 +165,3 @@ def check_firmware(firmware: str, range_module: str, source: str) -> None:
         settings.load(firmware)
     except AirTouchError as error:
         raise AirTouchError(f"{source}: {error}") from None
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)

@@ -6,6 +6,7 @@ import shutil
 import pytest
 from click.testing import CliRunner
 
+from airtouch.cli import airtouch
 from airtouch.cli.learning.crossval import command
 from airtouch.detector import baseline
 from airtouch.detector.evaluation import crossval
@@ -48,6 +49,36 @@ def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(genera
     assert table["flights"] == 4 and len(table["folds"]) == 2 and len(table["lag_s"]) == 2
     assert "done before" in run(*call, "--force").stderr
     assert ledger.read_text().count("baseline") == 2
+
+
+@pytest.mark.parametrize("options, message", [
+    (["--silence-training"], "needs --silence"), (["--random-epochs", 60], "needs --random-windows")])
+def test_an_option_without_its_other_is_refused(generated, tmp_path, options, message):
+    result = run(generated, "--out", tmp_path / "folds", *options)
+    assert result.exit_code == 2 and message in result.output and not (tmp_path / "folds").exists()
+
+
+def test_the_ledger_is_checked_before_the_work(generated, tmp_path, monkeypatch):
+    monkeypatch.setattr(crossval, "crossval", lambda *_, **__: pytest.fail("it has begun"))
+    result = run(generated, "--detector", "baseline", "--ledger", tmp_path)
+    assert isinstance(result.exception, AirTouchError) and "is a folder" in str(result.exception)
+    result = run(generated, "--detector", "baseline", "--ledger", "/proc/absent/looks.md")
+    assert isinstance(result.exception, AirTouchError) and "cannot be made" in str(result.exception)
+
+
+def test_the_ledger_may_be_in_a_new_folder(generated, tmp_path):
+    ledger = tmp_path / "new" / "looks.md"
+    result = run(generated, "--detector", "baseline", "--out", tmp_path / "folds", "--ledger", ledger)
+    assert result.exit_code == 0 and "baseline" in ledger.read_text()
+
+
+@pytest.mark.parametrize("name", ["adapt", "twin", "evaluate", "crossval", "map"])
+def test_commands_take_the_same_speeds(name, tmp_path):
+    out = ["--out", str(tmp_path / "out")] if name != "evaluate" else []
+    call = [name, str(tmp_path / "absent"), *out, "--speed"]
+    taken, refused = (CliRunner().invoke(airtouch, [*call, speed]) for speed in ("2", "101"))
+    assert "no such file" in str(taken.exception), taken.output
+    assert refused.exit_code == 2 and "0<x<=100" in refused.output
 
 
 def test_a_damaged_cache_is_done_again(generated, tmp_path):

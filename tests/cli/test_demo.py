@@ -39,6 +39,14 @@ def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     assert isinstance(repeat.exception, AirTouchError) and "--force" in str(repeat.exception)
 
 
+def test_a_model_of_the_user_is_not_replaced(tmp_path):
+    pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "best.npz").write_text("mine")
+    assert "model: holds a model already" in str(run("--out", tmp_path).exception)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 def test_the_seconds_run_on_a_terminal_while_nothing_is_told():
     """On a pseudo-terminal: the elapsed time appears again and again, without a call."""
     code = ("import time\nfrom airtouch.cli.shared.progress import Bar\n"

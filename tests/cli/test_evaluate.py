@@ -51,7 +51,7 @@ def test_the_scores_of_a_folder_are_those_of_its_edges(generated, tmp_path):
 def test_a_fold_without_flights_is_named(generated):
     result = run(generated, "--detector", "baseline", "--fold", "77")
     assert isinstance(result.exception, AirTouchError)
-    assert str(result.exception) == "no flight is in fold 77 of the manifest"
+    assert str(result.exception) == "no flight is in fold 77 of the manifest; its folds are 0, 1"
 
 
 def test_flights_that_the_manifest_leaves_out_are_counted(generated, tmp_path):

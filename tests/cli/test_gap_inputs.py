@@ -1,10 +1,16 @@
-"""What `airtouch gap diagnose` says of inputs and outputs that it cannot use, before any work."""
+"""What `airtouch gap` says of inputs and outputs that it cannot use."""
+
+import shlex
 
 import pytest
 from click.testing import CliRunner
 
+import made_diagnosis
+from airtouch.cli.gap.blind import blind_run
 from airtouch.cli.gap.diagnose import diagnose_command
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
+from airtouch.gap import diagnosis
 
 
 def test_baseline_before_the_flights_is_told():
@@ -16,3 +22,67 @@ def test_a_place_that_no_one_can_write_to_is_told_before_the_work(tmp_path):
     with pytest.raises(AirTouchError, match="cannot be written to"):
         CliRunner().invoke(diagnose_command, [str(tmp_path / "absent.csv"), "--report", "/proc/which.html"],
                            catch_exceptions=False, standalone_mode=False)
+
+
+@pytest.mark.parametrize("words", [["--baseline", "a.csv", "b.csv"], ["--baseline=a.csv", "b.csv"],
+                                   ["--baseline=", "a.csv", "b.csv"], ["--baseline=a.csv", "--baseline=b.csv"]])
+def test_each_name_after_baseline_is_of_the_baseline(words):
+    context = diagnose_command.make_context("diagnose", ["real.csv", *words, "--each"])
+    assert context.params["real"] == ("real.csv",) and context.params["baseline"] == ("a.csv", "b.csv")
+
+
+@pytest.mark.parametrize("words", [["--baseline"], ["--baseline="], ["--baseline", "--each"]])
+def test_a_baseline_without_a_name_is_told(words):
+    result = CliRunner().invoke(diagnose_command, ["real.csv", *words])
+    assert result.exit_code == 2 and "requires an argument" in result.output
+
+
+def test_a_partner_needs_a_baseline():
+    result = CliRunner().invoke(diagnose_command, ["real.csv", "--partner", "high.csv"])
+    assert result.exit_code == 2 and "--partner needs --baseline" in result.output
+
+
+@pytest.fixture
+def unreadable(tmp_path):
+    """Two files that are no logs."""
+    for name in ("bad_1.csv", "bad_2.csv"):
+        (tmp_path / name).write_text("")
+    return tmp_path
+
+
+def test_partners_that_cannot_be_read_are_told(generated, unreadable, monkeypatch):
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: made_diagnosis.diagnosis())
+    result = CliRunner().invoke(diagnose_command, [
+        str(generated / "f0.csv.gz"), "--baseline", str(generated / "f1.csv.gz"),
+        "--partner", str(unreadable / "bad_1.csv"), "--partner", str(unreadable / "bad_2.csv")])
+    assert result.exit_code == 0, result.output + str(result.exception)
+    assert result.output.count("left out: ") == 2 and "bad_2.csv: the file is empty" in result.output
+
+
+def test_each_that_diagnoses_nothing_is_an_error(unreadable, tmp_path):
+    result = CliRunner().invoke(diagnose_command, [str(unreadable), "--each", "--json", str(tmp_path / "out.json")])
+    assert isinstance(result.exception, AirTouchError) and "none of 2 flights" in str(result.exception)
+    assert "bad_1.csv: the file is empty" in result.output and not (tmp_path / "out.json").exists()
+
+
+def test_each_tells_a_flight_that_is_in_its_baseline_too(generated, monkeypatch):
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: made_diagnosis.diagnosis())
+    flight = str(generated / "f0.csv.gz")
+    result = CliRunner().invoke(diagnose_command, [flight, "--each", "--baseline", flight])
+    assert "cannot differ from itself" in result.output
+
+
+def test_the_command_in_a_report_can_be_pasted_and_long_lists_are_counted(monkeypatch):
+    words = ["gap", "diagnose", "my flight.csv", "--partner", "high.csv", "--without", "wind", "--baseline", *"abcdef"]
+    monkeypatch.setattr("sys.argv", ["/usr/bin/airtouch", *words])
+    assert shlex.split(typed()) == ["airtouch", *words]
+    assert typed(4).endswith("--baseline a b c d [and 2 more]") and "--without wind" in typed(4)
+
+
+def test_the_figures_of_a_check_are_not_replaced(tmp_path):
+    (tmp_path / "mine.json").write_text("mine")
+    for out, option in (("check", ["--json", str(tmp_path / "mine.json")]), ("", [])):
+        (tmp_path / "figures.json").write_text("mine")
+        result = CliRunner().invoke(blind_run, [str(tmp_path / out), *option])
+        assert "exists already" in str(result.exception)
+    assert {p.read_text() for p in tmp_path.glob("*.json")} == {"mine"} and not (tmp_path / "check").exists()

@@ -7,7 +7,9 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
+from click.testing import CliRunner
 
+from airtouch.cli.dataset import fetch
 from airtouch.errors import AirTouchError
 from airtouch.logs import public
 
@@ -43,6 +45,26 @@ def test_a_damaged_file_in_the_target_is_replaced(two_flights, tmp_path):
     (source / "b.csv").write_bytes(two_flights["b.csv.gz"])
     (out / "b.csv.gz").write_bytes(b"\x1f\x8bgarbage")
     assert "b.csv.gz" in public.fetch(out, source=source)["new"]
+
+
+def test_a_manifest_of_other_flights_stays(two_flights, tmp_path):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    out.mkdir()
+    (source / "b.csv").write_bytes(two_flights["b.csv.gz"])
+    (out / "manifest.csv").write_text("file,use\nmine.csv,clean\n")
+    with pytest.raises(AirTouchError, match="not the manifest of these flights"):
+        public.fetch(out, source=source)
+    assert "mine.csv" in (out / "manifest.csv").read_text() and not (out / "b.csv.gz").exists()
+
+
+def test_nothing_fetched_leaves_no_manifest(two_flights, tmp_path):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    assert len(public.fetch(out, source=source)["failed"]) == 2
+    assert not (out / "manifest.csv").exists()
+    result = CliRunner().invoke(fetch, ["--from", str(source), "--out", str(tmp_path / "new" / "out")])
+    assert isinstance(result.exception, AirTouchError) and not (tmp_path / "new").exists()
 
 
 def test_flights_come_over_http_and_failures_are_listed(two_flights, tmp_path, monkeypatch):

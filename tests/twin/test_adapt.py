@@ -142,6 +142,13 @@ def adapt_vehicle():
     return vehicle.load()
 
 
+def test_a_fold_without_flights_is_named_with_those_that_there_are(tmp_path):
+    (tmp_path / "f.csv").write_text("")
+    (tmp_path / "manifest.csv").write_text("file,use,fold\nf.csv,clean,2\n")
+    result = CliRunner().invoke(airtouch, ["adapt", str(tmp_path), "--fold", "9", "--out", str(tmp_path / "m.npz")])
+    assert str(result.exception) == "no flight is in fold 9 of the manifest; its folds are 2"
+
+
 def test_no_flight_is_in_training_and_held_out_at_once(sweeps, tmp_path, monkeypatch):
     """Each held-out flight is scored once, by a model whose training flights lack it."""
     scored = []

@@ -101,6 +101,29 @@ def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
     assert "two vehicles" in refusal("two", [*flights, other])
 
 
+def test_force_keeps_the_old_fit_until_the_inputs_are_read(folder, tmp_path):
+    fit = tmp_path / "fit.json"
+    fit.write_text("a fit of hours")
+    assert "no such file or folder" in str(run("twin", tmp_path / "absent", "--out", tmp_path, "--force").exception)
+    assert "no such vehicle" in str(run("twin", folder, "--vehicle", "absent.toml", "--out", tmp_path,
+                                        "--force").exception)
+    assert fit.read_text() == "a fit of hours"
+
+
+@pytest.mark.parametrize("option", [[], ["--resume"]])
+@pytest.mark.parametrize("name", ["vehicle.toml", "scenario.toml", "twin.json", "report.html"])
+def test_files_of_the_user_are_not_replaced(folder, tmp_path, name, option):
+    (tmp_path / name).write_text("mine")
+    result = run("twin", folder, "--out", tmp_path, *option)
+    assert f"{name}: exists already" in str(result.exception)
+    assert (tmp_path / name).read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_refused_call_leaves_no_folder(tmp_path):
+    assert "no such file or folder" in str(run("twin", tmp_path / "absent", "--out", tmp_path / "new").exception)
+    assert not (tmp_path / "new").exists()
+
+
 def test_the_help_of_twin_says_what_to_fly_and_how_to_go_on():
     output = run("twin", "--help").output
     for text in ("What to fly", "airtouch simulate twin/scenario.toml", "0.5 is closed"):

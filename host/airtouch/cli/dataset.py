@@ -6,6 +6,7 @@ import click
 from rich.progress import Progress
 
 from airtouch.cli import Suggesting
+from airtouch.cli.shared.folders import made_folder
 from airtouch.errors import AirTouchError
 from airtouch.logs import public
 
@@ -29,6 +30,12 @@ def fetch(out: Path, source: Path | None, base_url: str) -> None:
     airtouch dataset fetch --from ~/crazyflie_filter_constant/control/data
     airtouch crossval flights/airtouch
     """
+    with made_folder(out):
+        _fetch(out, source, base_url)
+
+
+def _fetch(out: Path, source: Path | None, base_url: str) -> None:
+    """Fetch the flights and print their numbers. Raises AirTouchError where some failed."""
     with Progress(transient=True) as bar:
         task = bar.add_task("flights", total=len(public.registry()))
         states = public.fetch(out, source=source, base_url=base_url,

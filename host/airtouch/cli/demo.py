@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.flights import SPEED_MPS, find_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.progress import Bar
+from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import demo_flights
@@ -33,7 +34,7 @@ COMPILES = "the first time compiles the simulator, which takes a minute"
               help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
               help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
-@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of flights without one in their manifest.")
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
@@ -50,6 +51,8 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     report = out / "report.html"
     if report.exists() and not force:
         raise AirTouchError(f"{report}: exists already; use --force to replace it")
+    if not force and any((out / "model").glob("*")):
+        raise AirTouchError(f"{out / 'model'}: holds a model already; use --force to replace it")
     make_folder(out)
     steps = Steps(started)
 
@@ -84,7 +87,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     write_report(report, f"AirTouch demo: {origin}", scored,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
-                 command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
+                 command=typed(), left_out=left_out, force=True)
     click.echo(f"  written: {report} (open it in a browser), {out / 'model'}")
     click.echo(f"\ndone in {time.monotonic() - started:.0f} s")
 

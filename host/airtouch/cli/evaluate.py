@@ -6,11 +6,12 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared import scores as show
+from airtouch.cli.shared.flights import SPEED_MPS
 from airtouch.cli.shared.help import examples
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
-from airtouch.errors import AirTouchError
+from airtouch.detector.evaluation.data import folds as folds_of
 from airtouch.logs.files import check_free
 
 
@@ -22,7 +23,7 @@ from airtouch.logs.files import check_free
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
-@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of flights without one in their manifest; default: the log's.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
@@ -39,9 +40,7 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     module = registry.get(detector)
     trained = module.load(model)
     collected = dataset.collect(flights, speed)
-    files = [f for f in collected if not folds or f.condition.fold in folds]
-    if not files:
-        raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
+    files = folds_of.in_folds(collected, folds)
     reasons = dataset.not_taken(flights)
     reasons["of another fold"] += len(collected) - len(files)
     if reasons.total():

@@ -117,7 +117,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     _write(results, len(todo), out, scene.name)
     there = flights - len(store.missing(out, scene.name, seed, flights))
     diverged = [f for f in store.failures(out) if f["flight"] < flights]
-    store.write_manifest(out, scene, seed, flights)
+    store.write_manifest(out, scene, seed)
     whole = there - len(diverged)
     click.echo(f"{whole} flight{'s' * (whole != 1)} in {out}")
     if diverged:

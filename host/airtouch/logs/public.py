@@ -33,12 +33,15 @@ def fetch(
 
     Returns the file names by state: "present" (already there with the right hash), "new" and "failed"
     (missing at the source, or with a wrong hash; not written).
-    Raises AirTouchError if `source` is no folder, or if pooch is needed and not installed.
+    No manifest.csv is written where there is no flight.
+    Raises AirTouchError if `source` is no folder, if `out` has a manifest.csv of other flights, and if pooch is needed
+    and not installed.
     """
     if source is not None and not source.is_dir():
         raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
     read = from_folder(source) if source is not None else _from_network(base_url)
     make_folder(out)
+    _check_manifest(out / MANIFEST)
     states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
     for row in registry():
         target = out / row["file"]
@@ -46,7 +49,8 @@ def fetch(
         states[state].append(row["file"])
         if progress:
             progress(row["file"], state)
-    _write_manifest(out / MANIFEST, set(states["present"] + states["new"]))
+    if fetched := set(states["present"] + states["new"]):
+        _write_manifest(out / MANIFEST, fetched)
     return states
 
 
@@ -105,12 +109,23 @@ def _from_network(base_url: str) -> Callable[[str, str], bytes | None]:
     return read
 
 
+def _manifest_lines() -> dict[str, str]:
+    """File -> its line in manifest.csv, of every flight of the registry; under "file" the head."""
+    columns = [name for name in registry()[0] if name != "sha256"]
+    return {"file": ",".join(columns)} | {row["file"]: ",".join(_quote(row[name]) for name in columns)
+                                          for row in registry()}
+
+
+def _check_manifest(path: Path) -> None:
+    """Raise AirTouchError for a manifest.csv with a line that `_write_manifest` does not write."""
+    lines = load_bytes(path).decode(errors="replace").splitlines() if path.exists() else []
+    if not {*lines} <= {*_manifest_lines().values()}:
+        raise AirTouchError(f"{path}: not the manifest of these flights; choose another --out, or move it away")
+
+
 def _write_manifest(path: Path, present: set[str]) -> None:
     """Write the manifest.csv of the flights that are present."""
-    rows = [row for row in registry() if row["file"] in present]
-    columns = [name for name in registry()[0] if name != "sha256"]
-    lines = [",".join(columns)]
-    lines += [",".join(_quote(row[name]) for name in columns) for row in rows]
+    lines = [line for file, line in _manifest_lines().items() if file in present | {"file"}]
     _replace(path, ("\n".join(lines) + "\n").encode())
 
 

@@ -1,7 +1,6 @@
 """Scenarios: a world, a mission and effects with ranges, so that no two flights are alike."""
 
 import math
-import tomllib
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import tables
 from airtouch.errors import AirTouchError, unknown
 from airtouch.simulation import effects
 from airtouch.simulation.firmware.settings import DEFAULT
@@ -76,10 +76,7 @@ def load(name_or_path: str | Path) -> Scenario:
 
 def parse(text: str, source: str) -> Scenario:
     """A scenario from TOML text; `source` names it in messages. One flight is drawn as a check."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    table = tables.parse(text, source)
     unknown_keys = sorted(set(table) - KEYS)
     if unknown_keys:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown_keys)}; known: {', '.join(sorted(KEYS))}")
@@ -89,7 +86,10 @@ def parse(text: str, source: str) -> Scenario:
     if "mission" not in table:
         raise AirTouchError(f"{source}: no [mission]")
     scenario = Scenario(str(table.get("name", Path(source).stem)), str(table.get("summary", "")), table)
-    changes = draw_flight(scenario, 0, 0).changes
+    try:
+        changes = draw_flight(scenario, 0, 0).changes
+    except RecursionError:
+        raise AirTouchError(f"{source}: lists and tables are nested too deeply") from None
     check_firmware(changes.get("firmware", DEFAULT), changes.get("range_module", RANGE_MODULES[0]), source)
     return scenario
 
@@ -102,53 +102,67 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
     rng = np.random.default_rng([seed, flight, zlib.crc32(b"scenario")])
     source, table = scenario.name, scenario.table
     values: dict[str, Any] = {}
-    for key, node in table.get("values", {}).items():
+    for key, node in tables.inner_table(table, "values", source).items():
         value = draw(node, values, rng, f"{source}: values.{key}")
         values |= value if isinstance(value, dict) else {key: value}  # a table: values that are drawn together
-    ground = draw(table.get("world", {}), values, rng, f"{source}: world")
+    ground = _drawn(table, "world", values, rng, source)
     platforms = [_platform(draw(p, values, rng, f"{source}: platform {i + 1}"), f"{source}: platform {i + 1}")
-                 for i, p in enumerate(table.get("platform", []))]
+                 for i, p in enumerate(tables.table_list(table, "platform", source))]
     if set(ground) - {"floor", "room_m"}:
         raise AirTouchError(f"{source}: [world] takes floor and room_m")
-    built = world.build(platforms, ground.get("floor", "cement"))
+    built = world.build(platforms, str(ground.get("floor", "cement")))
     chosen = []
-    for name, drawn in draw(table.get("effects", {}), values, rng, f"{source}: effects").items():
+    for name, drawn in _drawn(table, "effects", values, rng, source).items():
         effect = effects.get(name)
-        chosen += [(name, effect.values(one)) for one in (drawn if isinstance(drawn, list) else [drawn])]
-    plan = draw(table["mission"], values, rng, f"{source}: mission")
+        for one in drawn if isinstance(drawn, list) else [drawn]:
+            if not isinstance(one, dict):
+                raise AirTouchError(f"{source}: effects.{name} must be a table of its parameters")
+            chosen.append((name, effect.values(one)))
+    plan = _drawn(table, "mission", values, rng, source)
     rows = mission.setpoints(plan, built, source)
-    room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)
-    if room.shape != (4,):
-        raise AirTouchError(f"{source}: room_m needs four numbers: x from, to, y from, to")
-    fields = draw(table.get("vehicle", {}), values, rng, f"{source}: vehicle")
+    room = np.array(tables.number_list(ground, "room_m", source, 4, default=DEFAULT_ROOM_M))
+    if room[0] >= room[1] or room[2] >= room[3]:
+        raise AirTouchError(f"{source}: room_m is x from, to, y from, to: each from must be below its to")
+    fields = _drawn(table, "vehicle", values, rng, source)
     changes = numbers(fields, f"{source}: [vehicle]") | {k: table[k] for k in FIRMWARE_KEYS if table.get(k)}
     if "name" in changes:
         raise AirTouchError(f"{source}: [vehicle] takes every field of a vehicle but its name")
     return FlightPlan(rows, built, room, chosen, values, changes)
 
 
+def _drawn(table: Mapping[str, Any], key: str, values: Mapping[str, Any], rng: np.random.Generator,
+           source: str) -> dict[str, Any]:
+    """The table under a key with every value drawn."""
+    drawn = {key: draw(tables.inner_table(table, key, source), values, rng, f"{source}: {key}")}
+    return tables.inner_table(drawn, key, source)
+
+
 def _platform(table: Mapping[str, Any], where: str) -> world.Platform:
     """A platform from its table: shape rectangle (size_m), circle (radius_m) or polygon (corners_m)."""
+    if not isinstance(table, Mapping):
+        raise AirTouchError(f"{where}: must be a table")
     shape = table.get("shape", "rectangle")
     needed = {"rectangle": {"size_m"}, "circle": {"radius_m"}, "polygon": {"corners_m"}}
-    if shape not in needed:
+    if not isinstance(shape, str) or shape not in needed:
         raise AirTouchError(f"{where}: no shape {shape!r}; known: {', '.join(needed)}")
     wrong = set(table) - needed[shape] - {"shape", "centre_m", "angle_deg", "top_m", "material"}
     missing = (needed[shape] | {"top_m"}) - set(table)
     if wrong or missing:
         fault = f"does not take {', '.join(sorted(wrong))}" if wrong else f"needs {', '.join(sorted(missing))}"
         raise AirTouchError(f"{where}: a {shape} {fault}")
-    if table["top_m"] < 0.0:
-        raise AirTouchError(f"{where}: its top is below the floor")
+    top = tables.number(table, "top_m", where, 0.0)
     if shape == "rectangle":
-        half = np.asarray(table["size_m"], dtype=np.float64) / 2.0
+        half = np.array(tables.number_list(table, "size_m", where, 2, above=0.0)) / 2.0
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
     elif shape == "circle":
         turn = np.arange(CIRCLE_CORNERS) * 2.0 * np.pi / CIRCLE_CORNERS
-        corners = table["radius_m"] * np.column_stack([np.cos(turn), np.sin(turn)])
+        corners = tables.number(table, "radius_m", where, above=0.0) * np.column_stack([np.cos(turn), np.sin(turn)])
     else:
-        corners = np.asarray(table["corners_m"], dtype=np.float64)
-    angle = math.radians(table.get("angle_deg", 0.0))
+        if not isinstance(table["corners_m"], list) or len(table["corners_m"]) < 3:
+            raise AirTouchError(f"{where}: corners_m needs three corners or more, each of two numbers")
+        corners = np.array([tables.number_list({"corners_m": pair}, "corners_m", where, 2)
+                            for pair in table["corners_m"]])
+    angle = math.radians(tables.number(table, "angle_deg", where, default=0.0))
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    corners = corners @ turn + np.asarray(table.get("centre_m", [0.0, 0.0]), dtype=np.float64)
-    return world.Platform(corners, float(table["top_m"]), str(table.get("material", "acrylic")))
+    corners = corners @ turn + np.array(tables.number_list(table, "centre_m", where, 2, default=(0.0, 0.0)))
+    return world.Platform(corners, top, str(table.get("material", "acrylic")))

@@ -142,6 +142,15 @@ def test_packet_loss_has_its_share_and_bursts():
     assert gaps[gaps > 0].mean() == pytest.approx(4.0, rel=0.1)
 
 
+@pytest.mark.parametrize("loss, burst", [(0.5, 1.0), (0.6, 1.0), (0.8, 1.0), (0.9, 3.0), (0.9, 9.0), (0.6, 4.0)])
+def test_a_large_share_of_lost_rows_is_reached_by_longer_bursts(loss, burst):
+    rows = 200_000
+    out = radio.received(np.arange(rows)[:, None] * 0.01, 0.0, loss, burst, np.random.default_rng(0))[:, 0]
+    gaps = np.round(np.diff(out) / 0.01) - 1.0
+    assert 1.0 - len(out) / rows == pytest.approx(loss, abs=0.01)
+    assert gaps[gaps > 0].mean() == pytest.approx(max(burst, loss / (1.0 - loss)), rel=0.03)
+
+
 @pytest.mark.parametrize("loss", [1.0, -0.1, float("nan")])
 def test_a_share_of_lost_rows_that_is_none_is_refused(loss):
     with pytest.raises(AirTouchError, match="share of lost rows"):

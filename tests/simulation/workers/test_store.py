@@ -1,23 +1,90 @@
-"""A folder of simulated flights whose own files are damaged."""
+"""A folder of simulated flights keeps what the simulator did not write, and may hold damaged files of its own."""
 
-import json
+import csv
 
 import pytest
+from click.testing import CliRunner
 
+from airtouch import logs
+from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
 from airtouch.simulation.workers import store
 
+SHORT = """
+name = "short"
+[[mission.step]]
+do = "take-off"
+height_m = 0.4
+time_s = 1.0
+[[mission.step]]
+do = "hover"
+time_s = 0.5
+"""
+REQUEST = {"scenario": "short", "seed": 3}
 
-def test_a_damaged_request_is_another_one(tmp_path):
-    """Bytes that are no text in `run.json` ended in a traceback."""
-    request = {"scenario": "paper-low", "seed": 1}
-    store.open_folder(tmp_path, request)
-    store.open_folder(tmp_path, request)
+
+def hold(folder, *names):
+    """Make files in a folder, each with its name as content."""
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        (folder / name).write_text(name)
+
+
+@pytest.mark.parametrize("name", ["mine.csv.gz", "notes.jsonl", "short_3_000000.csv.gz"])
+def test_force_removes_nothing_where_no_simulation_ran(tmp_path, name):
+    hold(tmp_path, name)
+    with pytest.raises(AirTouchError, match=r"no run\.json of a simulation"):
+        store.open_folder(tmp_path, REQUEST, force=True)
+    assert (tmp_path / name).exists() and not (tmp_path / "run.json").exists()
+
+
+def test_force_removes_the_flights_of_the_old_request_alone(tmp_path):
+    store.open_folder(tmp_path, REQUEST)
+    own = ["short_3_000000.csv.gz", "short_3_1000000.csv.gz", "diverged.jsonl"]
+    users = ["mine.csv.gz", "notes.jsonl", "short_4_000000.csv.gz", "short_3_0.csv.gz", "short_3_000000_cut.csv.gz"]
+    hold(tmp_path, *own, *users)
+    with pytest.raises(AirTouchError, match="another request"):
+        store.open_folder(tmp_path, {**REQUEST, "seed": 4})
+    store.open_folder(tmp_path, {**REQUEST, "seed": 4}, force=True)
+    assert {p.name for p in tmp_path.iterdir()} == {"run.json", *users}
+
+
+def test_a_run_json_of_something_else_is_no_leave_to_remove(tmp_path):
+    hold(tmp_path, "run.json", "short_3_000000.csv.gz")
+    with pytest.raises(AirTouchError, match="not the request of a simulation"):
+        store.open_folder(tmp_path, REQUEST, force=True)
+    assert (tmp_path / "run.json").read_text() == "run.json"
+
+
+@pytest.mark.parametrize("text", ["file,use\nmine.csv,clean\n", store.HEAD + "\nmine.csv.gz,clean,0,,,,\n"])
+def test_a_manifest_of_the_user_stays(tmp_path, text):
+    (tmp_path / "manifest.csv").write_text(text)
+    (tmp_path / "short.toml").write_text(SHORT)
+    for force in ([], ["--force"]):
+        result = CliRunner().invoke(command, [str(tmp_path / "short.toml"), "--out", str(tmp_path), *force])
+        assert "not written by a simulation" in str(result.exception)
+    assert (tmp_path / "manifest.csv").read_text() == text
+    assert not (tmp_path / "run.json").exists() and not list(tmp_path.glob("*.csv.gz"))
+
+
+def test_fewer_flights_of_the_same_request_leave_all_of_them_listed(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    out = tmp_path / "out"
+    for count in ("2", "1"):
+        result = CliRunner().invoke(command, [str(tmp_path / "short.toml"), "--out", str(out), "-n", count])
+        assert result.exit_code == 0, result.output + str(result.exception)
+    with open(out / "manifest.csv") as file:
+        listed = [row["file"] for row in csv.DictReader(file)]
+    assert listed == [p.name for p in logs.files.in_folder(out)] and len(listed) == 2
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_damaged_request_is_no_request(tmp_path, force):
+    store.open_folder(tmp_path, REQUEST)
+    store.open_folder(tmp_path, REQUEST)
     (tmp_path / store.REQUEST).write_bytes(b"\xff\xfe{}")
-    with pytest.raises(AirTouchError, match="another request; choose another --out, or --force"):
-        store.open_folder(tmp_path, request)
-    store.open_folder(tmp_path, request, force=True)
-    assert json.loads((tmp_path / store.REQUEST).read_text()) == request
+    with pytest.raises(AirTouchError, match="not the request of a simulation"):
+        store.open_folder(tmp_path, REQUEST, force=force)
 
 
 def test_a_damaged_list_of_diverged_flights_is_one_line(tmp_path):

@@ -74,7 +74,9 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure; default: OUT/figures.json.")
-def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None, json_path: Path | None) -> None:
+@click.option("--force", is_flag=True, help="Replace the file of --json.")
+def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None, json_path: Path | None,
+              force: bool) -> None:
     """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
 
     Goes on where it was broken off. Single effects are then diagnosed once more with the
@@ -83,6 +85,9 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     from airtouch.extras import need
 
     need("plots", "scoring a sealed set")
+    check_free(json_path, None, force)
+    if not (out / "sealed.json").exists():  # figures of this check are replaced when it goes on
+        check_free(out / "figures.json", out / "figures.png", force)
     spread = runner(dask, ()) if dask else None
     make_folder(out)
     if not (out / "sealed.json").exists():

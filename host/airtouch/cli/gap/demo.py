@@ -8,6 +8,7 @@ from airtouch.cli.gap.options import check_free
 from airtouch.cli.gap.progress import Steps
 from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.typed import typed
 
 
 @click.command("demo", epilog=examples(
@@ -44,7 +45,7 @@ def demo_command(out: Path, force: bool) -> None:
                              pictures=True)
         say("report")
         scores.write_json(json_path, diagnosis.plain(), force)
-        gap_report.write_diagnosis(report, diagnosis, command="airtouch gap demo", force=force)
+        gap_report.write_diagnosis(report, diagnosis, command=typed(), force=force)
     show.diagnosis(scores.console(), diagnosis)
     true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
     answer = words.joined([e.name for e in diagnosis.effects]) or diagnosis.verdict

@@ -7,10 +7,11 @@ from typing import Any
 
 import click
 
-from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, runner, typed, written
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_free, inputs_and_outputs, runner, written
 from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 
 
@@ -44,6 +45,8 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
     if each and partner:
         raise AirTouchError("--partner is of one flight; leave --each out")
+    if partner and not baseline:
+        raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
     with Bar() as bar:
         from airtouch.cli.gap import files, show
         from airtouch.simulation import effects
@@ -52,13 +55,13 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
             effects.load_file(path)
         for name in without:
             effects.get(name)
-        flights, nominal = files.Flights(real), files.Flights(baseline)
-        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without, list(files.Flights(partner)))
+        flights, nominal, partners = files.Flights(real), files.Flights(baseline), files.Flights(partner)
+        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without, list(partners))
+        if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
+            click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
+                       f"give it once ({len(same)} of {len(flights)} flights)", err=True)
         if not each:
             logs = list(flights)
-            if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
-                click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
-                           f"give it once ({len(same)} of {len(flights)} flights)", err=True)
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
             diagnosis = case(logs, progress=bar, pictures=bool(report))
@@ -68,13 +71,15 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                 from airtouch.report import gap_report
 
                 bar("report")
-                gap_report.write_diagnosis(report, diagnosis, command=typed("diagnose", real, baseline, vehicle_name),
-                                           force=force)
+                gap_report.write_diagnosis(report, diagnosis, command=typed(NAMES_SHOWN), force=force)
+    diagnosed = 1
     if each:
-        _each(flights, case, json_path, runner(dask, effect_files), force)
+        diagnosed = _each(flights, case, json_path, runner(dask, effect_files), force)
     else:
         show.diagnosis(scores.console(), diagnosis)
-    show.left_out([*flights.failed.values(), *nominal.failed.values()])
+    show.left_out([*flights.failed.values(), *nominal.failed.values(), *partners.failed.values()])
+    if not diagnosed:
+        raise AirTouchError(f"none of {len(flights)} flights can be diagnosed; the reasons are above")
     written(json_path, report)
 
 
@@ -87,8 +92,8 @@ def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) 
     return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without), partner=partner)
 
 
-def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> None:
-    """Diagnose each flight alone and print one row for each."""
+def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> int:
+    """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing."""
     from functools import partial
 
     from rich.table import Table
@@ -109,9 +114,11 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
                           "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
                           f"{first.probability:.0%}")
             rows.append(diagnosis.plain())
-    scores.console().print(table)
-    if json_path:
+    if rows:
+        scores.console().print(table)
+    if rows and json_path:
         scores.write_json(json_path, {"cases": rows}, force)
+    return len(rows)
 
 
 def _alone(case: Callable, log: Any) -> Any:

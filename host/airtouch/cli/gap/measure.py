@@ -5,10 +5,11 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, typed, written
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_free, inputs_and_outputs, written
 from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.typed import typed
 
 
 @click.command("measure", cls=Greedy, epilog=examples(
@@ -40,8 +41,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
         from airtouch.report import gap_report
 
         pictures = measure.pictures_of_measurement(measurement, flights, vehicle)
-        gap_report.write_measurement(report, measurement, pictures, force=force,
-                                     command=typed("measure", real, baseline, vehicle_name))
+        gap_report.write_measurement(report, measurement, pictures, force=force, command=typed(NAMES_SHOWN))
     show.measurement(scores.console(), measurement)
     show.left_out(measurement.left_out)
     written(json_path, report)

@@ -7,6 +7,8 @@ import click
 
 from airtouch.logs import files
 
+NAMES_SHOWN = 4  #: files in a row in a report's command, of more the rest is counted; no source: fits a line
+
 
 class Greedy(click.Command):
     """A command whose --baseline takes all words up to the next option, so that a shell pattern works."""
@@ -14,14 +16,15 @@ class Greedy(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         spread: list[str] = []
         taking = False
-        for word in args:
+        for word, following in zip(args, [*args[1:], "-"], strict=True):
             if word.startswith("-"):
-                taking = word == "--baseline"
-                spread += [] if taking else [word]
+                option, _, name = word.partition("=")
+                taking = option == "--baseline"
+                if taking and not name and following.startswith("-"):
+                    raise click.BadOptionUsage(option, f"Option {option!r} requires an argument.", ctx)
+                spread += [word] if not taking else [option, name] if name else []
             else:
                 spread += ["--baseline", word] if taking else [word]
-        if args and args[-1] == "--baseline":
-            spread.append("--baseline")  # click says that its value is missing
         try:
             return super().parse_args(ctx, [*spread])  # click empties its list
         except click.MissingParameter as error:
@@ -53,15 +56,6 @@ def check_free(report: Path | None, json_path: Path | None, force: bool) -> None
     """Refuse, before the work, to replace a file without --force."""
     for path in (report, json_path):
         files.check_free(path, force)
-
-
-def typed(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:
-    """The command as typed, for the report, with long lists of files shortened."""
-    def few(names: tuple[str, ...]) -> str:
-        return " ".join(names[:4]) + (f" [and {len(names) - 4} more]" if len(names) > 4 else "")
-
-    return (f"airtouch gap {name} {few(real)}" + (f" --vehicle {vehicle}" if vehicle else "")
-            + (f" --baseline {few(baseline)}" if baseline else ""))
 
 
 def written(*paths: Path | None) -> None:

@@ -1,7 +1,5 @@
 """`airtouch adapt`: a detector for the drone that flew some flights."""
 
-import shlex
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +7,9 @@ from typing import Any
 
 import click
 
+from airtouch.cli.shared.flights import SPEED_MPS
 from airtouch.cli.shared.progress import Bar
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
@@ -28,8 +28,8 @@ MORE = 5  #: further flights whose benefit is estimated
               f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
-@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
-              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
+              help="Commanded speed of flights without one in their manifest; else from the logs.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
@@ -56,6 +56,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
+    from airtouch.detector.evaluation.data.folds import in_folds
     from airtouch.twin import adapt, adapt_report
 
     need("train", "training")
@@ -64,17 +65,16 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     if twin_folder and vehicle:
         raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
-    usable = _read([f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds])
+    usable = _read(in_folds(dataset.collect(flights, speed), folds))
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
     twin = adapt_report.twin_for(usable, twin_folder, vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed,
                                  seed=seed, bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")
-    typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
         adapted = adapt.adapt(usable, twin.scenario, twin.vehicle, work, start=start, seed=seed, hold_out=hold_out,
-                              withhold=withhold_range, progress=stages, command=typed)
+                              withhold=withhold_range, progress=stages, command=typed())
     adapted.model.save(out, force)
     _say(adapted, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")

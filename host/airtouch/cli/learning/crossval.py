@@ -6,9 +6,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import need_flights
+from airtouch.cli.shared.flights import SPEED_MPS, need_flights
 from airtouch.cli.shared.help import examples
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
@@ -39,7 +40,7 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--silence-training", is_flag=True, help="With --silence: remove it from the training flights too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
-@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of flights without one in their manifest.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the training.")
 @click.option("--random-windows", is_flag=True,
@@ -63,6 +64,12 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     training flights of each fold alone. Exit code 2 when a flight was left out.
     """
     check_free(json_path, force)
+    check_free(ledger, True)
+    if silence_training and not silence:
+        raise click.UsageError("--silence-training needs --silence")
+    source = click.get_current_context().get_parameter_source("random_epochs")
+    if source is ParameterSource.COMMANDLINE and not random_windows:
+        raise click.UsageError("--random-epochs needs --random-windows")
     if detector != "best" and (steps or silence or free_air):
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
     if detector == "baseline" and epochs:

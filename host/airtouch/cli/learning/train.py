@@ -1,6 +1,5 @@
 """`airtouch train`: train a detector on recorded flights, or on simulated ones."""
 
-import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
 from airtouch.detector.evaluation import crossval, evaluate
@@ -96,7 +96,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         if detector == "best":
             options["work"] = checkpoints
         model = module.fit([sensors.without(log, silence) for log in training], seed=seed, progress=progress,
-                           command=_command(), **options)
+                           command=typed(), **options)
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
@@ -169,11 +169,6 @@ def _report(metadata: dict, seconds: float) -> None:
     if score.get("float") is not None:
         click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "
                    f"int8 {score['int8']:.1%} (n = {score['windows']} windows)")
-
-
-def _command() -> str:
-    """The command as typed, without the folder of the `airtouch` program."""
-    return shlex.join(["airtouch", *sys.argv[1:]])
 
 
 def _stderr():

@@ -1,8 +1,6 @@
 """`airtouch twin`: fit the simulator to recorded flights of one drone."""
 
 import json
-import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import count
@@ -11,9 +9,12 @@ from typing import Any
 
 import click
 
+from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared.folders import made_folder
 from airtouch.cli.shared.progress import Bar
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import make_folder, write_bytes
+from airtouch.logs.files import write_bytes
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 SUMMARY, REPORT = "twin.json", "report.html"
@@ -25,8 +26,8 @@ SUMMARY, REPORT = "twin.json", "report.html"
               help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True,
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
-@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
-              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--speed", type=SPEED_MPS, metavar="M/S",
+              help="Commanded speed of flights without one in their manifest; else from the logs.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
@@ -63,10 +64,13 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch.twin.comparison.curves import curves
     from airtouch.twin.fitting import calibrate, levers
 
-    make_folder(out)
-    _check_free(out / calibrate.FIT, resume, force)
-    craft = vehicles.load(vehicle)
-    recorded = _read(flights, speed, folds)
+    fit_file = out / calibrate.FIT
+    _check_free(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
+    with made_folder(out):
+        craft = vehicles.load(vehicle)
+        recorded = _read(flights, speed, folds)
+    if force and not resume:
+        fit_file.unlink(missing_ok=True)
     fitted = calibrate.calibrate(recorded, craft, out, rounds=rounds, flights=batch, seed=seed, workers=workers,
                                  bar=Bar)
     with Bar("flying the twin") as bar:
@@ -76,13 +80,12 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         phase = count(1)
         comparison = compare.compare(recorded, fitted.target, simulated, diverged, seed,
                                      lambda name: bar(next(phase), 6, name))
-    typed = shlex.join(["airtouch", *sys.argv[1:]])
     by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
-    summary = _summary(comparison, by_name, fitted.history, recorded, typed)
+    summary = _summary(comparison, by_name, fitted.history, recorded, typed())
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
     with Bar("report"):
         flown = twin_report.FlownTwin(recorded, fitted, comparison, curves(recorded, comparison.flights))
-        twin_report.write_report(out / REPORT, flown, command=typed, force=True)
+        twin_report.write_report(out / REPORT, flown, command=typed(), force=True)
     _say(comparison, len(recorded.courses), fitted.history[0]["misfit"])
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 
@@ -114,16 +117,23 @@ def _say(comparison: Any, flights: int, first_misfit: Any) -> None:
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
 
 
-def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
+def _check_free(fit_file: Path, results: Sequence[Path], resume: bool, force: bool) -> None:
+    """Raise AirTouchError for a twin, or files with the names of its results, without --force.
+
+    A fit that goes on replaces its own results.
+    """
     if fit_file.exists() and not (resume or force):
         raise AirTouchError(f"{fit_file.parent}: holds a twin already; --resume goes on with it, --force starts anew")
-    if force and not resume:
-        fit_file.unlink(missing_ok=True)
+    for path in results:
+        if path.exists() and not (force or fit_file.exists()):
+            raise AirTouchError(f"{path}: exists already, and is of no fit; choose another --out, or --force to "
+                                "replace it")
 
 
-def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
+def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any,
+             command_line: str) -> dict[str, Any]:
     """The content of the report as plain values for JSON."""
-    return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
+    return {"command": command_line, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
             "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.diverged,
             "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
                       "difference": g.difference, "scatters": g.scatters, "flights": g.flights}

@@ -83,17 +83,20 @@ class Effect:
         overrides = dict(overrides or {})
         preset = overrides.pop("preset", None)
         if preset is not None:
-            if preset not in self.presets:
+            if not isinstance(preset, str) or preset not in self.presets:
                 listed = ", ".join(self.presets) or "it has none"
                 raise AirTouchError(f"{self.name} has no preset {preset!r}; known: {listed}")
-            overrides = {**self.presets[str(preset)], **overrides}
+            overrides = {**self.presets[preset], **overrides}
         known = {p.name: p for p in self.parameters}
         for name in overrides:
             if name not in known:
                 raise AirTouchError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
         result = {}
         for p in self.parameters:
-            value = float(overrides.get(p.name, p.default))
+            try:
+                value = float(overrides.get(p.name, p.default))
+            except (TypeError, ValueError, OverflowError):
+                raise AirTouchError(f"{self.name}: {p.name} must be a number") from None
             if not p.low <= value <= p.high:
                 raise AirTouchError(f"{self.name}: {p.name} = {value:g} {p.unit} is out of bounds, "
                                     f"{p.low:g} to {p.high:g} {p.unit}")

@@ -6,7 +6,6 @@ another one. Every key is in KEYS, with its meaning and unit.
 
 import difflib
 import functools
-import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import tables
 from airtouch.errors import AirTouchError
 
 DEFAULT = "2026.08"
@@ -136,10 +136,7 @@ def _built_in(name: str) -> np.ndarray:
 
 def parse(text: str, source: str) -> np.ndarray:
     """Settings (1,) from TOML text; `source` names it in messages."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    table = tables.parse(text, source)
     base = table.pop("base", None)
     table.pop("summary", None)
     if base is not None and not (isinstance(base, str) and base != source):

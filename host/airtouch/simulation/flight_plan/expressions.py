@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.tables import is_number
 
 _BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _FUNCTIONS: dict[str, Callable[..., float]] = {
@@ -30,7 +31,7 @@ def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: 
     if isinstance(node, dict):
         if set(node) == {"low", "high"}:
             low, high = (draw(node[k], values, rng, where) for k in ("low", "high"))
-            if not (_number(low) and _number(high) and low <= high):
+            if not (is_number(low) and is_number(high) and low <= high):
                 raise AirTouchError(f"{where}: a range needs two numbers, low <= high")
             return float(rng.uniform(low, high))
         if set(node) == {"choice"}:
@@ -49,7 +50,7 @@ def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
         name = error.args[0]
         raise AirTouchError(f"{where}: {text.strip()!r} uses {name!r}, "
                             "which [values] does not have") from None
-    except (SyntaxError, TypeError, ValueError, ZeroDivisionError):
+    except (SyntaxError, TypeError, ValueError, ArithmeticError, RecursionError, MemoryError):
         raise AirTouchError(f"{where}: {text.strip()!r} is not a sum of numbers and named values") from None
 
 
@@ -59,9 +60,11 @@ def _tree(text: str) -> ast.expr:
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> float:
-    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and _number(node.value):
+    if isinstance(node, ast.Constant) and is_number(node.value):
         return node.value
     if isinstance(node, ast.Name):
+        if not is_number(values[node.id]):
+            raise ValueError
         return values[node.id]
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return -_evaluate(node.operand, values)
@@ -70,7 +73,3 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> float:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
         return _FUNCTIONS[node.func.id](*(_evaluate(a, values) for a in node.args))
     raise ValueError
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -9,6 +9,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.simulation.firmware import setpoint as c
 from airtouch.simulation.flight_plan.world import NONE, World, first_below, top_at
+from airtouch.tables import number, number_list, table_list
 
 RATE_HZ = 100  #: rows of set-points a second, as a client sends them
 MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
@@ -67,31 +68,44 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
     control = mission.get("control", "velocity")
     if control not in ("velocity", "position"):
         raise AirTouchError(f"{where}: control is velocity or position, not {control!r}")
-    start = _pair(mission.get("start_m", [0.0, 0.0]), where, "start_m")
-    pen = _Pen(start, math.radians(mission.get("yaw_deg", 0.0)), control == "position", world)
-    if not mission.get("step"):
+    start = number_list(mission, "start_m", where, 2, default=(0.0, 0.0))
+    pen = _Pen(start, math.radians(number(mission, "yaw_deg", where, default=0.0)), control == "position", world)
+    steps = table_list({"mission.step": mission.get("step", [])}, "mission.step", where)
+    if not steps:
         raise AirTouchError(f"{where}: a mission needs steps")
-    for i, step in enumerate(mission["step"]):
+    for i, step in enumerate(steps):
         place = f"{where}: step {i + 1}"
         kind = step.get("do")
-        if kind not in KEYS:
+        if not isinstance(kind, str) or kind not in KEYS:
             raise AirTouchError(f"{place}: no step {kind!r}; known: {', '.join(KEYS)}")
         wrong = set(step) - KEYS[kind] - {"do"}
         missing = NEEDED.get(kind, set()) - set(step)
         if wrong or missing:
             fault, keys = ("does not take", wrong) if wrong else ("needs", missing)
             raise AirTouchError(f"{place}: {kind} {fault} {', '.join(sorted(keys))}")
-        for key in ("time_s", "speed_mps", "spacing_m"):
-            if key in step and not 0.0 < float(step[key]) < MAX_FLIGHT_S:
-                raise AirTouchError(f"{place}: {key} = {step[key]} must be positive")
+        _check_numbers(step, place)
         if step.get("speed_mps", 0.0) > MAX_SPEED_MPS:
             raise AirTouchError(f"{place}: {step['speed_mps']:g} m/s is faster than the firmware flies, "
                                 f"{MAX_SPEED_MPS:g} m/s")
         first = pen.count
         _run(pen, kind, step, place)
+        if pen.count > MAX_FLIGHT_S * RATE_HZ:
+            raise AirTouchError(f"{place}: the flight is longer than {MAX_FLIGHT_S:g} s")
         if kind in ("hover", "go", "zigzag"):
             _check_path(pen, first, place)
     return np.ascontiguousarray(np.concatenate(pen.rows))
+
+
+def _check_numbers(step: Mapping[str, Any], place: str) -> None:
+    """Raise AirTouchError for a value of a step that is no number, or one that nobody flies."""
+    number(step, "height_m", place, above=0.0 if step["do"] == "take-off" else -math.inf, default=1.0)
+    for key in ("time_s", "speed_mps", "spacing_m"):
+        if key in step and number(step, key, place, above=0.0) >= MAX_FLIGHT_S:
+            raise AirTouchError(f"{place}: {key} = {step[key]:g} is too large")
+    if number(step, "every_s", place, 0.0, default=0.0) >= MAX_FLIGHT_S:
+        raise AirTouchError(f"{place}: every_s = {step['every_s']:g} is too large")
+    for key in ("pulse_mps", "distance_m", "direction_deg"):
+        number(step, key, place, default=0.0)
 
 
 def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
@@ -111,16 +125,20 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
     elif kind == "go":
         to = pen.at.copy()
         if "to_m" in step:
-            to[:2] = _pair(step["to_m"], place, "to_m")
+            to[:2] = number_list(step, "to_m", place, 2)
         elif "distance_m" in step:
             angle = math.radians(step.get("direction_deg", 0.0))
             to[:2] += step["distance_m"] * np.array([math.cos(angle), math.sin(angle)])
         to[2] = step.get("height_m", to[2])
-        pen.move(to, np.linalg.norm(to - pen.at) / step["speed_mps"])
+        seconds = np.linalg.norm(to - pen.at) / step["speed_mps"]
+        _check_duration(seconds, place)
+        pen.move(to, seconds)
     elif kind == "zigzag":
-        length, width = _pair(step["size_m"], place, "size_m")
+        length, width = number_list(step, "size_m", place, 2, above=0.0)
         corner = pen.at.copy()
+        _check_duration(width / step["spacing_m"] / RATE_HZ, place)  # a row or more for each line
         lines = int(width // step["spacing_m"]) + 1
+        _check_duration(lines * length / step["speed_mps"] + width / step["speed_mps"], place)
         for line in range(lines):
             y = corner[1] + line * step["spacing_m"]
             for x in ((0.0, length) if line % 2 == 0 else (length, 0.0)):
@@ -143,8 +161,7 @@ def _check_path(pen: _Pen, first: int, place: str) -> None:
                             f"{z:.2f} m high through a surface {pen.top((x, y)):.2f} m high")
 
 
-def _pair(value: Any, place: str, key: str) -> tuple[float, float]:
-    if not (isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(v, (int,
-            float)) for v in value)):
-        raise AirTouchError(f"{place}: {key} must be two numbers")
-    return float(value[0]), float(value[1])
+def _check_duration(seconds: float, place: str) -> None:
+    """Raise AirTouchError for a step longer than MAX_FLIGHT_S, before its rows are made."""
+    if seconds > MAX_FLIGHT_S:
+        raise AirTouchError(f"{place}: takes {seconds:.0f} s, longer than {MAX_FLIGHT_S:g} s")

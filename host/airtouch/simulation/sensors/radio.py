@@ -11,8 +11,9 @@ def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
     """The rows of a log (n, columns), time in column 0, that reach the host, with the host's times.
 
     jitter_s: rms of the error of each time; times never run backwards. loss: share of rows
-    lost, in runs of `burst` rows on average (Gilbert's two-state channel). The first row
-    always arrives. Raises AirTouchError for a loss outside 0..1, 1 excluded.
+    lost, in runs of `burst` rows on average (Gilbert's two-state channel), or of loss / (1 - loss)
+    rows where that is more, as a row or more arrives between two runs. The first row always arrives.
+    Raises AirTouchError for a loss outside 0..1, 1 excluded.
     """
     if not 0.0 <= loss < 1.0:
         raise AirTouchError(f"radio: the share of lost rows must be 0 or more and below 1, not {loss:g}")
@@ -22,7 +23,7 @@ def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
         table[:, 0] = np.maximum.accumulate(table[:, 0] + jitter_s * errors)
     if loss <= 0.0:
         return table
-    recover = 1.0 / burst
+    recover = 1.0 / max(burst, loss / (1.0 - loss))
     arrived = np.ones(n, dtype=bool)
     _lose(draws, recover, min(recover * loss / (1.0 - loss), 1.0), arrived)
     return table[arrived]

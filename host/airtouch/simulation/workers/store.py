@@ -9,6 +9,7 @@ kill the same command flies only what is missing. Flights that diverged are list
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,36 +20,73 @@ from airtouch.logs.files import MANIFEST, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
+from airtouch.tables import is_number
 
 REQUEST, FAILED = "run.json", "diverged.jsonl"
+HEAD = "file,use,fold,height,angle_deg,wind,speed_mps"  #: first line of the manifest
+NUMBER = re.compile(r"(\d{6,})\.csv\.gz")  #: end of a flight's file name
+FLIGHT = re.compile(r".+_\d+_" + NUMBER.pattern)  #: a flight's file name
 
 
 def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -> None:
     """Make the folder, or continue one of the same request.
 
-    Raises AirTouchError when it holds flights of another request and `force` is not given;
-    with force these flights are removed.
+    With `force` the flights of another request are removed, by the names that its run.json gives them. Raises
+    AirTouchError when it holds flights of another request and `force` is not given; and, whatever `force`, when it
+    holds flights or a manifest.csv that were written by something else.
     """
     text = json.dumps(request, indent=1, sort_keys=True)
     make_folder(folder)
+    check_manifest(folder)
     known = folder / REQUEST
     if known.is_file() and known.read_bytes() == text.encode():  # bytes, as a damaged one may be no text
         return
-    old = [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]
-    if old or known.is_file():
+    if known.is_file():
+        own = _of_request(folder, known)
         if not force:
             raise AirTouchError(f"{folder}: holds flights of another request; "
                                 "choose another --out, or --force")
-        for path in old:
-            path.unlink()
+        for path in own:
+            path.unlink(missing_ok=True)
+    elif [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]:
+        raise AirTouchError(f"{folder}: holds flights but no {REQUEST} of a simulation; choose another --out")
     temporary = folder / f".{REQUEST}.{os.getpid()}"
     temporary.write_text(text)
     temporary.replace(known)
 
 
+def _of_request(folder: Path, known: Path) -> list[Path]:
+    """What the request in a folder's run.json wrote beside it. Raises AirTouchError for a file that is no request."""
+    try:
+        request = json.loads(known.read_text(encoding="utf-8"))
+        scenario, seed = str(request["scenario"]), int(request["seed"])
+    except (ValueError, KeyError, TypeError):
+        raise AirTouchError(f"{known}: not the request of a simulation; choose another --out") from None
+    return [*_flights(folder, scenario, seed).values(), folder / FAILED, folder / MANIFEST]
+
+
+def check_manifest(folder: Path) -> None:
+    """Raise AirTouchError where the folder's manifest.csv is not one of `write_manifest`."""
+    path = folder / MANIFEST
+    if not path.exists():
+        return
+    head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
+    if head != HEAD or not all(FLIGHT.fullmatch(row.split(",")[0]) for row in rows):
+        raise AirTouchError(f"{path}: not written by a simulation, and its flights need another; "
+                            "choose another folder, or move it away")
+
+
 def path_of(folder: Path, scenario: str, seed: int, flight: int) -> Path:
     """File of one flight."""
     return folder / f"{Path(scenario).name}_{seed}_{flight:06d}.csv.gz"
+
+
+def _flights(folder: Path, scenario: str, seed: int) -> dict[int, Path]:
+    """Flight number -> file, of the flights of a scenario and seed that are in the folder."""
+    begin = f"{Path(scenario).name}_{seed}_"
+    files = {int(match[1]): p for p in folder.glob("*.csv.gz")
+             if p.name.startswith(begin) and (match := NUMBER.fullmatch(p.name[len(begin):]))}
+    return dict(sorted(files.items()))
 
 
 def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
@@ -86,19 +124,17 @@ def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | No
     return path
 
 
-def write_manifest(folder: Path, scenario: Scenario, seed: int, count: int) -> None:
-    """`manifest.csv` beside the flights, as `evaluate` and `crossval` read it.
+def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
+    """`manifest.csv` beside the flights of a scenario and seed, as `evaluate` and `crossval` read it.
 
     speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle
-    and wind; folds go round by flight number.
+    and wind; folds go round by flight number. Raises AirTouchError for a manifest of something else.
     """
-    lines = ["file,use,fold,height,angle_deg,wind,speed_mps"]
-    for number in range(count):
-        path = path_of(folder, scenario.name, seed, number)
-        if not path.exists():
-            continue
+    check_manifest(folder)
+    lines = [HEAD]
+    for number, path in _flights(folder, scenario.name, seed).items():
         values = draw_flight(scenario, seed, number).values
-        height = f"{1000 * values['clearance']:.0f}mm" if "clearance" in values else ""
+        height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
         cells = [path.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
         lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))

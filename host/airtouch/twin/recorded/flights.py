@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.evaluation.data.folds import in_folds
 from airtouch.errors import AirTouchError
 from airtouch.twin.recorded import course as courses
 from airtouch.twin.recorded import near_range
@@ -43,9 +44,7 @@ def read(paths: Sequence[str | Path], *, speed_mps: float | None = None, folds: 
     progress(done, total). Flights that cannot be used are in `left_out` with the reason. Raises AirTouchError, with
     what to fly, if fewer than MIN_FLIGHTS can be used, and for two vehicles.
     """
-    files = [f for f in dataset.collect(paths, speed_mps) if not folds or f.condition.fold in folds]
-    if not files:
-        raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
+    files = in_folds(dataset.collect(paths, speed_mps), folds)
     usable, feature_rows, channel_arrays, left_out, heads = [], [], [], [], []
     for i, file in enumerate(files):
         try:

@@ -63,6 +63,7 @@ def simulate_flights(folder: Path, tell: Callable[[str], None] = lambda _: None,
 
     scene = scenario.load(SCENARIO)
     folder.mkdir(parents=True, exist_ok=True)
+    store.check_manifest(folder)
     progress(0, GENERATED)
     for number, flight in enumerate(batch.flights(scene, GENERATED)):
         path = store.path_of(folder, scene.name, 0, number)
@@ -72,7 +73,7 @@ def simulate_flights(folder: Path, tell: Callable[[str], None] = lambda _: None,
         else:
             logs.write(flight, path)
         progress(number + 1, GENERATED)
-    store.write_manifest(folder, scene, 0, GENERATED)
+    store.write_manifest(folder, scene, 0)
     return dataset.collect([folder])
 
 

@@ -12,6 +12,16 @@ BUILD_FOLDS = (0, 1, 2)
 BUILD_DAYS = ("19", "20")  #: neural-swarm's days on which settings are chosen, as its manifest names them
 
 
+def in_folds(files: Sequence[FlightFile], folds: Sequence[int]) -> list[FlightFile]:
+    """The flights of these folds of the manifest, all without any. Raises AirTouchError for folds without a flight."""
+    chosen = [file for file in files if not folds or file.condition.fold in folds]
+    if not chosen and folds:
+        known = sorted({file.condition.fold for file in files if file.condition.fold is not None})
+        there = f"its folds are {', '.join(map(str, known))}" if known else "it has no folds"
+        raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest; {there}")
+    return chosen
+
+
 def by_fold(files: Sequence[FlightFile]) -> Folds:
     """Fold -> its flights. Raises AirTouchError for flights without a fold or with fewer than two folds."""
     folds: Folds = {}
