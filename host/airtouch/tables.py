@@ -3,7 +3,7 @@
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 from airtouch.errors import AirTouchError
 
@@ -18,7 +18,7 @@ def parse(text: str, source: str) -> dict[str, Any]:
         raise AirTouchError(f"{source}: not valid TOML: {error}") from None
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is a finite number, not larger than LARGEST, and no truth value."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and -LARGEST <= value <= LARGEST
 
