@@ -115,7 +115,7 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
     open_cell = OpenCell("force_y", (0.0, 0.5), "hover", "a/log.csv", from_s=34.0, to_s=42.0, over_floor=6.1,
                          follows=("height",), nearest=(Rejected("wind", "gains 3 nats, but 12 are needed"),))
     result = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(open_cell,))
-    steps = advice.steps(replace(result, indistinguishable=()), [], VEHICLE)
+    steps = advice.next_steps(replace(result, indistinguishable=()), [], VEHICLE)
     path = tmp_path / "gap.html"
     gap_report.write_diagnosis(path, replace(result, next=steps), command="x")
     text, _ = checked(path)
