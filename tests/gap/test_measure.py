@@ -10,7 +10,7 @@ import short_flights
 from airtouch import logs, vehicle
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import Measurement, measure
-from airtouch.gap.result import BASELINE, GapMap
+from airtouch.gap.where.cell import BASELINE, GapMap
 from airtouch.gap.where.rotor_speeds import RotorSpeed
 from airtouch.gap.where.summary import significant
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog

@@ -140,8 +140,8 @@ def test_the_report_computes_nothing():
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
-        allowed = ("measurement", "result", "where.cell_words", "where.summary", "answer.advice", "answer.pictures",
-                   "answer.sentences", "answer.words", "signals.channels", "second_process")
+        allowed = ("measurement", "result", "where.cell", "where.cell_words", "where.summary", "answer.advice",
+                   "answer.pictures", "answer.sentences", "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)
         assert not re.search(r"\b(residual|calibrate|ready|closure_of|gap_map)\(", source)

@@ -7,20 +7,10 @@ from airtouch import vehicle
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import (
-    BASELINE,
-    Cell,
-    Closure,
-    Control,
-    Diagnosis,
-    GapMap,
-    NamedEffect,
-    NextStep,
-    Quantity,
-    RankedCandidate,
-)
+from airtouch.gap.result import Closure, Control, Diagnosis, NamedEffect, NextStep, Quantity, RankedCandidate
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.gap.where.gap_map import gap_map
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")

@@ -15,9 +15,10 @@ from airtouch.gap.flights.flight import ready, ready_flights, with_gyro_if_any
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
-from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
+from airtouch.gap.result import Quantity, rounded
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import Cell, plain_cell
 from airtouch.gap.where.cell_words import in_words
 from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of

@@ -20,10 +20,11 @@ from airtouch.gap.answer.advice import ADD_AN_EFFECT
 from airtouch.gap.answer.pictures import Pictures
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
-from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.result import Diagnosis
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import remaining_in_words
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables

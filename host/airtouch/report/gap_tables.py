@@ -8,9 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from airtouch.gap.answer.words import format_of, leading, seconds_in_words
-from airtouch.gap.result import Cell, Diagnosis, Quantity
+from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, short
 from airtouch.report.columns import WithInterval
 

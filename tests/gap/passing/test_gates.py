@@ -14,11 +14,11 @@ from airtouch.gap.flights import flight
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.select import select
 from airtouch.gap.passing import gate_search, gates
-from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import inside, residual
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import PASSING
+from airtouch.gap.where.cell import Cell
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active

@@ -6,8 +6,9 @@ import pytest
 
 from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
-from airtouch.gap.result import BASELINE, Cell, GapMap, NamedEffect
+from airtouch.gap.result import NamedEffect
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from made_diagnosis import VEHICLE, cell, diagnosis
 
 

@@ -9,8 +9,9 @@ from rich.table import Table
 from airtouch.gap.answer import words
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
-from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import interval, short
 
 MOST_CELLS = 16  #: rows of a table of cells, largest first; no source: fits a terminal

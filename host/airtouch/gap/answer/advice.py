@@ -4,8 +4,9 @@ import shlex
 from collections.abc import Sequence
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.result import Cell, Diagnosis, NamedEffect, NextStep
+from airtouch.gap.result import Diagnosis, NamedEffect, NextStep
 from airtouch.gap.signatures.alike import confusion_among
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 from airtouch.vehicle import Vehicle, argument_of

@@ -10,7 +10,6 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import sensor_noise
-from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, COLUMN, FORCE, TORQUE, angular_acceleration
 from airtouch.gap.signals.floor import sensor_power
 from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, starts
@@ -18,6 +17,7 @@ from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import stretches
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
 

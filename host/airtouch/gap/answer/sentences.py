@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airtouch.gap.answer.words import joined, name_in_words, quantity
-from airtouch.gap.result import REST_OF_FLIGHT, Cell, Diagnosis, NamedEffect, OpenCell
+from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
-from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, ratio, short
+from airtouch.gap.where.cell import Cell
+from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, short
 
 LEAST_PROBABILITY = 0.0005  #: of the nearest effect, to be named: a smaller one would be shown as 0.0 %
 
@@ -37,7 +38,7 @@ def _where(diagnosis: Diagnosis) -> str:
     most = summary.headline(cells) or cell  # the effects named may close another
     begin = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
     return (f"{begin} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
-            f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor"
+            f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(cell.ratio)} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 
 

@@ -12,12 +12,13 @@ from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import unsteadiness_ratio
 from airtouch.gap.passing.bursts import SHAKE_BAND_HZ, SHAKE_PIECE_S
 from airtouch.gap.passing.unsteadiness import COLUMNS, rms_over_median
-from airtouch.gap.result import REST_OF_FLIGHT, Cell, OpenCell, Rejected
+from airtouch.gap.result import REST_OF_FLIGHT, OpenCell, Rejected
 from airtouch.gap.signals.channels import CHANNELS, COLUMN
 from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_spectra, starts
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
 

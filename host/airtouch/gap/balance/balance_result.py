@@ -28,18 +28,9 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import (
-    BASELINE,
-    Cell,
-    Closure,
-    Control,
-    Diagnosis,
-    GapMap,
-    OverallGap,
-    Quantity,
-    RankedCandidate,
-)
+from airtouch.gap.result import Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen

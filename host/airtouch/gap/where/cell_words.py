@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from airtouch.gap.result import Cell, OpenCell
+from airtouch.gap.result import OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
+from airtouch.gap.where.cell import Cell
 
 #: each phase as a phrase
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
@@ -35,11 +36,6 @@ def interval(cell: Cell) -> str:
 def short(value: float) -> str:
     """The value with two digits, or its whole part where that has more."""
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
-
-
-def ratio(cell: Cell) -> float:
-    """The cell's gap over its floor."""
-    return cell.ratio
 
 
 def change_in_words(cell: Cell) -> str:

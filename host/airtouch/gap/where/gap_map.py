@@ -15,13 +15,13 @@ import numpy as np
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.result import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import Sums, block_sums, join
+from airtouch.gap.where.cell import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
 from airtouch.gap.where.regimes import REGIMES

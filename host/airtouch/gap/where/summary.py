@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.result import SMALLEST_FLOOR, Cell, GapMap
+from airtouch.gap.where.cell import SMALLEST_FLOOR, Cell, GapMap
 from airtouch.logs.segments import KINDS
 
 GROUND_NAME = "ground"  #: a phase, of `segments.KINDS`
