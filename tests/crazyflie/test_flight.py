@@ -146,10 +146,12 @@ def test_a_refusing_supervisor_stays_on_the_ground(tmp_path):
     assert "supervisor refuses take-off" in ended and flight.pilot.refused and "land" not in kinds(craft)
 
 
-def test_a_drone_that_restarts_in_flight_ends_it(tmp_path):
-    craft = FakeCraft(restart_at=9.0)
+@pytest.mark.parametrize("uptime_h", [0, 1, 3, 4.5])
+def test_a_drone_that_restarts_in_flight_ends_it(tmp_path, uptime_h):
+    craft = FakeCraft(restart_at=9.0, uptime_s=int(3600 * uptime_h))
     _, book, ended = fly(craft, tmp_path)
     assert ended == "the drone restarted in flight" and len(book.finish()) > 500
+    assert "land" not in kinds(craft)
 
 
 def test_an_error_of_ours_lands_first(tmp_path):
