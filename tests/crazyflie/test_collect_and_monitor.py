@@ -1,5 +1,6 @@
 """collect and monitor with cflib as it is and the virtual drone, in its own time."""
 
+import io
 import re
 import struct
 import threading
@@ -51,7 +52,7 @@ def guards(monkeypatch):
 
     @contextmanager
     def guarding(uri, height_m, seconds):
-        started.append(Guard())
+        started.append(Guard(io.BytesIO()))
         yield started[-1]
 
     monkeypatch.setattr(collect, "guarding", guarding)
@@ -82,7 +83,7 @@ def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards)
         result = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
         assert result.exit_code == 0, result.output
         assert comes_to_rest(virtual)
-    assert [guard.landed for guard in guards] == [True, True]
+    assert [guard.pipe.getvalue() for guard in guards] == [b"10", b"10"]
     assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
     log = logs.read(tmp_path / "hop_0004.csv.gz")
     assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and result.output.count("\ntrue ") >= 2
@@ -153,7 +154,7 @@ def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
     with serve("disconnect=4,5s") as virtual:
         result = fly(virtual, hop, cache, tmp_path)
         assert result.exit_code == 1 and "link lost" in result.output, result.output
-        assert comes_to_rest(virtual) and guards[0].landed
+        assert comes_to_rest(virtual) and guards[0].pipe.getvalue() == b"10"
     log = logs.read(tmp_path / "hop_0001.csv.gz")
     assert log.meta["longest_gap_s"] >= 4.9 and "link lost" in log.meta["ended"]
     middle = int(np.argmax(np.diff(log["t_s"])))

@@ -111,12 +111,11 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
     down_s = max(LEAST_DOWN_S, height / LANDING_MPS)
     ended = "an error"
     with guarding(plan.uri, origin.z_m, down_s) if plan.guarded else nullcontext(None) as guard:
-        flight = Flight(drone, Autopilot(mission.legs, origin), intake, recorder, stop, plan.link_timeout_s, show, say)
+        flight = Flight(drone, Autopilot(mission.legs, origin), intake, recorder, stop, plan.link_timeout_s, show, say,
+                        in_air=guard.tell if guard else lambda _: None)
         try:
             ended = flight.run()
         finally:
-            if guard is not None:
-                guard.landed = flight.landed
             log = recorder.finish(ended=ended, silences_s=flight.silences)
     outcome = Outcome(path, ended, log, flight.silences)
     if len(log):
