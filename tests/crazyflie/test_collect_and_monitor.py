@@ -212,6 +212,13 @@ def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, c
         assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
 
 
+@pytest.mark.parametrize("option", ["--link-timeout", "--min-battery"])
+@pytest.mark.parametrize("value", ["nan", "inf", "-1"])
+def test_limits_that_are_never_reached_are_refused(tmp_path, option, value):
+    result = run("collect", "--uri", "udp://127.0.0.1:1", "--mission", "sweep", "--out", tmp_path / "new", option, value)
+    assert result.exit_code == 2 and option in result.output and not (tmp_path / "new").exists()
+
+
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):
     with serve("gap8-silent=start") as virtual:
         result = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param",

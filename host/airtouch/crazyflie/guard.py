@@ -32,7 +32,7 @@ def land_packet(height_m: float, seconds: float) -> bytes:
 
 @dataclass
 class Guard:
-    """State of the guard and the pipe to its process. While `flying` is true, the end of this process means a landing."""
+    """State of the guard and the pipe to its process, which lands the drone at our end while `flying` is true."""
 
     pipe: IO[bytes] | None = None
     flying: bool = False

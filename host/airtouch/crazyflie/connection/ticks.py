@@ -27,8 +27,8 @@ class Ticks:
     def unwrap(self, stamp: int, arrival_s: float) -> int:
         """The time of a 24-bit stamp in ms, without wraps. arrival_s: host's clock.
 
-        Raises Restarted if it is over LATEST_MS in the past, or if it goes over LATEST_MS further than the host's clock:
-        from half a wrap of uptime on, a clock that starts again from zero looks like a step forward.
+        Raises Restarted if it is over LATEST_MS in the past, or if it goes over LATEST_MS further than the host's
+        clock: from half a wrap of uptime on, a clock that starts again from zero looks like a step forward.
         """
         if self.newest_ms is None:
             self.newest_ms, self.newest_arrival_s = stamp, arrival_s
