@@ -215,8 +215,29 @@ def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, c
 @pytest.mark.parametrize("option", ["--link-timeout", "--min-battery"])
 @pytest.mark.parametrize("value", ["nan", "inf", "-1"])
 def test_limits_that_are_never_reached_are_refused(tmp_path, option, value):
-    result = run("collect", "--uri", "udp://127.0.0.1:1", "--mission", "sweep", "--out", tmp_path / "new", option, value)
-    assert result.exit_code == 2 and option in result.output and not (tmp_path / "new").exists()
+    out = tmp_path / "new"
+    result = run("collect", "--uri", "udp://127.0.0.1:1", "--mission", "sweep", "--out", out, option, value)
+    assert result.exit_code == 2 and option in result.output and not out.exists()
+
+
+def test_a_flight_that_ends_by_an_error_is_listed_as_messy(serve, hop, cache, tmp_path):
+    def show(flight):
+        if flight.pilot.leg and flight.pilot.leg.kind == "go":
+            raise RuntimeError("a bug")
+
+    with serve() as virtual:
+        plan = collect.Plan(virtual.uri, tmp_path, "hop")
+        drone = Drone(virtual.uri, cache)
+        try:
+            ready = readiness.make_ready(drone, plan.settings, plan.least_v, lambda _: None)
+            with pytest.raises(RuntimeError, match="a bug"):
+                collect.fly(drone, ready, mission.load(hop), plan, 1, stop=threading.Event(), say=lambda _: None,
+                            show=show)
+        finally:
+            drone.close()
+        assert comes_to_rest(virtual)
+    assert (tmp_path / "manifest.csv").read_text().splitlines()[1].startswith("hop_0001.csv.gz,messy,1,")
+    assert logs.read(tmp_path / "hop_0001.csv.gz").meta["ended"] == "an error"
 
 
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):

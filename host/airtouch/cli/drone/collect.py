@@ -96,11 +96,12 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     with collect.no_empty_folders(out):
         collect.prepare_folder(out, click.echo)
         first_number = number or recorder.next_number(out, name)
-        check_free(recorder.flight_path(out, name, first_number), force)
+        numbers = range(first_number, first_number + flights)
+        for i in numbers:
+            check_free(recorder.flight_path(out, name, i), force)
         click.echo(first.describe())
-        missions = {i: mission.load(mission_name, seed, i) for i in range(first_number, first_number + flights)}
-        with stopping() as stop:
-            planned = _fly(plan, missions, cache, stop, ask=sys.stdin.isatty() and not yes)
+        missions = {i: mission.load(mission_name, seed, i) for i in numbers}
+        planned = _fly(plan, missions, cache, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
 
 
@@ -114,20 +115,25 @@ def _recover(out: Path) -> None:
     sys.exit(2 if unreadable else 0)
 
 
-def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | None, stop: threading.Event,
-         ask: bool) -> bool:
-    """Fly missions, by the flights' numbers, until one ends early. True if all ended as planned."""
+def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | None, ask: bool) -> bool:
+    """Fly missions, by the flights' numbers, until one ends early. True if all ended as planned.
+
+    Ctrl-C lands a drone in flight; before and between the flights it ends the program, as it does elsewhere.
+    """
     from airtouch.crazyflie import collect, readiness
     from airtouch.crazyflie.connection.drone import Drone
     from airtouch.crazyflie.connection.link import default_cache
 
-    drone = Drone(plan.uri, cache or default_cache(), unanswered=waiting(plan.uri, stop))
+    with stopping(quiet=True) as stop:
+        drone = Drone(plan.uri, cache or default_cache(), unanswered=waiting(plan.uri, stop))
     try:
+        if stop.is_set():
+            raise click.Abort
         ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
         for number, mission in missions.items():
             if ask:
                 click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
-            with _display(mission.seconds) as show:
+            with _display(mission.seconds) as show, stopping() as stop:
                 outcome = collect.fly(drone, ready, mission, plan, number, stop=stop, say=click.echo, show=show)
             _report(outcome)
             if not outcome.planned:
