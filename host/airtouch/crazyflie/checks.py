@@ -1,5 +1,6 @@
 """Checks before take-off. Each fault is one line with its remedy."""
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,7 +77,10 @@ def representable(name: str, text: str, ctype: str) -> float:
                                 f"the drone keeps it as {ctype}, {low} to {high}")
         return value
     try:
-        return struct.unpack("<f", struct.pack("<f", float(text)))[0]
+        value = float(text)
+        if not math.isfinite(value):
+            raise AirTouchError(f"{name} = {text}: give a finite number")
+        return struct.unpack("<f", struct.pack("<f", value))[0]
     except ValueError:
         raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a number") from None
     except OverflowError:
