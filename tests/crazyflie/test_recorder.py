@@ -120,6 +120,14 @@ def test_recovery_says_what_it_cannot_read_and_leaves_it(tmp_path):
     assert recovered == [] and "b_0001.csv.gz.part" in unreadable[0] and (tmp_path / "b_0001.csv.gz.part").exists()
 
 
+def test_recovery_says_what_is_no_file(tmp_path):
+    (tmp_path / "b_0001.csv.gz.part").mkdir()
+    (tmp_path / "b_0002.csv.gz.part").symlink_to("nowhere")
+    recovered, unreadable = recorder.recover(tmp_path)
+    assert recovered == [] and ["_0001.csv.gz.part: cannot be read: Is a directory" in unreadable[0],
+                                "_0002.csv.gz.part: cannot be read: No such file" in unreadable[1]] == [True, True]
+
+
 def test_a_log_that_cannot_be_finished_stays_as_it_is(tmp_path):
     book = Recorder(tmp_path / "a_0001.csv.gz", NAMES, {})
     book.add(*rows([0, 10]))

@@ -138,7 +138,12 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
     """
     finished, unreadable = [], []
     for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):
-        with part.open("rb") as file:
+        try:
+            file = part.open("rb")
+        except OSError as error:  # a folder, a link to nothing
+            unreadable.append(f"{part}: cannot be read: {error.strerror}")
+            continue
+        with file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
