@@ -36,7 +36,7 @@ def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostD
     app = app_log.block(known)
     for block in filter(None, (blocks.MOTION, slow, app)):
         drone.start(block)
-    return slow, HostDetector() if host_detector or app is None else None
+    return slow, HostDetector(traced=False) if host_detector or app is None else None
 
 
 @dataclass
