@@ -31,6 +31,8 @@ static void makeRetryDue(linkSender_t *sender) { sender->sinceRetry = UINT16_MAX
 
 /** A try is made: the next one comes after the same interval, or twice that where the silence has cost samples. */
 static void noteRetry(linkSender_t *sender) {
+  sender->trying = true;
+  sender->intervalBefore = sender->retryInterval;
   sender->sinceRetry = 0;
   if (sender->silent >= LINK_HISTORY) {
     sender->retryInterval =
@@ -126,6 +128,7 @@ static void retry(linkSender_t *sender) {
 uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
   edgeLinkPacket_t packet = {.session = sender->session};
   sender->sending = false;
+  sender->trying = false;
   const bool refused = sender->state == LINK_REFUSED;
   if (refused || sender->state == LINK_STARTING) {
     if (sender->sinceRetry < sender->retryInterval || (refused && sender->sinceRetry < LINK_REFUSED_STEPS)) {
@@ -160,6 +163,11 @@ void linkSenderSent(linkSender_t *sender, bool taken) {
   sender->counters.packetsDropped++;
   if (sender->sending) {
     sender->next = sender->sendingFrom;
+  }
+  if (sender->trying) {  // it was no try: the next packet is one
+    sender->counters.timeouts -= sender->sending ? 1 : 0;
+    sender->retryInterval = sender->intervalBefore;
+    makeRetryDue(sender);
   }
 }
 

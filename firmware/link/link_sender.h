@@ -38,7 +38,7 @@ typedef enum {
   LINK_STARTING = 0,  ///< no answer to the reset yet
   LINK_FILLING = 1,   ///< samples arrive; the network has not seen a whole window of them
   LINK_UP = 2,        ///< answers come
-  LINK_DOWN = 3,      ///< no packet from the GAP8 for LINK_DOWN_STEPS
+  LINK_DOWN = 3,      ///< no RESULT from the GAP8 for LINK_DOWN_STEPS; heartbeats do not count
   LINK_REFUSED = 4,   ///< the GAP8 has another model
 } linkState_t;
 
@@ -67,21 +67,23 @@ typedef struct {
   uint8_t history[LINK_HISTORY][EDGE_LINK_SAMPLE_BYTES];
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   uint32_t nonce;
-  uint32_t samples;        ///< pushed so far: the next one's sequence
-  uint32_t base;           ///< the oldest unconfirmed one
-  uint32_t next;           ///< the next one to send
-  uint32_t lastAnswer;     ///< sequence of the last answer given
-  uint16_t refill;         ///< samples that the network needs before it answers
-  uint16_t silent;         ///< steps since the GAP8's last packet
-  uint16_t sinceRetry;     ///< steps since the last try: a reset, or everything that is unconfirmed again
-  uint16_t retryInterval;  ///< steps from one try to the next
-  uint8_t outstanding;     ///< packets on their way
-  uint8_t holdOff;         ///< steps in which requests to go back are old news
+  uint32_t samples;         ///< pushed so far: the next one's sequence
+  uint32_t base;            ///< the oldest unconfirmed one
+  uint32_t next;            ///< the next one to send
+  uint32_t lastAnswer;      ///< sequence of the last answer given
+  uint16_t refill;          ///< samples that the network needs before it answers
+  uint16_t silent;          ///< steps since the GAP8's last RESULT in this session; heartbeats do not count
+  uint16_t sinceRetry;      ///< steps since the last try: a reset, or everything that is unconfirmed again
+  uint16_t retryInterval;   ///< steps from one try to the next
+  uint16_t intervalBefore;  ///< the same before the packet of the last poll
+  uint8_t outstanding;      ///< packets on their way
+  uint8_t holdOff;          ///< steps in which requests to go back are old news
   uint8_t session;
   uint8_t algorithm;
   uint8_t state;  ///< a linkState_t
   bool answered;
   bool sending;          ///< the packet of the last poll was one of samples
+  bool trying;           ///< it was a try: a reset, or everything that is unconfirmed again
   uint32_t sendingFrom;  ///< where `next` stood before it
 } linkSender_t;
 
@@ -106,7 +108,7 @@ void linkSenderPush(linkSender_t *sender, const uint8_t sample[EDGE_LINK_SAMPLE_
  */
 uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes);
 
-/** Whether the transport took the packet of the last poll; if not it counts as never sent. */
+/** Whether the transport took the packet of the last poll; if not it counts as never sent, and a try as none. */
 void linkSenderSent(linkSender_t *sender, bool taken);
 
 /**

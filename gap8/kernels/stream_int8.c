@@ -53,11 +53,16 @@ int32_t streamInt8Check(const streamInt8_t *network) {
     return 0;
   }
   int32_t skipped = 0;
+  int64_t window = network->stride;  // streamInt8Window, and as many samples as its last row may lie back
   for (int32_t i = 0; i < network->convCount; i++) {
     const streamConv_t *conv = &network->convs[i];
     const bool follows = i == 0 || conv->layer.inChannels == network->convs[i - 1].layer.outChannels;
     if (!layerFits(&conv->layer) || !follows || conv->dilation < 1 || (i == 0 && conv->dilation != 1) ||
         !shapeFits(conv->layer.inRows, conv->dilation, conv->layer.inChannels)) {
+      return i;
+    }
+    window += (int64_t)(i == 0 ? 1 : network->stride) * (ringRows(conv) - 1);
+    if (window > UINT16_MAX) {
       return i;
     }
     skipped += i >= network->firstSkip ? conv->layer.outChannels : 0;

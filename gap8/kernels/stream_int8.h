@@ -57,7 +57,7 @@ typedef struct {
 int32_t streamInt8ArenaBytes(const streamInt8_t *network);
 
 /**
- * @brief Whether the layers fit each other and the limits here.
+ * @brief Whether the layers fit each other and the limits here; streamInt8Window + stride - 1 is at most 65,535.
  *
  * @return -1 where they do; else the index of the first conv that does not, convCount
  * for the head.
@@ -65,7 +65,8 @@ int32_t streamInt8ArenaBytes(const streamInt8_t *network);
 int32_t streamInt8Check(const streamInt8_t *network);
 
 /**
- * @brief Samples, the newest included, that the network's output at one step depends on.
+ * @brief Samples, the newest included, that the output at one step depends on, of a network that streamInt8Check
+ * accepts.
  */
 static inline uint16_t streamInt8Window(const streamInt8_t *network) {
   int32_t steps = 0;

@@ -19,8 +19,9 @@ class FakeCraft:
     """See `airtouch.crazyflie.flight.Craft`."""
 
     def __init__(self, loss=0.0, silent=(), volts=4.0, busy=False, dead_link_at=None, restart_at=None,
-                 platform=(1.0, 2.0), seed=1):
+                 platform=(1.0, 2.0), seed=1, uptime_s=0):
         self.samples, self.answers, self.lost = queue.SimpleQueue(), queue.SimpleQueue(), threading.Event()
+        self.uptime_ms = 1000 * uptime_s  #: that its clock shows at the start
         self.loss, self.silent, self.volts, self.busy = loss, silent, volts, busy
         self.dead_link_at, self.restart_at, self.platform = dead_link_at, restart_at, platform
         self.heard: list = []  #: commands that reached it: (drone's clock, command)
@@ -110,7 +111,7 @@ class FakeCraft:
         self._move(t)
         if self.lost.is_set() or any(a <= t < b for a, b in self.silent) or self.random.random() < self.loss:
             return
-        stamp = index * 10
+        stamp = self.uptime_ms + index * 10
         if self.restart_at is not None and t > self.restart_at:
             stamp = int((t - self.restart_at) * 1000)
         over = self.platform[0] <= self.at[0] <= self.platform[1]

@@ -1,9 +1,12 @@
 """What keeps a drone on the ground, each in one line with its remedy."""
 
+from unittest.mock import Mock
+
 import pytest
 
 from airtouch.crazyflie import checks
 from airtouch.crazyflie.checks import Condition
+from airtouch.crazyflie.connection.drone import Drone
 from airtouch.errors import AirTouchError
 
 GOOD = Condition(4.0, {"bcFlow2": True, "bcMultiranger": True, "bcAI": True}, 0b11111, 0.02)
@@ -48,10 +51,23 @@ def test_values_that_a_parameter_can_hold(text, ctype, value):
 @pytest.mark.parametrize("text, ctype, message", [
     ("256", "uint8_t", "out of range; the drone keeps it as uint8_t, 0 to 255"), ("-1", "uint16_t", "out of range"),
     ("1.5", "uint8_t", "give a whole number"), ("yes", "float", "give a number"), ("1e40", "float", "out of range"),
+    ("nan", "float", "give a finite number"), ("-inf", "float", "give a finite number"),
 ])
 def test_values_that_it_cannot(text, ctype, message):
     with pytest.raises(AirTouchError, match=message):
         checks.representable("g.n", text, ctype)
+
+
+def test_a_parameter_that_the_drone_keeps_as_no_number_was_not_set():
+    drone, updates = Drone.__new__(Drone), []
+    drone.crazyflie = Mock()
+    drone.crazyflie.param.toc.get_element.return_value.ctype = "float"
+    drone.crazyflie.param.values = {"g": {"n": "0.5"}}
+    drone.crazyflie.param.add_update_callback = lambda group, name, update: updates.append(update)
+    drone.crazyflie.param.set_value = lambda name, value: updates[0](name, str(value))
+    drone.crazyflie.param.request_param_update = lambda name: updates[0](name, "nan")
+    with pytest.raises(AirTouchError, match="g.n = 0.7: out of range; the drone kept nan"):
+        drone.set_parameter("g.n", "0.7")
 
 
 @pytest.mark.parametrize("text", ["airtouch.enable", "enable=1", "a.b.c=1", "a.b="])

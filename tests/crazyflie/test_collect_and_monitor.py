@@ -1,5 +1,6 @@
 """collect and monitor with cflib as it is and the virtual drone, in its own time."""
 
+import io
 import re
 import struct
 import threading
@@ -51,7 +52,7 @@ def guards(monkeypatch):
 
     @contextmanager
     def guarding(uri, height_m, seconds):
-        started.append(Guard())
+        started.append(Guard(io.BytesIO()))
         yield started[-1]
 
     monkeypatch.setattr(collect, "guarding", guarding)
@@ -82,7 +83,7 @@ def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards)
         result = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
         assert result.exit_code == 0, result.output
         assert comes_to_rest(virtual)
-    assert [guard.landed for guard in guards] == [True, True]
+    assert [guard.pipe.getvalue() for guard in guards] == [b"10", b"10"]
     assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
     log = logs.read(tmp_path / "hop_0004.csv.gz")
     assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and result.output.count("\ntrue ") >= 2
@@ -153,7 +154,7 @@ def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
     with serve("disconnect=4,5s") as virtual:
         result = fly(virtual, hop, cache, tmp_path)
         assert result.exit_code == 1 and "link lost" in result.output, result.output
-        assert comes_to_rest(virtual) and guards[0].landed
+        assert comes_to_rest(virtual) and guards[0].pipe.getvalue() == b"10"
     log = logs.read(tmp_path / "hop_0001.csv.gz")
     assert log.meta["longest_gap_s"] >= 4.9 and "link lost" in log.meta["ended"]
     middle = int(np.argmax(np.diff(log["t_s"])))
@@ -209,6 +210,34 @@ def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, c
         result = fly(virtual, hop, cache, tmp_path)
         assert "not ready: battery at" in str(result.exception) and "charge it" in str(result.exception)
         assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
+
+
+@pytest.mark.parametrize("option", ["--link-timeout", "--min-battery"])
+@pytest.mark.parametrize("value", ["nan", "inf", "-1"])
+def test_limits_that_are_never_reached_are_refused(tmp_path, option, value):
+    out = tmp_path / "new"
+    result = run("collect", "--uri", "udp://127.0.0.1:1", "--mission", "sweep", "--out", out, option, value)
+    assert result.exit_code == 2 and option in result.output and not out.exists()
+
+
+def test_a_flight_that_ends_by_an_error_is_listed_as_messy(serve, hop, cache, tmp_path):
+    def show(flight):
+        if flight.pilot.leg and flight.pilot.leg.kind == "go":
+            raise RuntimeError("a bug")
+
+    with serve() as virtual:
+        plan = collect.Plan(virtual.uri, tmp_path, "hop")
+        drone = Drone(virtual.uri, cache)
+        try:
+            ready = readiness.make_ready(drone, plan.settings, plan.least_v, lambda _: None)
+            with pytest.raises(RuntimeError, match="a bug"):
+                collect.fly(drone, ready, mission.load(hop), plan, 1, stop=threading.Event(), say=lambda _: None,
+                            show=show)
+        finally:
+            drone.close()
+        assert comes_to_rest(virtual)
+    assert (tmp_path / "manifest.csv").read_text().splitlines()[1].startswith("hop_0001.csv.gz,messy,1,")
+    assert logs.read(tmp_path / "hop_0001.csv.gz").meta["ended"] == "an error"
 
 
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):

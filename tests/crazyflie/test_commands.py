@@ -1,10 +1,17 @@
 """The commands without a drone: what they ask for, and what they refuse in one line."""
 
+import os
+import signal
+import threading
+from unittest.mock import Mock
+
 import pytest
 from click.testing import CliRunner
 
 from airtouch.cli import airtouch
-from airtouch.crazyflie import collect, recorder
+from airtouch.cli.drone import collect as cli_collect
+from airtouch.crazyflie import collect, mission, readiness, recorder
+from airtouch.crazyflie.checks import Condition
 from airtouch.errors import AirTouchError
 
 
@@ -46,11 +53,52 @@ def test_a_folder_that_holds_something_stays(tmp_path):
     assert (tmp_path / "a" / "b" / "flight.csv.gz.part").is_file()
 
 
-def test_an_existing_flight_is_not_flown_over(tmp_path):
-    path = recorder.flight_path(tmp_path, "sweep", 3)
+@pytest.mark.parametrize("number", [3, 4])
+def test_an_existing_flight_is_not_flown_over(tmp_path, number):
+    path = recorder.flight_path(tmp_path, "sweep", number)
     path.write_bytes(b"mine")
-    message = refusal("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--number", "3")
+    message = refusal("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--number", "3", "-n", "2")
     assert message == f"{path}: exists already; use --force to replace it" and path.read_bytes() == b"mine"
+
+
+def test_ctrl_c_at_the_question_ends_the_program_before_anything_is_armed(tmp_path, monkeypatch):
+    flown = Mock()
+    monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", Mock())
+    monkeypatch.setattr(readiness, "make_ready", Mock())
+    monkeypatch.setattr(collect, "fly", flown)
+    monkeypatch.setattr("click.confirm", lambda *_, **__: os.kill(os.getpid(), signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        cli_collect._fly(collect.Plan("x", tmp_path, "hop"), {1: Mock(seconds=1.0)}, tmp_path, ask=True)
+    flown.assert_not_called()
+
+
+def fly_once(tmp_path, drone, stop):
+    ready = readiness.Readiness(Condition(4.0, {"bcFlow2": True}), None, "unknown")
+    flown = mission.load("sweep")
+    return collect.fly(drone, ready, flown, collect.Plan("x", tmp_path, "hop"), 1, stop=stop, say=print)
+
+
+@pytest.mark.parametrize("when", ["before", "while it settles"])
+def test_a_stop_before_the_take_off_leaves_the_drone_unarmed(tmp_path, monkeypatch, when):
+    drone, stop = Mock(protocol=8), threading.Event()
+    standing = Mock(latest={"vbat_V": 4.0, "zrange_m": 0.02}, supervisor=readiness.CAN_BE_ARMED)
+    monkeypatch.setattr(readiness, "listen", lambda *_: standing)
+    monkeypatch.setattr(readiness, "reset_estimator", lambda _: stop.set())
+    if when == "before":
+        stop.set()
+    with pytest.raises(AirTouchError, match="stopped by the user before the take-off"):
+        fly_once(tmp_path, drone, stop)
+    drone.arm.assert_not_called()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_opened_leaves_the_drone_unarmed(tmp_path, monkeypatch):
+    (tmp_path / "hop_0001.csv.gz.part").write_text("of a killed flight")
+    settle = Mock()
+    monkeypatch.setattr(collect, "settle", settle)
+    with pytest.raises(AirTouchError, match="--force replaces it"):
+        fly_once(tmp_path, Mock(protocol=8), threading.Event())
+    settle.assert_not_called()
 
 
 def test_a_folder_without_room_or_rights_is_told_before_flying(tmp_path, monkeypatch):

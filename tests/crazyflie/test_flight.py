@@ -23,10 +23,10 @@ LEGS = (mission.Leg("wait", 0, 0, 0, 1.0), mission.Leg("take-off", 0, 0, HEIGHT,
         mission.Leg("wait", 3.0, 0, 0, 0.5))
 
 
-def fly(craft, folder, stop=None, show=lambda _: None, **more):
+def fly(craft, folder, stop=None, show=lambda _: None, legs=LEGS, **more):
     intake = Intake(blocks.STATE)
     book = Recorder(folder / "f_0001.csv.gz", intake.names, {"mission": "test", "acc_frame": "body"})
-    flight = Flight(craft, Autopilot(LEGS), intake, book, stop or threading.Event(), show=show, clock=craft.clock,
+    flight = Flight(craft, Autopilot(legs), intake, book, stop or threading.Event(), show=show, clock=craft.clock,
                     sleep=craft.sleep, **more)
     ended = flight.run()
     return flight, book, ended
@@ -146,10 +146,12 @@ def test_a_refusing_supervisor_stays_on_the_ground(tmp_path):
     assert "supervisor refuses take-off" in ended and flight.pilot.refused and "land" not in kinds(craft)
 
 
-def test_a_drone_that_restarts_in_flight_ends_it(tmp_path):
-    craft = FakeCraft(restart_at=9.0)
+@pytest.mark.parametrize("uptime_h", [0, 1, 3, 4.5])
+def test_a_drone_that_restarts_in_flight_ends_it(tmp_path, uptime_h):
+    craft = FakeCraft(restart_at=9.0, uptime_s=int(3600 * uptime_h))
     _, book, ended = fly(craft, tmp_path)
     assert ended == "the drone restarted in flight" and len(book.finish()) > 500
+    assert "land" not in kinds(craft)
 
 
 def test_an_error_of_ours_lands_first(tmp_path):
@@ -163,6 +165,26 @@ def test_an_error_of_ours_lands_first(tmp_path):
         fly(craft, tmp_path, show=show)
     assert not craft.flying and not craft.crashed
     assert len(logs.read(tmp_path / "f_0001.csv.gz.part")) > 300  # readable though nobody finished it
+
+
+def test_an_error_after_the_landing_sends_no_land_command(tmp_path, monkeypatch):
+    def tail(flight):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(Flight, "_tail", tail)
+    craft = FakeCraft()
+    with pytest.raises(RuntimeError, match="a bug"):
+        fly(craft, tmp_path, legs=LEGS[:-1])  # as missions end: with the landing
+    assert kinds(craft)[-2:] == ["land", "stop"] and not craft.flying
+
+
+@pytest.mark.parametrize("craft", [FakeCraft(), FakeCraft(volts=3.3), FakeCraft(restart_at=9.0)],
+                         ids=["planned", "early", "restarted"])
+def test_the_guard_is_told_of_the_air_alone(tmp_path, craft):
+    told = []
+    fly(craft, tmp_path, in_air=lambda flying: told.append((flying, len(craft.heard))))
+    assert told[0] == (False, 0) and (True, 0) in told  # before the take-off is sent
+    assert told[-1][0] is False and craft.heard[told[-1][1] - 1][1].kind in ("stop", "go")
 
 
 def test_a_closed_terminal_is_no_reason_to_fall(tmp_path):

@@ -33,9 +33,13 @@ FLYER = f"""
 import sys, time
 from airtouch.crazyflie.guard import guarding
 with guarding(sys.argv[1], 0.25, 4.0) as watch:
+    if sys.argv[2] != "never flies":
+        watch.tell(True)
+    if sys.argv[2] == "has landed":
+        watch.tell(False)
     print("flying", flush=True)
     if sys.argv[2] == "lands":
-        watch.landed = True
+        watch.tell(False)
     elif sys.argv[2] == "raises":
         raise RuntimeError("a bug")
     else:
@@ -72,6 +76,17 @@ def test_a_pilot_that_landed_is_left_alone(drone):
         drone.recv(64)
 
 
+@pytest.mark.parametrize("ending", ["never flies", "has landed"])
+def test_a_drone_that_stands_is_left_alone_when_its_pilot_dies(drone, ending):
+    process = flyer(drone, ending)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert process.stderr.read() == ""  # the guard has ended
+    drone.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        drone.recv(64)
+
+
 def test_it_gives_up_in_the_end(monkeypatch):
     clock = Mock(now=0.0)
     clock.monotonic, clock.sleep = (lambda: clock.now), (lambda seconds: setattr(clock, "now", clock.now + seconds))
@@ -94,8 +109,8 @@ def test_help_says_what_it_is_for_and_how_to_use_it():
 
 
 def test_a_height_below_the_start_is_a_height_and_no_option(drone):
-    with guard.guarding(uri(drone), -1e-05, 3.0):
-        pass  # it ends without a landing, as a killed one does
+    with guard.guarding(uri(drone), -1e-05, 3.0) as watch:
+        watch.tell(True)  # it ends without a landing, as a killed one does
     data, sender = drone.recvfrom(64)
     drone.sendto(bytes([LAND_HEADER, 8, 0, 0, 0]), sender)
     assert struct.unpack("<BBff?f", data[1:])[2] == pytest.approx(-1e-05)

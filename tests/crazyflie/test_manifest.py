@@ -43,8 +43,19 @@ def test_a_row_has_the_values_of_its_mission_and_replaces_an_older_one(tmp_path)
     assert manifest.list_flight(tmp_path / "new.csv", log, planned=True) == "clean"
     with path.open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows == [HEADER.split(","), "old.csv,clean,1,h79,0,none,0.35".split(","),
-                    "new.csv,clean,2,40mm,30,fan,0.3".split(",")]
+    assert rows == [f"{HEADER},note".split(","), "old.csv,clean,1,h79,0,none,0.35,mine".split(","),
+                    "new.csv,clean,2,40mm,30,fan,0.3,".split(",")]
+
+
+def test_columns_of_the_user_stay_where_they_are(tmp_path):
+    path = tmp_path / "manifest.csv"
+    path.write_text("note,file,use\nmine,old.csv,clean\n")
+    manifest.list_flight(tmp_path / "new.csv", flight(), planned=True)
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert path.read_text().startswith("note,file,use,fold,height,")
+    assert [(row["note"], row["file"], row["use"]) for row in rows] == [("mine", "old.csv", "clean"),
+                                                                        ("", "new.csv", "clean")]
 
 
 def test_a_recorded_flight_without_mission_leaves_its_values_empty(tmp_path):

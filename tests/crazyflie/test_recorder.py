@@ -48,6 +48,26 @@ def test_nothing_is_replaced_unasked(tmp_path):
     assert list(tmp_path.iterdir()) == []  # a flight without a row leaves nothing
 
 
+def test_force_does_not_touch_a_flight_that_is_being_recorded(tmp_path):
+    path, files = tmp_path / "a_0001.csv.gz", len(os.listdir("/proc/self/fd"))
+    book = Recorder(path, NAMES, {"mission": "a"})
+    book.add(*rows([1000, 1010]))
+    with pytest.raises(AirTouchError, match="another flight being recorded there.$"):
+        Recorder(path, NAMES, {}, force=True)
+    assert list(logs.read(book.part)["t_s"]) == [1.0, 1.01]
+    book.finish()
+    assert len(os.listdir("/proc/self/fd")) == files
+
+
+def test_force_replaces_what_a_killed_flight_left(tmp_path):
+    part = tmp_path / "a_0001.csv.gz.part"
+    part.write_text("older and longer\n" * 100)
+    book = Recorder(tmp_path / "a_0001.csv.gz", NAMES, {}, force=True)
+    book.add(*rows([1000]))
+    assert "older" not in part.read_text() and list(logs.read(part)["t_s"]) == [1.0]
+    book.finish()
+
+
 def test_the_next_number_is_above_those_in_the_folder(tmp_path):
     assert recorder.next_number(tmp_path, "edge") == 1
     for name in ("edge_0003.csv.gz", "edge_0007.csv.gz.part", "edge_x_0009.csv.gz", "manifest.csv"):
@@ -98,6 +118,14 @@ def test_recovery_says_what_it_cannot_read_and_leaves_it(tmp_path):
     (tmp_path / "b_0001.csv.gz.part").write_text("")
     recovered, unreadable = recorder.recover(tmp_path)
     assert recovered == [] and "b_0001.csv.gz.part" in unreadable[0] and (tmp_path / "b_0001.csv.gz.part").exists()
+
+
+def test_recovery_says_what_is_no_file(tmp_path):
+    (tmp_path / "b_0001.csv.gz.part").mkdir()
+    (tmp_path / "b_0002.csv.gz.part").symlink_to("nowhere")
+    recovered, unreadable = recorder.recover(tmp_path)
+    assert recovered == [] and ["_0001.csv.gz.part: cannot be read: Is a directory" in unreadable[0],
+                                "_0002.csv.gz.part: cannot be read: No such file" in unreadable[1]] == [True, True]
 
 
 def test_a_log_that_cannot_be_finished_stays_as_it_is(tmp_path):

@@ -61,5 +61,13 @@ def test_pieces_of_one_row_give_the_same(flight):
     for i in range(0, 900):
         row_by_row.next({name: values[i:i + 1] for name, values in log.columns.items()})
     all_at_once.next({name: values[:900] for name, values in log.columns.items()})
+    bounded = HostDetector(traced=False)
+    edges = [bounded.next({name: values[i:i + 1] for name, values in log.columns.items()})[1]
+             for i in range(0, len(log))]
+    _, expected = HostDetector().next(log.columns)
+    assert [edge for some in edges for edge in some] == expected != []
+    assert len(bounded._logits) < len(log) / 2
+    with pytest.raises(ValueError, match="keeps no trace"):
+        bounded.trace(log)
     beginning = log.slice(0, 900)
     assert row_by_row.trace(beginning).edges == all_at_once.trace(beginning).edges

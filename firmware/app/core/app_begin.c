@@ -63,13 +63,24 @@ static bool beginBest(appCore_t *core) {
                             &airtouchStreamDecoder, core->arena);
 }
 
+/** What the detector found last is no longer so: nothing is known of it until the next step. */
+static void forgetFindings(appLog_t *log) {
+  memset(log->feature, 0, sizeof log->feature);
+  memset(log->force, 0, sizeof log->force);
+  memset(log->logit, 0, sizeof log->logit);
+  log->cfarPower = 0.0f;
+  log->threshold = NAN;
+  log->probability = NAN;
+  log->alert = 0;
+  log->over = 0;
+}
+
 /** Kernels, detector and stream begin anew; counters stay. */
 static void beginDetector(appCore_t *core) {
   core->networksFit = beginBest(core) && core->networksFit;
   core->detector = detectorInForce(core);
   core->log.detector = core->detector;
-  core->log.over = 0;
-  core->log.probability = NAN;
+  forgetFindings(&core->log);
   core->probability = NAN;
   core->wasAlert = false;
   core->sinceEdge = UINT16_MAX;
@@ -95,7 +106,6 @@ void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint
   core->haveGap8 = haveGap8;
   core->nonce = nonce;
   appParamsDefaults(&core->params);
-  core->log.threshold = NAN;
   if (params != NULL) {
     core->params = *params;
     core->log.paramErrors = appParamsClamp(&core->params);

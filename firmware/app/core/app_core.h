@@ -6,7 +6,7 @@
  *
  * One step every 10 ms: appCoreReceive() for each packet that came, appCoreStep(), then the packets
  * of appCoreOutgoing(). Nothing waits, nothing fails: a value that is not finite is replaced and
- * counted, a GAP8 that is silent leaves the probability unknown, and the log says so. About 24 kB.
+ * counted, a GAP8 that is silent leaves the probability unknown, and the log says so. About 20 kB.
  */
 #pragma once
 
@@ -90,7 +90,8 @@ void appParamsDefaults(appParams_t *params);
 
 /**
  * Puts settings that are out of range right: each to its nearest limit, what is not finite to its default.
- * The band and probabilityOut are limited by their partners, so the order of two changes does not matter.
+ * Each is limited on its own, so the order of two changes does not matter. The exit of `paper` is used at most 0.01
+ * below its entry, whatever probabilityOut says.
  * @return how many were changed
  */
 uint16_t appParamsClamp(appParams_t *params);

@@ -44,7 +44,8 @@ void appPaperDecoding(const appPaper_t *paper, const appParams_t *params, edgePi
   const float in = floatOr(params->probabilityIn, shipped->probabilityIn, tuned->probabilityIn);
   const float out = floatOr(params->probabilityOut, shipped->probabilityOut, tuned->probabilityOut);
   config->probabilityEntry = in;
-  config->probabilityExit = out < in ? out : in - 0.01f;  // one of them may have been set, the other not
+  const float below = in - 0.01f;  // one of them may have been set, the other not
+  config->probabilityExit = out < below ? out : below;
   config->dwellSamples = stepsOr(params->probabilityDwell, shipped->probabilityDwell, tuned->probabilityDwell);
   config->alertHold = stepsOr(params->alertHold, shipped->alertHold, tuned->alertHold);
 }

@@ -41,10 +41,9 @@ uint16_t appParamsClamp(appParams_t *params) {
   changed += clampSetting(&params->bandMid, 2.0f, 48.0f, shipped.bandMid);
   // No source, round numbers: far within FLT_MIN to 1, all that FR-CFAR takes.
   changed += clampSetting(&params->pFa, 1e-12f, 0.5f, shipped.pFa);
-  // Neither 0 nor 1, which a probability always or never reaches, and the exit at least 0.01 below the entry.
+  // Neither 0 nor 1, which a probability always or never reaches. appPaperDecoding keeps the exit below the entry.
   changed += clampSetting(&params->probabilityIn, 0.02f, 0.99f, shipped.probabilityIn);
-  const float below = params->probabilityIn - 0.01f;
-  changed += clampSetting(&params->probabilityOut, 0.01f, below, shipped.probabilityOut);
+  changed += clampSetting(&params->probabilityOut, 0.01f, 0.98f, shipped.probabilityOut);
   // Logits: what is compared with a score is at most 8 + 0.3 * 8 (edge_decoder.c, overShare), so 12 never fires. No
   // source for -8.
   changed += clampSetting(&params->scoreIn, -8.0f, 12.0f, shipped.scoreIn);

@@ -21,21 +21,21 @@ static const char *const names[VARIABLES][2] = {{"stateEstimate", "z"},  {"state
                                                 {"stateEstimate", "qx"}, {"stateEstimate", "qy"},
                                                 {"gyro", "x"},           {"gyro", "y"}};
 static logVarId_t ids[VARIABLES];
-static bool variablesFound;
+static enum { NOT_SOUGHT, FOUND, LACKING } variables;
 static uint8_t enable;
 static floorHeight_t state;
 
-/** @return false where the firmware lacks a variable: then everything stays as it is */
+/** Looks once: a search through the whole table. @return false where a variable is lacking: everything stays as it is
+ */
 static bool findVariables(void) {
-  if (!variablesFound) {
-    bool all = true;
+  if (variables == NOT_SOUGHT) {
+    variables = FOUND;
     for (int i = 0; i < VARIABLES; i++) {
       ids[i] = logGetVarId(names[i][0], names[i][1]);
-      all = all && logVarIdIsValid(ids[i]);
+      variables = logVarIdIsValid(ids[i]) ? variables : LACKING;
     }
-    variablesFound = all;
   }
-  return variablesFound;
+  return variables == FOUND;
 }
 
 /** Forgets the floor; the count of its steps stays. */

@@ -101,8 +101,8 @@ class Autopilot:
             return self._come_down(now_s, wall_s)
         self.index += 1
         if self.index >= len(self.legs):
-            self.phase = "done"
-            return [Command("stop")] if self.in_air else []
+            landed, self.phase, self.in_air = self.in_air, "done", False
+            return [Command("stop")] if landed else []
         leg = self.legs[self.index]
         if leg.kind in ("wait", "hover"):
             landed = leg.kind == "wait" and self.in_air

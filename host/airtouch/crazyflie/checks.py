@@ -1,5 +1,6 @@
 """Checks before take-off. Each fault is one line with its remedy."""
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,8 +77,11 @@ def representable(name: str, text: str, ctype: str) -> float:
                                 f"the drone keeps it as {ctype}, {low} to {high}")
         return value
     try:
-        return struct.unpack("<f", struct.pack("<f", float(text)))[0]
+        value = struct.unpack("<f", struct.pack("<f", float(text)))[0]
     except ValueError:
         raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a number") from None
     except OverflowError:
         raise AirTouchError(f"{name} = {text}: out of range for {ctype}") from None
+    if not math.isfinite(value):
+        raise AirTouchError(f"{name} = {text}: give a finite number")
+    return value

@@ -101,26 +101,25 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
         say: Callable[[str], None], show: Callable[[Flight], None] = lambda _: None) -> Outcome:
     """Fly a mission once, record it, and add it to the manifest.
 
-    Raises AirTouchError if the drone is not ready or refuses a command, and if the file cannot be written.
+    Raises AirTouchError if the drone is not ready or refuses a command, if the file cannot be written, and after `stop`
+    before the drone is armed.
     """
-    origin = origin_of(settle(drone, ready, plan.least_v).latest)
     intake = Intake(ready.slow)
     path = flight_path(plan.out, plan.name, number)
     recorder = Recorder(path, intake.names, meta_of(drone, ready, mission, plan, number), plan.force)
     height = max((leg.z_m for leg in mission.legs), default=0.0)
     down_s = max(LEAST_DOWN_S, height / LANDING_MPS)
-    ended = "an error"
-    with guarding(plan.uri, origin.z_m, down_s) if plan.guarded else nullcontext(None) as guard:
-        flight = Flight(drone, Autopilot(mission.legs, origin), intake, recorder, stop, plan.link_timeout_s, show, say)
-        try:
-            ended = flight.run()
-        finally:
-            if guard is not None:
-                guard.landed = flight.landed
-            log = recorder.finish(ended=ended, silences_s=flight.silences)
-    outcome = Outcome(path, ended, log, flight.silences)
-    if len(log):
-        outcome.use = manifest.list_flight(path, log, outcome.planned)
+    outcome = Outcome(path, "an error", recorder.log())
+    try:
+        origin = origin_of(settle(drone, ready, plan.least_v, stop).latest)
+        with guarding(plan.uri, origin.z_m, down_s) if plan.guarded else nullcontext(None) as guard:
+            flight = Flight(drone, Autopilot(mission.legs, origin), intake, recorder, stop, plan.link_timeout_s, show,
+                            say, silences=outcome.silences, in_air=guard.tell if guard else lambda _: None)
+            outcome.ended = flight.run()
+    finally:
+        outcome.log = recorder.finish(ended=outcome.ended, silences_s=outcome.silences)
+        if len(outcome.log):
+            outcome.use = manifest.list_flight(path, outcome.log, outcome.planned)
     if flight.pilot.refused:
         raise AirTouchError(flight.pilot.refused)
     return outcome

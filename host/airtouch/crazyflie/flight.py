@@ -65,7 +65,8 @@ class Craft(Protocol):
 class Flight:
     """One flight. `run` flies it and returns how it ended. On any error it lands the drone first.
 
-    stop: set it to land (Ctrl-C). show: called with the flight in every turn of the loop.
+    stop: set it to land (Ctrl-C). show: called with the flight in every turn of the loop. in_air: called with True
+    before each command in the air, and with False once the drone stands.
     """
 
     craft: Craft
@@ -78,6 +79,7 @@ class Flight:
     say: Callable[[str], None] = lambda _: None
     clock: Callable[[], float] = field(default_factory=lambda: time.monotonic)
     sleep: Callable[[float], None] = field(default_factory=lambda: time.sleep)
+    in_air: Callable[[bool], None] = lambda _: None
     silences: list[float] = field(default_factory=list)
     landed: bool = False
     _volts: deque = field(default_factory=lambda: deque(maxlen=BATTERY_SAMPLES))
@@ -116,11 +118,19 @@ class Flight:
             self.pilot.answer(kind, code)
         self._land_early(wall, silence)
         self._repair_link(silence)
-        self.craft.send(self.pilot.step(self._now(silence), wall, silence))
+        self._send(self.pilot.step(self._now(silence), wall, silence))
         self._ping(wall)
         if self._landing_since is not None and self.pilot.waiting and wall - self._landing_since > GIVE_UP_S:
             return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
         return None
+
+    def _send(self, commands: list[Command]) -> None:
+        """Send the autopilot's commands. The guard learns of a take-off before it, and of a landing after it."""
+        if self.pilot.in_air:
+            self.in_air(True)
+        self.craft.send(commands)
+        if not self.pilot.in_air:
+            self.in_air(False)
 
     def _land_early(self, wall: float, silence: float) -> None:
         """Turn the mission into a landing where there is a reason to land."""
@@ -148,8 +158,12 @@ class Flight:
             self.say(text)
 
     def _over(self, reason: str | None) -> str:
-        self.landed = True
+        self._on_the_ground()
         return reason or "as planned"
+
+    def _on_the_ground(self) -> None:
+        self.landed = True
+        self.in_air(False)
 
     def _receive(self) -> bool:
         """Handle the received packets. False if the drone restarted."""
@@ -217,7 +231,7 @@ class Flight:
     def _bring_down(self) -> None:
         """Land after an error in this program, before the error is reported."""
         if not self.pilot.in_air:
-            self.landed = True
+            self._on_the_ground()
             return
         self._tell("an error in flight: landing")
         command = Command("land", z_m=self.pilot.origin.z_m, seconds=DOWN_S)
@@ -226,7 +240,7 @@ class Flight:
                 self.craft.send([command])
                 self.sleep(LAND_WAIT_S)
                 if any(kind == "land" for kind, _ in drain(self.craft.answers)):
-                    self.landed = True
+                    self._on_the_ground()
                     self.sleep(command.seconds + 1.0)
                     self.craft.send([Command("stop")])
                     return

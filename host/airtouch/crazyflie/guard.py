@@ -1,9 +1,10 @@
-"""A second process that lands the drone if the flying process dies before it has landed.
+"""A second process that lands the drone if the flying process dies while the drone is in the air.
 
 Without it the high-level commander would hover until the battery is empty. `airtouch collect` starts it; nobody else
 has to. `python -m airtouch.crazyflie.guard URI HEIGHT SECONDS` waits for the end of its standard input, which means
-that the flying process is gone. Then it sends land commands until one is answered, for a minute at most. After a normal
-landing the flying process ends the guard.
+that the flying process is gone. The input is 1 at each take-off and 0 at each landing. Unless its last character is 0,
+the guard then sends land commands until one is answered, for a minute at most: a drone that stands must not get one,
+its motors would spin. After a normal landing the flying process ends the guard.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import IO, Any
 
 PATIENCE_S = 60.0  #: s to wait for a drone out of reach or a radio that is still busy
 RESEND_S = 0.2  #: s between two land commands, until one is answered
@@ -31,25 +32,40 @@ def land_packet(height_m: float, seconds: float) -> bytes:
 
 @dataclass
 class Guard:
-    """State of the guard. Set `landed` after the landing; otherwise the guard lands the drone."""
+    """State of the guard and the pipe to its process, which lands the drone at our end while `flying` is true."""
 
-    landed: bool = False
+    pipe: IO[bytes] | None = None
+    flying: bool = False
+
+    def tell(self, flying: bool) -> None:
+        """Say whether the drone is in the air: before the take-off command, and after the landing."""
+        if flying != self.flying:
+            self.flying = flying
+            self._write()
+
+    def _write(self) -> None:
+        if self.pipe is not None:
+            with contextlib.suppress(OSError):  # the guard is gone; the flight goes on
+                self.pipe.write(b"1" if self.flying else b"0")
+                self.pipe.flush()
 
 
 @contextlib.contextmanager
 def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
-    """Run a guard process during the body of a `with` statement."""
+    """Run a guard process during the body of a `with` statement. It lands nothing before it is told of a take-off."""
     command = [sys.executable, "-m", "airtouch.crazyflie.guard", "--", uri, str(height_m), str(seconds)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
-    guard = Guard()
+    guard = Guard(process.stdin)
     try:
+        guard._write()
         yield guard
     finally:
-        if guard.landed:
+        if not guard.flying:
             process.kill()
         if process.stdin is not None:
-            process.stdin.close()
-        if guard.landed:
+            with contextlib.suppress(OSError):
+                process.stdin.close()
+        if not guard.flying:
             process.wait()
 
 
@@ -101,7 +117,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     cflib_or_error()
-    sys.stdin.read()
+    if sys.stdin.buffer.read()[-1:] == b"0":
+        return
     done = land(options.uri, options.height, options.seconds)
     what = "landing" if done else "NO CONTACT, land by hand"
     print(f"airtouch: the flying process is gone; {what}", file=sys.stderr)

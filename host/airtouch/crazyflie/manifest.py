@@ -19,14 +19,16 @@ CLEAN_LOSS = 0.01  #: largest fraction of lost samples of a "clean" flight; one 
 def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
     """Add a flight to the manifest of its folder, in place of a row of the same file. Returns its `use` there.
 
-    The mission's values come from the log's metadata.
+    The manifest's other columns stay, empty in the new row. The mission's values come from the log's metadata.
     """
     path = file.parent / MANIFEST
     use = use_of(log, planned)
-    rows = [row for row in _rows(path) if row.get("file") != file.name]
+    names, rows = _rows(path)
+    names += [name for name in COLUMNS if name not in names]
+    rows = [row for row in rows if row.get("file") != file.name]
     rows.append(_row(file.name, use, log))
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", restval="", lineterminator="\n")
+    writer = csv.DictWriter(text, names, extrasaction="ignore", restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     write_bytes(text.getvalue().encode(), path, force=True)
@@ -58,11 +60,14 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
     return recovered, unreadable
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
+def _rows(path: Path) -> tuple[list[str], list[dict[str, Any]]]:
+    """Names of the columns, and rows, of a manifest; none of both without one."""
     if not path.is_file():
-        return []
+        return [], []
     with path.open(encoding="utf-8-sig", newline="") as handle:
-        return list(csv.DictReader(handle))
+        reader = csv.DictReader(handle)
+        rows = list(reader)
+        return list(reader.fieldnames or []), rows
 
 
 def _row(name: str, use: str, log: FlightLog) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostD
     app = app_log.block(known)
     for block in filter(None, (blocks.MOTION, slow, app)):
         drone.start(block)
-    return slow, HostDetector() if host_detector or app is None else None
+    return slow, HostDetector(traced=False) if host_detector or app is None else None
 
 
 @dataclass
@@ -82,7 +82,8 @@ class Monitor:
         if self.detector is None:
             self.board.detector = self.app.detector
             if self._edges is not None and self.app.edges != self._edges and self.intake.first_ms is not None:
-                at = (self.intake.ticks.unwrap(sample.stamp) - self.intake.first_ms) / 1000.0 - self.app.age_s
+                now_ms = self.intake.ticks.unwrap(sample.stamp, sample.arrival_s)
+                at = (now_ms - self.intake.first_ms) / 1000.0 - self.app.age_s
                 self.on_edge(self.board.add_edge(self.app.kind, at, self.app.probability))
             self._edges = self.app.edges
         load = [f"app {self.app.load_us:.0f} us"] if self.app.load_us else []

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import Event
 
 from airtouch.crazyflie import checks
 from airtouch.crazyflie.autopilot import Origin
@@ -62,11 +63,12 @@ def make_ready(drone: Drone, settings: Sequence[tuple[str, str]], least_v: float
     return Readiness(condition, slow, firmware(drone))
 
 
-def settle(drone: Drone, ready: Readiness, least_v: float) -> Intake:
+def settle(drone: Drone, ready: Readiness, least_v: float, stop: Event) -> Intake:
     """Wait for the drone to stand still, reset its estimate, check it again, and arm it. Returns its packets.
 
-    least_v: V. Raises AirTouchError if it is not ready.
+    least_v: V. stop: set it to leave the drone unarmed. Raises AirTouchError if it is not ready, and after `stop`.
     """
+    go_on(stop)
     start_over(drone)
     standing_still(drone, ready.slow)
     reset_estimator(drone)
@@ -75,10 +77,17 @@ def settle(drone: Drone, ready: Readiness, least_v: float) -> Intake:
     faults = checks.problems(now, least_v)
     if faults:
         raise AirTouchError(f"not ready: {faults[0]}")
+    go_on(stop)
     if standing.supervisor is not None and standing.supervisor & (CAN_BE_ARMED | ARMED) == CAN_BE_ARMED:
         drone.arm()
         time.sleep(ARMING_S)
     return standing
+
+
+def go_on(stop: Event) -> None:
+    """Raise AirTouchError if `stop` is set."""
+    if stop.is_set():
+        raise AirTouchError("stopped by the user before the take-off")
 
 
 def slow_block(drone: Drone, decks: Mapping[str, bool]) -> blocks.Block | None:

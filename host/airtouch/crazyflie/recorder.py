@@ -7,6 +7,7 @@ arrival; those of the finished file are sorted. A full disk ends the writing, no
 import fcntl
 import json
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -52,12 +53,10 @@ class Recorder:
         self._rows: list[np.ndarray] = []
         self._times: list[np.ndarray] = []
         try:
-            flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if force else os.O_EXCL)
-            self._file = os.open(self.part, flags, 0o644)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._file = _open_locked(self.part, force)
         except OSError as error:
             raise AirTouchError(f"{self.part}: cannot be written: {error.strerror}; is another flight being "
-                                "recorded there? --force replaces it") from None
+                                f"recorded there?{'' if force else ' --force replaces it'}") from None
         header = [f"# {key}: {json.dumps(value, default=str)}" for key, value in self.meta.items()]
         self._write("\n".join([*header, ",".join(self.names)]) + "\n")
 
@@ -116,6 +115,22 @@ class Recorder:
         os.close(self._file)
 
 
+def _open_locked(part: Path, force: bool) -> int:
+    """A descriptor of the empty, locked file. It is emptied only once the lock is held: another process may write it.
+
+    Raises OSError if another process holds the lock, and without `force` if the file exists.
+    """
+    file = os.open(part, os.O_WRONLY | os.O_CREAT | (0 if force else os.O_EXCL), 0o644)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if stat.S_ISREG(os.fstat(file).st_mode):
+            os.ftruncate(file, 0)
+    except OSError:
+        os.close(file)
+        raise
+    return file
+
+
 def recover(folder: Path) -> tuple[list[Path], list[str]]:
     """Finish the unfinished files that killed runs left in a folder. Returns the files, and a line for each failure.
 
@@ -123,7 +138,12 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
     """
     finished, unreadable = [], []
     for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):
-        with part.open("rb") as file:
+        try:
+            file = part.open("rb")
+        except OSError as error:  # a folder, a link to nothing
+            unreadable.append(f"{part}: cannot be read: {error.strerror}")
+            continue
+        with file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:

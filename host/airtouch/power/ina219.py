@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from airtouch.errors import AirTouchError
 
@@ -126,7 +127,7 @@ def power(trace: Trace, where: np.ndarray | None = None) -> Power:
     """Mean power over the lines where `where`, (n,) bool, is true, by the trapezoidal rule.
 
     Gaps of more than 20 sample periods, and the backward step of a clock that was reset, are left out.
-    The 95 % interval is that of means over blocks of one second.
+    The 95 % interval is Student's t over the means of blocks of one second; NaN with fewer than two blocks.
     """
     watts = trace.volts * trace.amperes
     steps = np.diff(trace.time_s)
@@ -143,7 +144,9 @@ def power(trace: Trace, where: np.ndarray | None = None) -> Power:
     block = (np.cumsum(np.where(joined, steps, 0.0))[joined] / BLOCK_S).astype(int)
     spans = np.bincount(block, steps[joined])
     means = (np.bincount(block, pieces[joined]) / np.maximum(spans, 1e-12))[spans > 0.5 * BLOCK_S]
-    half = 1.96 * float(means.std(ddof=1)) / math.sqrt(len(means)) if len(means) > 1 else math.nan
+    half = math.nan
+    if len(means) > 1:
+        half = float(stdtrit(len(means) - 1, 0.975) * means.std(ddof=1)) / math.sqrt(len(means))
     return Power(1e3 * joules / seconds, 1e3 * half, 1e3 * joules, seconds, int(joined.sum()) + 1)
 
 

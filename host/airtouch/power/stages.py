@@ -27,16 +27,19 @@ def table(stages: dict[str, Power]) -> str:
     """Table 1 as text: power added by each stage with its interval, energy per step, and the paper's figure."""
     lines = [f"{'':44} {'measured, mW':>22} {'a step, uJ':>11} {'paper, mW':>10} {'n, s':>14}"]
     for name, (mw, half) in added_power(stages).items():
-        interval = f"{mw:8.1f} [{mw - half:.1f}, {mw + half:.1f}]" if math.isfinite(half) else f"{mw:8.1f}"
         a_step = "" if name == "baseline" else f"{1e3 * mw / SAMPLE_RATE_HZ:.0f}"
         paper = f"{PAPER_MW[name]:.0f}" if name in PAPER_MW else ""
         s = stages[name]
-        lines.append(f"{NAMES.get(name, name):44} {interval:>22} {a_step:>11} {paper:>10} "
+        lines.append(f"{NAMES.get(name, name):44} {_interval(mw, half):>22} {a_step:>11} {paper:>10} "
                      f"{s.lines:>7}, {s.seconds:5.1f}")
     total = list(stages.values())[-1]
-    interval = f"[{total.mw - total.half_mw:.1f}, {total.mw + total.half_mw:.1f}]"
-    lines.append(f"{'Total':44} {total.mw:8.1f} {interval}{'':>14} {PAPER_TOTAL_MW:>7.0f}")
+    lines.append(f"{'Total':44} {_interval(total.mw, total.half_mw):>22} {'':>11} {PAPER_TOTAL_MW:>10.0f}")
     return "\n".join(lines)
+
+
+def _interval(mw: float, half_mw: float) -> str:
+    """A power with its interval, or alone where the interval is not known."""
+    return f"{mw:8.1f}" + (f" [{mw - half_mw:.1f}, {mw + half_mw:.1f}]" if math.isfinite(half_mw) else "")
 
 
 # The estimate, without a power meter.

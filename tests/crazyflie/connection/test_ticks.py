@@ -12,21 +12,29 @@ from airtouch.crazyflie.connection.ticks import WRAP_MS, Restarted, Ticks, gaps,
 def test_ticks_go_on_where_the_counter_wraps(start, steps):
     true = start + np.cumsum([0, *steps])
     ticks = Ticks()
-    assert [ticks.unwrap(int(t) % WRAP_MS) for t in true] == list(true)
+    assert [ticks.unwrap(int(t) % WRAP_MS, t / 1000) for t in true] == list(true)
 
 
 @given(st.integers(0, WRAP_MS - 1), st.permutations(range(10)))
 def test_late_packets_keep_their_own_time(start, order):
     ticks = Ticks()
-    ticks.unwrap(start)
-    assert [ticks.unwrap((start + 10 * i) % WRAP_MS) for i in order] == [start + 10 * i for i in order]
+    ticks.unwrap(start, 0.0)
+    times = [ticks.unwrap((start + 10 * i) % WRAP_MS, 0.01 * n) for n, i in enumerate(order)]
+    assert times == [start + 10 * i for i in order]
 
 
-def test_a_clock_that_starts_anew_is_told():
+@pytest.mark.parametrize("uptime_h", [1 / 60, 1.0, 3.0, 4.5])
+def test_a_clock_that_starts_anew_is_told(uptime_h):
     ticks = Ticks()
-    ticks.unwrap(60_000)
+    ticks.unwrap(int(3_600_000 * uptime_h), 7.0)
     with pytest.raises(Restarted):
-        ticks.unwrap(500)
+        ticks.unwrap(500, 9.0)
+
+
+def test_packets_that_were_held_up_in_a_queue_are_no_restart():
+    ticks = Ticks()
+    ticks.unwrap(1000, 2.5)  # 1.5 s late
+    assert ticks.unwrap(2600, 2.6) == 2600
 
 
 @given(st.sets(st.integers(0, 300), min_size=2), st.integers(-3, 3))

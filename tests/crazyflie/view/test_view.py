@@ -59,6 +59,17 @@ def test_a_board_places_edges_one_lag_back_and_draws_itself():
     assert "SILENT for 3.0 s" in board.line()
 
 
+def test_the_track_of_a_long_flight_stays_short_and_new_edges_are_placed_as_well():
+    board = Board("test", "best", lag_s=0.5)
+    for first in range(0, 100_000, 500):  # 1000 s
+        times = (first + np.arange(500)) / 100
+        board.add(times, columns(500) | {"x_m": times / 10}, np.zeros(500))
+    assert len(board._track) <= 2000 and board._track[0][0] == 0.0
+    assert abs(board.add_edge("entry", 990.5, 0.97).x_m - 99.0) <= 0.01  # 5 samples at 0.1 m/s
+    gaps = np.diff([at for at, *_ in board._track])
+    assert gaps.max() < 10.0, "the whole flight is on the map"
+
+
 def test_an_empty_board_shows_no_value_no_position_and_no_edge():
     out = io.StringIO()
     Console(file=out, width=100).print(Board("test", "best").render())

@@ -1,5 +1,8 @@
 """The STM32 app's core with and without a GAP8: same edges, any fault survived, and the log says so."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -165,6 +168,28 @@ def test_recorded_flights_give_the_same_edges_on_both_processors(recorded):
     for flight, edges in recorded:
         assert Drone("best").fly(flight) == edges
         assert Drone("best-gap8").fly(flight) == [(i + 1, kind) for i, kind in edges]
+
+
+def test_the_core_is_as_large_as_its_header_says():
+    header = (Path(__file__).parents[3] / "firmware/app/core/app_core.h").read_text()
+    assert round(lib.appHostBytes() / 1000) == int(re.search(r"About (\d+) kB\.", header)[1])
+
+
+def test_a_try_that_the_transport_does_not_take_is_none(flight):
+    _, acc, gyro, pwm = flight
+    drone = Drone("best-gap8")
+    drone.app.step(acc[0], gyro[0], pwm[0])
+    assert list(drone.app.packets(accepted=False)) == []
+    drone.app.step(acc[0], gyro[0], pwm[0])
+    assert len(list(drone.app.packets())) == 1  # the reset goes out with the next step
+    drone = Drone("best-gap8")
+    drone.fly(flight, stop=400)
+    for i in range(400, 460):
+        drone.app.step(acc[i], gyro[i], pwm[i])
+        assert list(drone.app.packets(accepted=False)) == []
+    assert drone.app.log.timeouts == 0 and drone.app.log.dropped > 0
+    drone.fly(flight, stop=30)
+    assert LINK[drone.app.log.link] == "up" and drone.app.log.lost == 0
 
 
 @pytest.mark.parametrize("now, last, stalled", [

@@ -15,7 +15,7 @@ from firmware.drone import Drone, edges_and_rows
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMid": (1e9, 48.0),
                 "bandWidth": (50.0, 2.0), "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99),
-                "probabilityOut": (0.95, 0.89), "scoreIn": (99.0, 12.0), "scoreOut": (-99.0, -8.0),
+                "probabilityOut": (7.0, 0.98), "scoreIn": (99.0, 12.0), "scoreOut": (-99.0, -8.0),
                 "probabilityDwell": (0, 10), "alertHold": (60_000, 1000)}
 
 
@@ -32,6 +32,35 @@ def test_a_parameter_out_of_range_is_put_right_counted_and_logged(flight, name):
         default = AppCore().params()[name]
         assert drone.app.set_params(**{name: np.nan}) == 1
         assert drone.app.params()[name] == pytest.approx(default)
+
+
+@pytest.mark.parametrize("entry, leave", [(0.97, 0.93), (0.3, 0.25), (0.3, 0.6)])
+def test_the_order_of_two_changes_does_not_matter(entry, leave):
+    one, other = AppCore(), AppCore()
+    changes = {"probabilityIn": entry}, {"probabilityOut": leave}
+    for app, ordered in ((one, changes), (other, changes[::-1])):
+        for change in ordered:
+            assert app.set_params(**change) == 0
+    for app in (one, other):
+        assert app.params()["probabilityIn"] == pytest.approx(entry)
+        assert app.params()["probabilityOut"] == pytest.approx(leave)
+
+
+@pytest.mark.parametrize("detector", ["cfar", "best"])
+def test_switched_off_it_says_nothing_of_the_last_step(flight, detector):
+    _, acc, gyro, pwm = flight
+    drone = Drone(detector)
+    drone.app.set_params(pFa=0.5)
+    i = 0
+    while not drone.app.log.alert:
+        drone.step(acc[i], gyro[i], pwm[i])
+        i += 1
+    drone.app.set_params(enable=0)
+    drone.step(acc[i], gyro[i], pwm[i])
+    log = drone.app.log
+    assert (log.alert, log.cfarPower, list(log.feature), list(log.force), list(log.logit)) == (
+        0, 0.0, [0.0] * 3, [0.0] * 3, [0.0] * 3)
+    assert np.isnan(log.threshold) and np.isnan(log.probability)
 
 
 def test_an_unknown_parameter_is_refused():

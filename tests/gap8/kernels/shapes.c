@@ -39,5 +39,14 @@ int main(void) {
   const streamInt8_t wide = {.convs = convs + 2, .convCount = 1, .stride = 1, .head = &head};
   const streamInt8_t tall = {.convs = convs, .convCount = 1, .stride = 1, .head = &far};
   printf("%d %d %d\n", streamInt8Check(&spread), streamInt8Check(&wide), streamInt8Check(&tall));
+  // 4 + stride * 3 * 4000 samples and stride - 1 more: 48,007 at 4; 65,535 is the most.
+  const streamConv_t back[] = {{.layer = DENSE(4, 1, 1, 1), .dilation = 1},
+                               {.layer = DENSE(4, 1, 1, 1), .dilation = 4000}};
+  for (int32_t stride = 4; stride <= 6; stride++) {
+    const streamInt8_t past = {.convs = back, .convCount = 2, .stride = stride, .firstSkip = 1, .head = &head};
+    printf("%d ", streamInt8Check(&past));
+  }
+  const streamInt8_t slow = {.convs = back, .convCount = 2, .stride = INT32_MAX, .firstSkip = 1, .head = &head};
+  printf("%d\n", streamInt8Check(&slow));
   return 0;
 }

@@ -18,4 +18,4 @@ def test_sizes_beyond_int32_are_refused(compiler, tmp_path, sanitizer):
         pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
     process = subprocess.run([compiler(SOURCES, tmp_path / "shapes", *flags)], capture_output=True, text=True,
                              timeout=HANG_S)
-    assert (process.returncode, process.stdout) == (0, "0 0 0 0 0 0 1 0 1\n"), process.stderr
+    assert (process.returncode, process.stdout) == (0, "0 0 0 0 0 0 1 0 1\n-1 -1 1 0\n"), process.stderr

@@ -1,12 +1,13 @@
 """`airtouch collect`: fly a mission with a Crazyflie and write the flight logs."""
 
+import math
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -30,6 +31,16 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.exit()
 
 
+class _Limit(click.FloatRange):
+    """A finite number of a range: a limit that is NaN or infinite would never be reached."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
 @click.command("collect")
 @click.option("--uri", help="Of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850.")
 @click.option("--mission", "mission_name",
@@ -44,9 +55,9 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Written into the log.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
               help="Set a parameter of the drone first.")
-@click.option("--min-battery", default=3.7, show_default=True, metavar="V",
+@click.option("--min-battery", type=_Limit(min=0.0), default=3.7, show_default=True, metavar="V",
               help="Least voltage on the ground.")
-@click.option("--link-timeout", default=3.0, show_default=True, metavar="S",
+@click.option("--link-timeout", type=_Limit(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
 @click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
 @click.option("--cache", type=click.Path(path_type=Path),
@@ -76,8 +87,8 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         _recover(out)
     if not uri or not mission_name:
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
-    if flights < 1 or link_timeout <= 0:
-        raise AirTouchError("--flights must be 1 or more, --link-timeout more than 0")
+    if flights < 1:
+        raise AirTouchError("--flights must be 1 or more")
     first = mission.load(mission_name, seed, number or 0)
     name = name or Path(first.name).name
     plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
@@ -85,11 +96,12 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     with collect.no_empty_folders(out):
         collect.prepare_folder(out, click.echo)
         first_number = number or recorder.next_number(out, name)
-        check_free(recorder.flight_path(out, name, first_number), force)
+        numbers = range(first_number, first_number + flights)
+        for i in numbers:
+            check_free(recorder.flight_path(out, name, i), force)
         click.echo(first.describe())
-        missions = {i: mission.load(mission_name, seed, i) for i in range(first_number, first_number + flights)}
-        with stopping() as stop:
-            planned = _fly(plan, missions, cache, stop, ask=sys.stdin.isatty() and not yes)
+        missions = {i: mission.load(mission_name, seed, i) for i in numbers}
+        planned = _fly(plan, missions, cache, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
 
 
@@ -103,20 +115,25 @@ def _recover(out: Path) -> None:
     sys.exit(2 if unreadable else 0)
 
 
-def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | None, stop: threading.Event,
-         ask: bool) -> bool:
-    """Fly missions, by the flights' numbers, until one ends early. True if all ended as planned."""
+def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | None, ask: bool) -> bool:
+    """Fly missions, by the flights' numbers, until one ends early. True if all ended as planned.
+
+    Ctrl-C lands a drone in flight; before and between the flights it ends the program, as it does elsewhere.
+    """
     from airtouch.crazyflie import collect, readiness
     from airtouch.crazyflie.connection.drone import Drone
     from airtouch.crazyflie.connection.link import default_cache
 
-    drone = Drone(plan.uri, cache or default_cache(), unanswered=waiting(plan.uri, stop))
+    with stopping(quiet=True) as stop:
+        drone = Drone(plan.uri, cache or default_cache(), unanswered=waiting(plan.uri, stop))
     try:
+        if stop.is_set():
+            raise click.Abort
         ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
         for number, mission in missions.items():
             if ask:
                 click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
-            with _display(mission.seconds) as show:
+            with _display(mission.seconds) as show, stopping() as stop:
                 outcome = collect.fly(drone, ready, mission, plan, number, stop=stop, say=click.echo, show=show)
             _report(outcome)
             if not outcome.planned:

@@ -120,7 +120,7 @@ class Drone:
             self.crazyflie.param.remove_update_callback(group, short, update)
         if stored is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
-        if abs(stored - value) > 1e-6 * max(abs(value), 1.0):
+        if not abs(stored - value) <= 1e-6 * max(abs(value), 1.0):  # NaN is not the value either
             raise AirTouchError(f"{name} = {text}: out of range; the drone kept {stored:g}")
 
     @property

@@ -66,7 +66,7 @@ class Intake:
         """
         fast: list[tuple[int, dict]] = []
         for sample in samples:
-            at = self.ticks.unwrap(sample.stamp)
+            at = self.ticks.unwrap(sample.stamp, sample.arrival_s)
             if sample.block == blocks.MOTION.name:
                 fast.append((at, sample.values))
                 self._count(at, sample.arrival_s)

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.logs.checks.clock import Gap
 
 WRAP_MS = 1 << 24  #: ms after which the counter wraps, 4 h 39 min
-LATEST_MS = 2000  #: ms that a packet may be late; a larger step back means that the drone restarted
+LATEST_MS = 2000  #: ms that a packet may be late; a larger step back, or one ahead of the host's clock, is a restart
 
 
 class Restarted(Exception):
@@ -16,20 +16,29 @@ class Restarted(Exception):
 
 @dataclass
 class Ticks:
-    """Unwraps the time stamps of packets in order of arrival."""
+    """Unwraps the time stamps of packets in order of arrival.
+
+    newest_ms: the newest time. newest_arrival_s: when its packet arrived, host's clock.
+    """
 
     newest_ms: int | None = None
+    newest_arrival_s: float = 0.0
 
-    def unwrap(self, stamp: int) -> int:
-        """The time of a 24-bit stamp in ms, without wraps. Raises Restarted if it is over LATEST_MS in the past."""
+    def unwrap(self, stamp: int, arrival_s: float) -> int:
+        """The time of a 24-bit stamp in ms, without wraps. arrival_s: host's clock.
+
+        Raises Restarted if it is over LATEST_MS in the past, or if it goes over LATEST_MS further than the host's
+        clock: from half a wrap of uptime on, a clock that starts again from zero looks like a step forward.
+        """
         if self.newest_ms is None:
-            self.newest_ms = stamp
+            self.newest_ms, self.newest_arrival_s = stamp, arrival_s
             return stamp
         step = (stamp - self.newest_ms + WRAP_MS // 2) % WRAP_MS - WRAP_MS // 2
-        if step < -LATEST_MS:
+        if step < -LATEST_MS or step - 1000.0 * (arrival_s - self.newest_arrival_s) > LATEST_MS:
             raise Restarted
         at = self.newest_ms + step
-        self.newest_ms = max(self.newest_ms, at)
+        if step > 0:
+            self.newest_ms, self.newest_arrival_s = at, arrival_s
         return at
 
 

@@ -10,6 +10,9 @@ from airtouch.crazyflie.view.sparkline import sparkline, text_map
 
 SECONDS = 10.0  #: s of signals shown
 WIDTH = 50
+#: positions of the track at most, the newest of them, 20 s of a drone, that are not thinned, and those that stay of the
+#: older ones; round numbers
+MOST_TRACK, DENSE_TRACK, THIN_TRACK = 2000, 400, 800
 #: label -> (function of the columns, lower and upper end of the scale, unit)
 SIGNALS = {
     "P(over)": (None, 0.0, 1.0, ""),
@@ -84,6 +87,8 @@ class Board:
             self._signals[name].extend(np.full(len(times_s), np.nan) if values is None else values)
         if "x_m" in columns:
             self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)
+            if len(self._track) > MOST_TRACK:
+                self._track = thinned(self._track[:-DENSE_TRACK]) + self._track[-DENSE_TRACK:]
 
     def add_edge(self, kind: str, at_s: float, probability: float) -> ReportedEdge:
         """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""
@@ -129,6 +134,13 @@ class Board:
 
     def _last(self, name: str) -> float:
         return float(self._signals[name][-1]) if self._signals[name] else float("nan")
+
+
+def thinned(track: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:
+    """Some THIN_TRACK positions of a track, (time, x, y) each, evenly in time."""
+    times = np.array([at for at, *_ in track])
+    slot = np.floor(THIN_TRACK * (times - times[0]) / max(times[-1] - times[0], 1e-9))
+    return [track[i] for i in np.unique(slot, return_index=True)[1]]
 
 
 def edge_line(edge: ReportedEdge) -> str:

@@ -21,8 +21,12 @@ class HostDetector:
     `next` takes rows and returns their results. `trace` returns the trace of all rows, equal to that of `best.run`.
     """
 
-    def __init__(self, model: BestModel | None = None, missing: tuple[str, ...] = ()) -> None:
-        """missing: the sensors, one at most, that the rows lack (`detector.shared.sensors.missing_sensors`)."""
+    def __init__(self, model: BestModel | None = None, missing: tuple[str, ...] = (), traced: bool = True) -> None:
+        """missing: the sensors, one at most, that the rows lack (`detector.shared.sensors.missing_sensors`).
+
+        traced: keep what `trace` needs of every row. Without it the memory is bounded.
+        """
+        self._traced = traced
         self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)
         self._missing = missing
@@ -47,9 +51,12 @@ class HostDetector:
         self._rates = np.vstack([self._rates, logged.gyro])[-sensors.FLYING_WINDOW - 1:]
         events = self._session.next(logged.acc, logged.gyro, logged.pwm)
         self._logits.append(events.logits)
-        self._edge.append(events.edge)
-        self._airborne.append(events.airborne)
         recent = (self._decoder.hold_steps + self._decoder.look_back) * ROW_STRIDE
+        if self._traced:
+            self._edge.append(events.edge)
+            self._airborne.append(events.airborne)
+        else:
+            del self._logits[:-recent]
         edges = []
         for i in np.flatnonzero(events.edge):
             past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]
@@ -62,7 +69,9 @@ class HostDetector:
         return np.where(events.airborne, over, 0.0), edges
 
     def trace(self, log: FlightLog) -> Trace:
-        """The trace of all rows so far. `log` holds the same rows."""
+        """The trace of all rows so far. `log` holds the same rows. Raises ValueError without `traced`."""
+        if not self._traced:
+            raise ValueError("a detector without traced=True keeps no trace")
         return best.trace_of(log, self.model, np.concatenate(self._logits), np.concatenate(self._edge),
                              np.concatenate(self._airborne))
 
