@@ -124,6 +124,13 @@ def load(path: str | Path | None = None) -> BestModel:
     return parse(archive.read(Path(path)), str(path))
 
 
+def is_shipped(model: BestModel, missing: Sequence[str]) -> bool:
+    """Whether network and decoder are those that the shipped model has for a log that lacks these sensors."""
+    shipped = load(None).serving(missing)
+    return (model is shipped or model.digest == shipped.digest) and (
+        model.decoder_without(missing) == shipped.decoder_without(missing))
+
+
 @cache
 def _shipped(name: str) -> BestModel:
     """A model that ships, read once."""
