@@ -78,6 +78,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
         raise click.UsageError("--random-epochs needs --random-windows")
     if detector != "best" and (steps or silence or free_air):
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
+    if random_windows and detector != "paper":
+        raise click.UsageError("--random-windows is for --detector paper, whose network it trains")
     if detector == "baseline" and epochs:
         raise click.UsageError("--epochs is for detectors with a network; the baseline has none")
     files = dataset.collect(flights or [need_flights()], speed)
