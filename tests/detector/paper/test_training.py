@@ -108,5 +108,7 @@ def test_training_settings_out_of_range_are_refused() -> None:
     for setting in ({"epochs": 0}, {"sparsity": 1.0}, {"block": 3}, {"df_lambda": -1.0}):
         with pytest.raises(AirTouchError, match="training"):
             training.train_paper([], **setting)
+    with pytest.raises(AirTouchError, match="no setting 'steps'; known: epochs, "):
+        training.train_paper([], steps=3)
     with pytest.raises(AirTouchError, match="no flight"):
         training.train_paper([])

@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,8 +64,13 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
     (`held_out`). recipe: `PaperRecipe()` for None; changes: fields of it, by name. progress: called as the training
     goes; None for silence. command: what the model's metadata names as its origin.
     The decoding settings and the lag are not chosen yet (`detector.tune`).
-    Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
+    Raises AirTouchError without TensorFlow, without a usable window and for settings that are unknown or out of
+    range.
     """
+    known = [field.name for field in fields(PaperRecipe)]
+    absent = changes.keys() - set(known)
+    if absent:
+        raise AirTouchError(f"training: no setting {min(absent)!r}; known: {', '.join(known)}")
     recipe = replace(recipe or PaperRecipe(), **changes)
     use_tensorflow(seed)
     report = progress or (lambda *_: None)
