@@ -165,9 +165,9 @@ def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: 
 
 
 def _report(metadata: dict, seconds: float) -> None:
-    held_out = set(metadata.get("held_out", ()))
-    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held_out]
-    click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
+    held_out = metadata.get("held_out", ())
+    fitted = len(metadata["flights"]) - metadata.get("flights_before", 0) - len(held_out)
+    click.echo(f"trained on {fitted} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
     if held_out:
         click.echo(f"held out ({len(held_out)}): {', '.join(sorted(held_out))}")
     if "simulated" in metadata:

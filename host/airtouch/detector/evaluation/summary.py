@@ -47,7 +47,7 @@ def one_a_flight(scores: Iterable[FlightScore]) -> list[FlightScore]:
     """One score a flight, the sum of its scores by several models, so that intervals draw a flight whole."""
     of_flight: dict[str, list[FlightScore]] = {}
     for score in scores:
-        of_flight.setdefault(score.file, []).append(score)
+        of_flight.setdefault(score.flight, []).append(score)
     return [replace(same[0], edges=tuple(e for s in same for e in s.edges),
                     false=tuple(sample for s in same for sample in s.false or ()),
                     detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),

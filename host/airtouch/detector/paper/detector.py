@@ -21,6 +21,7 @@ from airtouch.detector.paper.decoding import decode, detections
 from airtouch.detector.paper.decoding import physical_filter as filtered
 from airtouch.detector.paper.features import Features, feature_windows, flight_features, pipeline
 from airtouch.detector.paper.model import Model
+from airtouch.detector.shared import training_set
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
@@ -95,9 +96,13 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = 
 
 
 def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
-    """The same network with decoding settings and lag chosen again. flights: those of its training."""
-    unseen = set(model.metadata["held_out"])
-    chosen = [log for log in flights if os.path.basename(log.source) in unseen]
+    """The same network with decoding settings and lag chosen again. flights: those of its training.
+
+    A model of an older version holds the names of the held-out flights instead of hashes.
+    """
+    names, hashes = model.metadata["held_out"], model.metadata.get("held_out_hashes")
+    chosen = [log for log in flights if (os.path.basename(log.source) in names if hashes is None
+                                         else training_set.flight_hash(log) in hashes)]
     return tune(model, chosen or flights, physical_filter)
 
 
