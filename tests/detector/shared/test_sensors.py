@@ -127,7 +127,7 @@ def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
     assert not best.run(sensors.without(log, ("acceleration",)), model).edges
     faulty = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
     faulty.save(tmp_path / "w.npz")
-    with pytest.raises(AirTouchError, match="not numbers"):
+    with pytest.raises(AirTouchError, match="entry_score is 'high', not a number"):
         best.load(tmp_path / "w.npz")
 
 
