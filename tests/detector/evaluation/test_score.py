@@ -93,6 +93,11 @@ def test_heights_that_were_drawn_are_grouped_by_centimetre():
     assert list(groups) == ["2 cm", "10 cm", "low"]
 
 
+def test_half_a_centimetre_is_rounded_up():
+    groups = by_centimetre([replace(flight([]), condition=Condition(height=f"{h}mm")) for h in (15, 25, 35)])
+    assert list(groups) == ["2 cm", "3 cm", "4 cm"]
+
+
 def test_balanced_accuracy_uses_airborne_samples_only():
     probability = np.zeros(len(AIRBORNE))
     probability[1000:1200] = 1.0  # half of the platform
