@@ -13,6 +13,7 @@ import pytest
 import airtouch as at
 import short_flights
 from airtouch import api
+from airtouch.errors import python_words
 
 NEVER = ("numba", "scipy", "pandas", "matplotlib", "tensorflow", "keras", "sklearn", "jinja2", "numpy", "cffi", "click")
 
@@ -47,6 +48,15 @@ def test_everything_promised_is_there():
         assert callable(operator.attrgetter(name)(at)), name
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = at.nonsense
+
+
+@pytest.mark.parametrize("text, words", [
+    ("use --detector paper, or --force", 'use detector="paper", or force=True'),
+    ("--detector paper-stream.", 'detector="paper-stream".'),
+    ("give the speed: --speed 0.2", "give the speed: speed_mps=0.2"),
+    ("give --speed, or speed_mps", "give speed_mps, or speed_mps")])
+def test_options_in_messages_are_arguments(text, words):
+    assert python_words(text) == words
 
 
 def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
