@@ -117,10 +117,10 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
              speed_mps: float | None = None, model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights; true edges come from their down range.
 
-    flights: files, folders (by their manifest) or logs. speed_mps: commanded speed of flights without one in
-    their manifest, instead of the log's. model: file of a trained model, None for the shipped one. Returns the content of `airtouch evaluate
-    --json` (host/docs/scoring.md), with files that cannot be scored in `left_out`. Raises AirTouchError for a log
-    that cannot be scored, and for one with edges and without a speed.
+    flights: files, folders (by their manifest) or logs. speed_mps: commanded speed of flights without one in their
+    manifest, instead of the log's. model: file of a trained model, None for the shipped one. Returns the content of
+    `airtouch evaluate --json` (host/docs/scoring.md), with files that cannot be scored in `left_out`. Raises
+    AirTouchError for a log that cannot be scored, and for one with edges and without a speed.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring

@@ -1,4 +1,4 @@
-"""What `best` loses where a log lacks a sensor, in one line; with measured figures where the model is the shipped one."""
+"""What `best` loses where a log lacks a sensor, in one line; with measured figures of the shipped model."""
 
 import json
 from collections.abc import Sequence

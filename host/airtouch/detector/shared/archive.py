@@ -89,7 +89,7 @@ def check_metadata(metadata: Mapping[str, Any], source: str) -> None:
 
 
 def check_settings(table: Any, defaults: Mapping[str, float], source: str) -> None:
-    """Raise AirTouchError where a setting is no number, or, of those with whole defaults, no count that C holds."""
+    """Raise AirTouchError where a setting is no number, or no count where its default is a whole number."""
     if not isinstance(table, dict):
         raise AirTouchError(f"{source}: settings are not a table; {REMEDY}")
     for name in table.keys() & defaults.keys():
