@@ -89,7 +89,7 @@ def check_metadata(metadata: Mapping[str, Any], source: str) -> None:
 
 
 def check_settings(table: Any, defaults: Mapping[str, float], source: str) -> None:
-    """Raise AirTouchError where a setting is no number, or no count where its default is a whole number."""
+    """Raise AirTouchError where a setting is no number, or no count where its default is one."""
     if not isinstance(table, dict):
         raise AirTouchError(f"{source}: settings are not a table; {REMEDY}")
     for name in table.keys() & defaults.keys():
@@ -101,8 +101,8 @@ def _check_number(value: object, name: str, source: str, low: float, high: float
     """Raise AirTouchError for anything but a number, or a whole one, from low to high."""
     kind = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
     if not (kind and low <= value <= high):  # type: ignore[operator]
-        raise AirTouchError(f"{source}: {name} is {printable(repr(value))}, not a {'whole ' * whole}number from {low:g} "
-                            f"to {high:g}; {REMEDY}")
+        raise AirTouchError(f"{source}: {name} is {printable(repr(value))}, not a {'whole ' * whole}number from "
+                            f"{low:g} to {high:g}; {REMEDY}")
 
 
 def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) -> None:
