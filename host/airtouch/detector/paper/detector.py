@@ -87,8 +87,8 @@ def _vehicle_note(log: FlightLog) -> str:
     """A line where the log names a vehicle of which no file is known: the force is then the default's."""
     if vehicles.of_log(log.meta)[1] is None:
         return ""
-    return (f"the log names vehicle {printable(str(log.meta['vehicle']))!r}, of which no file is known; the disturbance "
-            f"force is that of {vehicles.DEFAULT_VEHICLE}")
+    return (f"the log names vehicle {printable(str(log.meta['vehicle']))!r}, of which no file is known; the "
+            f"disturbance force is that of {vehicles.DEFAULT_VEHICLE}")
 
 
 def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any) -> Model:
