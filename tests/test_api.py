@@ -13,6 +13,7 @@ import pytest
 import airtouch as at
 import short_flights
 from airtouch import api
+from airtouch.errors import AirTouchError, python_words
 
 NEVER = ("numba", "scipy", "pandas", "matplotlib", "tensorflow", "keras", "sklearn", "jinja2", "numpy", "cffi", "click")
 
@@ -47,6 +48,15 @@ def test_everything_promised_is_there():
         assert callable(operator.attrgetter(name)(at)), name
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = at.nonsense
+
+
+@pytest.mark.parametrize("text, words", [
+    ("use --detector paper, or --force", 'use detector="paper", or force=True'),
+    ("--detector paper-stream.", 'detector="paper-stream".'),
+    ("give the speed: --speed 0.2", "give the speed: speed_mps=0.2"),
+    ("give --speed, or speed_mps", "give speed_mps, or speed_mps")])
+def test_options_in_messages_are_arguments(text, words):
+    assert python_words(text) == words
 
 
 def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
@@ -142,3 +152,13 @@ def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
 def test_a_mission_is_simulated_by_its_name():
     (log,) = at.simulate("sweep")
     assert log.meta["scenario"] == "sweep" and log["zrange_m"].max() > 0.7
+
+
+def test_text_in_a_column_and_numbers_out_of_range_are_named():
+    pandas = pytest.importorskip("pandas")
+    with pytest.raises(AirTouchError, match="column zrange_m of this table"):
+        at.read(pandas.DataFrame({"t_s": [0.0, 0.01], "zrange_m": [0.5, "high"]}))
+    for wrong, message in (({"seed": -1}, "seed must be"), ({"flights": -1}, "flights must be"),
+                           ({"flights": 1.5}, "flights must be")):
+        with pytest.raises(AirTouchError, match=message):
+            at.simulate("paper-low", **wrong)

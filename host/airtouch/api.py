@@ -5,6 +5,7 @@
 names. Heavy modules are imported at their first use, so `import airtouch` is fast.
 """
 
+import numbers
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -78,14 +79,20 @@ def to_pandas(flight: "Flight") -> "DataFrame":
 def from_pandas(table: "DataFrame") -> FlightLog:
     """The flight log of a pandas table. Columns with other names than the log's are left out.
 
-    Raises AirTouchError if no column has a name of the log.
+    Raises AirTouchError if no column has a name of the log, and for one that holds something else than numbers.
     """
     names = [str(name) for name in table.columns if str(name) in COLUMNS]
     if not names:
         raise AirTouchError(f"no column of this table has a name of the flight log; it has "
                             f"{', '.join(map(str, table.columns))}")
     meta = {"source": "pandas table", "format": "pandas", **{str(k): v for k, v in table.attrs.items()}}
-    return FlightLog({name: table[name].to_numpy(dtype=float) for name in names}, meta)
+    columns = {}
+    for name in names:
+        try:
+            columns[name] = table[name].to_numpy(dtype=float)
+        except (TypeError, ValueError) as error:
+            raise AirTouchError(f"column {name} of this table holds something else than numbers: {error}") from None
+    return FlightLog(columns, meta)
 
 
 @in_python
@@ -110,10 +117,10 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
              speed_mps: float | None = None, model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights; true edges come from their down range.
 
-    flights: files, folders (by their manifest) or logs. speed_mps: commanded speed, if neither manifest nor log
-    states it. model: file of a trained model, None for the shipped one. Returns the content of `airtouch evaluate
-    --json` (host/docs/scoring.md), with files that cannot be scored in `left_out`. Raises AirTouchError for a log
-    that cannot be scored, and for one with edges and without a speed.
+    flights: files, folders (by their manifest) or logs. speed_mps: commanded speed of flights without one in their
+    manifest, instead of the log's. model: file of a trained model, None for the shipped one. Returns the content of
+    `airtouch evaluate --json` (host/docs/scoring.md), with files that cannot be scored in `left_out`. Raises
+    AirTouchError for a log that cannot be scored, and for one with edges and without a speed.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring
@@ -144,13 +151,16 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     """Simulate flights of a scenario. A flight depends on these arguments and its number only.
 
     scenario: a scenario's or mission's name, a .toml file or an object; so is vehicle. effects: {name: {parameter:
-    value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name and for a flight that
-    diverges.
+    value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name, a wrong number and a
+    flight that diverges.
     """
     from airtouch.crazyflie import mission
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
+    for name, value, least in (("flights", flights, 1), ("seed", seed, 0)):
+        if not isinstance(value, numbers.Integral) or value < least:
+            raise AirTouchError(f"{name} must be a whole number from {least}, not {value!r}")
     scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
     pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
     logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))

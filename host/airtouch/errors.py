@@ -11,7 +11,8 @@ from typing import ParamSpec, TypeVar
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 #: option of the command line, as messages have it -> argument of the Python functions
-_ARGUMENTS = ((r"--force\b", "force=True"), (r"--speed\b", "speed_mps"), (r"--detector (\S+)", r'detector="\1"'),
+_ARGUMENTS = ((r"--force\b", "force=True"), (r"--speed ([\d.]*\d)", r"speed_mps=\1"),
+              (r"--speed\b", "speed_mps"), (r"--detector ([\w-]+)", r'detector="\1"'),
               (r"--model\b", "model"), (r"--vehicle\b", "vehicle"))
 
 

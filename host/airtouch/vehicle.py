@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import tables
-from airtouch.errors import AirTouchError, unknown
+from airtouch.errors import AirTouchError, printable, unknown
 from airtouch.parameters import DEFAULT
 
 
@@ -74,6 +74,9 @@ LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_n
 #: fields that must be more than 0
 POSITIVE = {"mass_kg", "arm_m", "motor_time_constant_s", "rotor_radius_m", "gravity_mps2", "nominal_voltage_v",
             "battery_cells", "battery_capacity_ah", "range_drift_time_s", "flow_noise_time_s"}
+#: fields that must be 0 or more
+NOT_NEGATIVE = {"acc_noise_rms_mps2", "gyro_noise_rms_radps", "range_noise_rms_m", "range_drift_rms", "acc_lowpass_hz",
+                "gyro_bandwidth_hz", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps"}
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
@@ -84,14 +87,15 @@ def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
     """
     path = Path(name_or_path)
     if path.suffix == ".toml":
-        if not path.is_file():
-            raise AirTouchError(f"{path}: no such vehicle file")
-        text = path.read_text(encoding="utf-8", errors="replace")
+        try:
+            text = path.read_text(encoding="utf-8", errors="replace")
+        except (OSError, ValueError):  # ValueError: a name with a zero byte
+            raise AirTouchError(f"{printable(str(path), 200)}: no such vehicle file") from None
     else:
         folder = resources.files("airtouch") / "vehicles"
         file = folder / f"{name_or_path}.toml"
-        if not file.is_file():
-            known = sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
+        known = sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
+        if str(name_or_path) not in known:
             raise unknown("vehicle", str(name_or_path), known, ", or a .toml file")
         text = file.read_text(encoding="utf-8")
     return parse(text, str(name_or_path))
@@ -144,12 +148,15 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
     for name, value in table.items():
         if name in LISTS:
             values[name] = tables.number_list(table, name, source, LISTS[name])
+            for one in values[name] if name in NOT_NEGATIVE else ():
+                tables.number({name: one}, name, source, 0.0)
         elif name in TEXTS:
             if not isinstance(value, str):
                 raise AirTouchError(f"{source}: {name} must be a text in quotes")
             values[name] = value
         else:
-            values[name] = tables.number(table, name, source, above=0.0 if name in POSITIVE else -np.inf)
+            values[name] = tables.number(table, name, source, 0.0 if name in NOT_NEGATIVE else -np.inf,
+                                         above=0.0 if name in POSITIVE else -np.inf)
     if min(values.get("inertia_kg_m2", (1.0,))) <= 0:
         raise AirTouchError(f"{source}: inertia must be positive")
     return values

@@ -1,14 +1,18 @@
 """`airtouch ablate`, from the outside."""
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from airtouch.cli.learning.ablate import command
-from airtouch.detector import best
-from airtouch.detector.ablation import ABLATIONS
+from airtouch.detector import ablation, baseline, best
+from airtouch.detector.ablation import ABLATIONS, Ablation
+from airtouch.detector.evaluation import crossval
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.trace import Detection, Trace
 from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels
 from made_flight import SMALL
 
@@ -49,3 +53,35 @@ def test_muted_channels_are_zero_and_the_others_are_not():
                            46000 + 900 * rng.normal(size=(300, 4)), MotionConfig(scale=scale))
     alive = {NAMES[i] for i in np.flatnonzero(np.abs(x[150:]).max(axis=0) > 0)}
     assert alive == {"unexplained az"}
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A detector that is not registered: an edge at each of these samples."""
+
+    samples: tuple[int, ...] = ()
+
+    def run(self, log, model=None):
+        return Trace(np.full(len(log), np.nan), [Detection(sample, "edge") for sample in self.samples])
+
+    def fit(self, flights, seed=0):
+        return baseline.load(None)
+
+    def load(self, path):
+        return baseline.load(path)
+
+    def lag_s(self, model):
+        return 0.0
+
+    def parameters(self, model):
+        return {}
+
+
+def test_a_variant_and_the_detector_of_the_same_name_share_no_folds(generated, tmp_path, monkeypatch):
+    files = dataset.collect([generated])
+    detections = []
+    for samples in ((), (300, 400)):
+        monkeypatch.setitem(ABLATIONS, "baseline", Ablation("paper", "silent", Fixed(samples)))
+        detections.append(ablation.ablate(["baseline"], files, tmp_path)["baseline"]["detections"])
+    assert detections == [0, 8]
+    assert sum(score.detections for score in crossval.crossval("baseline", files, tmp_path).scores) > 8

@@ -52,10 +52,24 @@ def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(genera
 
 
 @pytest.mark.parametrize("options, message", [
-    (["--silence-training"], "needs --silence"), (["--random-epochs", 60], "needs --random-windows")])
+    (["--silence-training"], "needs --silence"), (["--random-epochs", 60], "needs --random-windows"),
+    (["--random-windows"], "for --detector paper"),
+    (["--random-windows", "--detector", "baseline"], "for --detector paper")])
 def test_an_option_without_its_other_is_refused(generated, tmp_path, options, message):
     result = run(generated, "--out", tmp_path / "folds", *options)
     assert result.exit_code == 2 and message in result.output and not (tmp_path / "folds").exists()
+
+
+@pytest.mark.parametrize("detector", ["best", "baseline"])
+def test_the_output_says_that_the_decoder_of_best_was_chosen_over_the_folds(generated, tmp_path, monkeypatch, detector):
+    whole = crossval.crossval
+    monkeypatch.setattr(crossval, "crossval", lambda _, *rest, **named: whole("baseline", *rest, **named))
+    out = tmp_path / "cv.json"
+    result = run(generated, "--detector", detector, "--out", tmp_path / "folds", "--json", out)
+    assert result.exit_code == 0, result.output
+    note = json.loads(out.read_text()).get("note", "")
+    assert ("chosen over the five folds" in note) == (detector == "best")
+    assert ("note: the decoder's settings" in result.stdout) == (detector == "best")
 
 
 def test_the_ledger_is_checked_before_the_work(generated, tmp_path, monkeypatch):

@@ -155,3 +155,17 @@ def test_messy_flights_never_stop_the_batch(flights):
         messy = [flights / "airtouch" / row["file"] for row in csv.DictReader(handle) if row["use"] == "messy"]
     result = run(*messy, "--speed", 0.3, "--detector", "baseline")
     assert result.exit_code == 2 and (result.exception is None or isinstance(result.exception, SystemExit))
+
+
+def test_remarks_on_flights_of_one_name_in_two_folders_are_both_there(generated, tmp_path):
+    log = logs.read(generated / "f0.csv.gz")
+    times = log["t_s"].copy()
+    times[500] -= 0.5
+    paths = [tmp_path / folder / "f.csv" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        logs.write(log.with_columns({**log.columns, "t_s": times}), path)
+    for chosen, keys in ((paths, {str(path) for path in paths}), (paths[:1], {"f.csv"})):
+        result = run(*chosen, "--detector", "baseline", "--speed", 0.3, "--json", tmp_path / "o.json", "--force")
+        assert result.exit_code == 0, result.output
+        assert set(json.loads((tmp_path / "o.json").read_text())["remarks"]) == keys

@@ -96,6 +96,15 @@ def train(*arguments: object):
     return CliRunner().invoke(train_command.command, [str(a) for a in arguments])
 
 
+@pytest.mark.parametrize("options", [
+    ("--detector", "paper", "--steps", 3), ("--detector", "paper-stream", "--steps", 3), ("--epochs", 3),
+    ("--lambda", 0)])
+def test_an_option_of_another_detector_is_refused_before_flights_are_read(tmp_path: Path, options: tuple) -> None:
+    result = train(tmp_path / "absent", "--out", tmp_path / "m.npz", *options)
+    assert result.exit_code == 2 and f"{options[-2]}" in result.output and "--detector" in result.output
+    assert "no such file" not in result.output
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("detector", "short"), [("best", ("--steps", SMALL.steps)), ("paper", ("--epochs", 1))])
 def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, monkeypatch, detector: str,

@@ -1,6 +1,7 @@
 """The report: self-contained, well formed, with the figures of the summary in it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,14 @@ def test_flights_are_shown_from_the_best_found_to_the_worst():
     assert [f.score.file for f in chosen] == ["good.csv", "false.csv", "blind.csv"]
     assert [set(f.others) for f in chosen] == [{"paper"}, set(), set()]
     assert [f.score.file for f in shown_flights(results, 2)] == ["good.csv", "blind.csv"]
+
+
+def test_flights_of_one_name_in_two_folders_have_their_own_traces():
+    own = {name: [replace(r, score=replace(r.score, path=f"{folder}/f.csv"))
+                  for folder, r in (("a", result("f.csv", DETECTIONS)), ("b", result("f.csv", ())))]
+           for name in ("best", "paper")}
+    shown = {f.score.path: len(f.others["paper"].edges) for f in shown_flights(own, 2)}
+    assert shown == {"a/f.csv": len(DETECTIONS), "b/f.csv": 0}
 
 
 def result(name, detections):

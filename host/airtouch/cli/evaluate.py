@@ -1,6 +1,7 @@
 """`airtouch evaluate`: score a detector on flights."""
 
 import sys
+from collections import Counter
 from pathlib import Path
 
 import click
@@ -47,12 +48,14 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
         click.echo(f"airtouch: {len(files)} flights are scored, {reasons.total()} are not: "
                    + ", ".join(f"{count} {reason}" for reason, count in (+reasons).items()), err=True)
     remarks: dict[str, list[str]] = {}
+    same_name = Counter(file.path.name for file in files)
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:
             if isinstance(result, Exception):
                 click.echo(f"\rairtouch: {result}", err=True)
             elif lines := evaluate.remarks(result.log):
-                remarks[result.score.file] = lines
+                score = result.score
+                remarks[score.file if same_name[score.file] == 1 else score.path] = lines
             bar.update(1)
 
         scores, failures = evaluate.evaluate(files, module, trained, done)

@@ -89,8 +89,8 @@ def ablate(
         detector = ablation.variant or get(ablation.name)
         shared = best_options if ablation.variant is None and ablation.name == "best" else paper_options
         result = crossval.crossval(
-            name if ablation.variant else ablation.name, files, out,
-            crossval.Settings(seed, {**(shared or {}), **ablation.options}), detector=detector, tell=tell)
+            f"variant-{name}" if ablation.variant else ablation.name, files, out,
+            crossval.Settings(seed, {**(shared or {}), **ablation.options}), detector=ablation.variant, tell=tell)
         results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(result.scores),
                          "by_height": summary.by_height(result.scores), "folds": [f.plain() for f in result.folds],
                          "seconds": sum(f.seconds for f in result.folds), "left_out": len(result.left_out)}
@@ -105,6 +105,6 @@ def in_float(detector: Detector, files: Sequence[FlightFile], folds: Sequence[Fo
         raise AirTouchError("this detector's network does not run in float")
     models: dict[int | str | None, Any] = {fold.fold: detector.load(out / fold.model) for fold in folds}
     float_detector = InFloatOnly(detector)
-    readable, _ = crossval.readable_flights(files)
+    readable, _ = crossval.readable_flights(files, evaluate.spare_of(detector))
     return [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
             for f in files if f.path in readable]

@@ -54,6 +54,7 @@ def test_the_shipped_model_equals_tflite_micro_on_real_windows(flights):
     windows = 0
     for path in sorted((flights / "airtouch").glob("*_h8*.csv.gz"))[:10]:
         windows += _check_against_tflite_micro(model, batches.channels_of(logs.read(path))[0], 100)
+    assert windows > 0
     print(f"bit for bit equal to tflite-micro on {windows} windows of real flights")
 
 
@@ -141,7 +142,7 @@ def test_a_damaged_file_is_one_clear_line(small, data):
 @pytest.mark.parametrize(("change", "message"), [
     (lambda m: replace(m, recipe=replace(m.recipe, width=12)), "another shape"),
     (lambda m: replace(m, recipe=replace(m.recipe, dilations=(1, 2, 999))), "shape is missing"),
-    (lambda m: replace(m, metadata={**m.metadata, "lag_s": "soon"}), "not numbers"),
+    (lambda m: replace(m, metadata={**m.metadata, "lag_s": "soon"}), "not a number"),
     (lambda m: replace(m, metadata={**m.metadata, "decoder": {"a": 1}}), "decoder settings"),
 ])
 def test_a_wrong_model_is_named(small, change, message):
@@ -183,3 +184,14 @@ def test_goals_peak_where_their_edge_is_due():
     for column, edge in ((1, edges[0]), (2, edges[1])):
         assert targets[:, column].argmax() == edge.sample + SMALL.delay
         assert targets[:, column].max() == 1.0
+
+
+@pytest.mark.parametrize("changed, message", [
+    ({"dwell_steps": 20.5}, "dwell_steps is 20.5, not a whole number"), ({"arm_steps": -1}, "arm_steps is -1"),
+    ({"hold_steps": 2**40}, "hold_steps"), ({"over_share": True}, "over_share is True")])
+@pytest.mark.parametrize("where", ["decoder", "decoder_without"])
+def test_decoder_settings_of_the_wrong_kind_are_named(small, changed, message, where):
+    table = {**small.metadata["decoder"], **changed}
+    wrong = replace(small, metadata={**small.metadata, where: table if where == "decoder" else {"motors": table}})
+    with pytest.raises(AirTouchError, match=message):
+        model_file.parse(wrong.to_bytes(), "m.npz")

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector import best
-from airtouch.detector.best import free_air
+from airtouch.detector.best import free_air, training
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.shared import sensors, training_set
@@ -140,3 +140,27 @@ def test_a_training_that_was_stopped_goes_on_to_the_same_bits(tmp_path, monkeypa
     for name, values in whole.weights.items():
         np.testing.assert_array_equal(resumed.weights[name], values, err_msg=name)
     assert resumed.to_bytes() == whole.to_bytes()
+
+
+def test_a_damaged_state_starts_anew_and_says_so(tmp_path):
+    state, rng = [_Variable(np.arange(6.0).reshape(2, 3))], np.random.default_rng(3)
+    path, before = tmp_path / "state.npz", rng.bit_generator.state
+    training._save_state(path, [variable.value for variable in state], np.random.default_rng(4), 7)
+    whole = path.read_bytes()
+    for damaged in (b"PK nothing", whole[:len(whole) // 2], b""):
+        path.write_bytes(damaged)
+        with pytest.warns(UserWarning, match="the training starts anew"):
+            assert training._resume(path, state, rng) == 0
+        assert rng.bit_generator.state == before
+    path.write_bytes(whole)
+    assert training._resume(path, state, rng) == 7 and rng.bit_generator.state != before
+
+
+class _Variable:
+    """What `training` uses of a TensorFlow variable."""
+
+    def __init__(self, value):
+        self.value, self.shape = value, value.shape
+
+    def assign(self, value):
+        self.value = value

@@ -8,6 +8,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 
 from airtouch.detector.evaluation import edge_map
+from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
@@ -106,3 +107,9 @@ def test_uncertainty_and_times_hold_at_any_rate_of_the_log(rate_hz, stated):
     log.columns.pop("x_m")
     plane = edge_map.edge_map(log, edges, lag_s=0.5, speed_mps=SPEED)
     assert [p.x_m for p in plane.points] == pytest.approx([0.0, 2.0 * SPEED])
+
+
+def test_an_edge_at_the_end_of_a_log_with_a_negative_lag_is_the_origin_of_dead_reckoning():
+    log = FlightLog({"t_s": np.arange(100) * 0.01}, {"source": "f.csv", "sample_period_s": 0.01})
+    plane = edge_map.edge_map(log, [Detection(99, "entry")], lag_s=-0.5, speed_mps=0.3)
+    assert (plane.points[0].x_m, plane.points[0].y_m) == (0.0, 0.0)

@@ -93,6 +93,11 @@ def test_heights_that_were_drawn_are_grouped_by_centimetre():
     assert list(groups) == ["2 cm", "10 cm", "low"]
 
 
+def test_half_a_centimetre_is_rounded_up():
+    groups = by_centimetre([replace(flight([]), condition=Condition(height=f"{h}mm")) for h in (15, 25, 35)])
+    assert list(groups) == ["2 cm", "3 cm", "4 cm"]
+
+
 def test_balanced_accuracy_uses_airborne_samples_only():
     probability = np.zeros(len(AIRBORNE))
     probability[1000:1200] = 1.0  # half of the platform
@@ -179,7 +184,7 @@ def test_a_score_is_the_same_after_it_was_json():
     assert replace(restored, bins=score.bins) == score
     unknown = flight([Detection(500, "entry")], true=None)
     assert FlightScore.from_dict(json.loads(json.dumps(unknown.as_dict()))).false is None
-    del entry["in_training"]  # as older files have it
+    del entry["in_training"], entry["path"]  # as older files have them
     assert FlightScore.from_dict(entry).in_training is False
     assert set(entry) == {"file", "condition", "edges", "false", "detections", "balanced_accuracy", "airborne_s",
                           "windows", "reliability", "note"}

@@ -38,3 +38,15 @@ def test_trainings_are_averaged_by_edge():
     first, second = _scores(1), _scores(2)
     distances = [abs(e.error_m) for s in (*first, *second) for e in s.edges if e.error_m is not None]
     assert summarise(one_a_flight([*first, *second]))["mean_abs_error_m"] == pytest.approx(np.mean(distances))
+
+
+def test_flights_of_one_name_in_two_folders_are_two():
+    scores = [FlightScore("f.csv", Condition(), (), (), 1, 10.0, path=path) for path in ("a/f.csv", "b/f.csv")]
+    assert len(one_a_flight([*scores, *scores])) == 2
+    assert len(one_a_flight([FlightScore.from_dict(score.as_dict()) for score in (*scores, *scores)])) == 2
+
+
+def test_false_edges_stay_unknown_where_no_score_knows_the_truth():
+    blind = FlightScore("a", Condition(), (), None, 3, 60.0)
+    assert one_a_flight([blind, blind])[0].false is None
+    assert summarise(one_a_flight([blind, blind]))["false_per_minute"] is None

@@ -107,3 +107,17 @@ def test_pickled_and_missing_files_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "pickled.npz", tmp_path / "none.npz", tmp_path):
         with pytest.raises(AirTouchError):
             model_file.load(path)
+
+
+@pytest.mark.parametrize("changed, message", [
+    ({"lag_s": "late"}, "lag_s is 'late', not a number"), ({"lag_s": 1e6}, "lag_s"), ({"sigma_s": None}, "sigma_s"),
+    ({"flights": 3}, "flights is not a list"), ({"held_out_hashes": [1]}, "held_out_hashes is not a list"),
+    ({"parameters": {"dwell_samples": 25.5}}, "dwell_samples is 25.5, not a whole number"),
+    ({"parameters": {"arm_samples": -1}}, "arm_samples is -1"), ({"parameters": []}, "settings are not a table"),
+    ({"parameters": {"probability_entry": "high"}}, "probability_entry is 'high'"),
+])
+def test_metadata_of_the_wrong_kind_are_named(model: model_file.Model, changed: dict, message: str) -> None:
+    data = replace(model, metadata={**model.metadata, **changed}).to_bytes()
+    with pytest.raises(AirTouchError, match=message) as error:
+        model_file.parse(data, "m.npz")
+    assert str(error.value).startswith("m.npz: ") and "\n" not in str(error.value)

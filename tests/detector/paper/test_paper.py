@@ -8,12 +8,14 @@ import pytest
 import short_flights
 from airtouch import reference, vehicle
 from airtouch.detector import paper, registry
+from airtouch.detector.paper import features
 from airtouch.detector.paper.decoding import detections
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.parameters import DEFAULT
 from airtouch.reference.edge_pipeline import EdgePipelineConfig
+from made_flight import made_flight
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +96,15 @@ def test_the_baseline_tells_edges_of_no_kind_and_no_probability(log):
     assert len(trace.probability) == len(log) and np.isnan(trace.probability).all()
     assert trace.edges and {e.kind for e in trace.edges} == {"edge"}
     assert all(0 <= e.sample < len(log) for e in trace.edges)
+
+
+def test_the_disturbance_force_is_that_of_the_vehicle_which_the_log_names():
+    log = made_flight(0)
+    of = {name: log.with_columns({}, **({"vehicle": name} if name else {}))
+          for name in ("", vehicle.DEFAULT_VEHICLE, "crazyflie-2.1-brushless", "house")}
+    force = {name: features.flight_features(named).force for name, named in of.items()}
+    assert np.array_equal(force[""], force[vehicle.DEFAULT_VEHICLE]) and np.array_equal(force[""], force["house"])
+    brushless = features.flight_features(log, vehicle.load("crazyflie-2.1-brushless")).force
+    assert np.array_equal(force["crazyflie-2.1-brushless"], brushless) and not np.array_equal(force[""], brushless)
+    notes = {name: paper.run(named).note for name, named in of.items()}
+    assert "vehicle 'house', of which no file is known" in notes.pop("house") and not any(notes.values())

@@ -1,13 +1,15 @@
 """The paper's network, its losses and its pruning, against what the paper says of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from airtouch.detector.paper import losses, network, training
-from airtouch.detector.shared import pruning
+from airtouch.detector.paper import detector, losses, network, training
+from airtouch.detector.shared import pruning, training_set
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
-from small_model import random_weights
+from small_model import random_model, random_weights
 
 
 def test_the_network_has_the_papers_weights() -> None:
@@ -108,5 +110,19 @@ def test_training_settings_out_of_range_are_refused() -> None:
     for setting in ({"epochs": 0}, {"sparsity": 1.0}, {"block": 3}, {"df_lambda": -1.0}):
         with pytest.raises(AirTouchError, match="training"):
             training.train_paper([], **setting)
+    with pytest.raises(AirTouchError, match="no setting 'steps'; known: epochs, "):
+        training.train_paper([], steps=3)
     with pytest.raises(AirTouchError, match="no flight"):
         training.train_paper([])
+
+
+def test_a_training_flight_is_not_taken_for_the_held_out_one_of_the_same_name(monkeypatch) -> None:
+    trained, unseen = made_flight(0), made_flight(1)
+    for folder, log in (("a", trained), ("b", unseen)):
+        log.meta["source"] = f"{folder}/f.csv"
+    monkeypatch.setattr(detector, "tune", lambda model, flights, physical_filter: flights)
+    model = random_model()
+    named = replace(model, metadata={"held_out": ["f.csv"]})
+    assert detector.retune(named, [trained, unseen]) == [trained, unseen], "an older model has names only"
+    hashed = replace(model, metadata={**named.metadata, "held_out_hashes": [training_set.flight_hash(unseen)]})
+    assert detector.retune(hashed, [trained, unseen]) == [unseen]

@@ -127,7 +127,7 @@ def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
     assert not best.run(sensors.without(log, ("acceleration",)), model).edges
     faulty = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
     faulty.save(tmp_path / "w.npz")
-    with pytest.raises(AirTouchError, match="not numbers"):
+    with pytest.raises(AirTouchError, match="entry_score is 'high', not a number"):
         best.load(tmp_path / "w.npz")
 
 
@@ -145,9 +145,18 @@ def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(s
 
 def test_the_note_has_the_measured_figures():
     all_sensors, no_acceleration = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
-    text = sensor_note.note(("acceleration",))
+    text = sensor_note.note(("acceleration",), shipped=True)
     first = text.index(f"{no_acceleration['missed']:.1%} missed of {no_acceleration['edges']}")
     assert first < text.index(f"{all_sensors['missed']:.1%} missed of")
     assert "\n" not in text
-    assert not sensor_note.note(())
+    assert not sensor_note.note((), shipped=True)
     assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}
+
+
+def test_only_the_shipped_model_is_said_to_have_the_measured_figures(small):
+    log = sensors.without(made_flight(4), ("motors",))
+    shipped = best.load(None)
+    assert "unseen edges" in best.run(log).note and "unseen edges" in best.run(log, shipped).note
+    other_decoder = replace(shipped, metadata={**shipped.metadata, "decoder_without": {}})
+    for model in (small, other_decoder):
+        assert best.run(log, model).note == "no motors in this log"

@@ -110,3 +110,16 @@ def test_the_refusal_names_the_key(path, node, key):
 @pytest.mark.parametrize("key, value", [("arm_m", -0.03), ("motor_time_constant_s", 0), ("mass_kg", "text")])
 def test_a_vehicle_that_cannot_be_is_refused(key, value):
     assert key in (refusal(vehicles.parse, tomli_w.dumps(CRAFT | {key: value})) or "")
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "x" * 300 + ".toml", "../models/best", "a\0.toml"])
+def test_a_vehicle_that_a_log_names_oddly_is_unknown(name):
+    flown, warning = vehicles.of_log({"vehicle": name})
+    assert flown == vehicles.load() and "no file is known" in warning
+
+
+@pytest.mark.parametrize("table", [{"acc_noise_rms_mps2": -0.1}, {"gyro_noise_ratio": [1, 1, -1]},
+                                   {"gyro_bandwidth_hz": -1.0}, {"flow_noise_mps": [0.1, -0.1]}])
+def test_negative_noise_is_refused(table):
+    with pytest.raises(AirTouchError, match=f"v.toml: {next(iter(table))} = .* must be 0 or more"):
+        vehicles.numbers(table, "v.toml")

@@ -68,7 +68,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     early and to choose its thresholds. `best` trains on all flights; its state is stored beside --out, in a folder
     that ends in .training, and the same command continues after a stop.
     """
-    _check_combination(flights, detector, simulated, scenario, without, (start, labelled, free_air, silence))
+    _check_combination(flights, detector, simulated, scenario, without, (start, labelled, free_air, silence),
+                       steps, (epochs, block, df_lambda))
     need("train", "training")
     check_free(out, force)
     module = registry.get(detector)
@@ -111,14 +112,21 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
 
 def _check_combination(flights: tuple[Path, ...], detector: str, simulated: int | None, scenario: str | None,
-                       without: tuple[str, ...], of_best: tuple) -> None:
-    """Raises click.UsageError for options that exclude each other; of_best: values of options for `best` alone."""
+                       without: tuple[str, ...], of_best: tuple, steps: int | None, of_paper: tuple) -> None:
+    """Raises click.UsageError for options that exclude each other.
+
+    of_best: values of options for `best` alone; so is steps. of_paper: of those for `paper` and `paper-stream`.
+    """
     if simulated and flights:
         raise click.UsageError("either FLIGHTS or --simulated, not both")
     if not simulated and (scenario or without):
         raise click.UsageError("--scenario and --without need --simulated N")
     if detector != "best" and any(of_best):
         raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+    if detector != "best" and steps is not None:
+        raise click.UsageError("--steps is for --detector best; paper takes --epochs")
+    if detector == "best" and any(value is not None for value in of_paper):
+        raise click.UsageError("--epochs, --block and --lambda are for --detector paper; best takes --steps")
 
 
 @contextmanager
@@ -157,9 +165,9 @@ def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: 
 
 
 def _report(metadata: dict, seconds: float) -> None:
-    held_out = set(metadata.get("held_out", ()))
-    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held_out]
-    click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
+    held_out = metadata.get("held_out", ())
+    fitted = len(metadata["flights"]) - metadata.get("flights_before", 0) - len(held_out)
+    click.echo(f"trained on {fitted} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
     if held_out:
         click.echo(f"held out ({len(held_out)}): {', '.join(sorted(held_out))}")
     if "simulated" in metadata:

@@ -102,7 +102,7 @@ def _resume_file(examples: Examples, recipe: Recipe, settings: FitSettings, seed
         return None
     make_folder(settings.work)
     hashes = [training_set.flight_hash(log) for log in (*examples.flights, *settings.free_air)]
-    parts = [repr(recipe), str(seed), repr([examples.labels, examples.emphasis]), *hashes]
+    parts = [__version__, repr(recipe), str(seed), repr([examples.labels, examples.emphasis]), *hashes]
     start = settings.start.weights.values() if settings.start else ()
     weights = b"".join(np.ascontiguousarray(values).tobytes() for values in start)
     return settings.work / f"training_{hashlib.sha256('|'.join(parts).encode() + weights).hexdigest()[:16]}.npz"

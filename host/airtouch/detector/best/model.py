@@ -124,6 +124,13 @@ def load(path: str | Path | None = None) -> BestModel:
     return parse(archive.read(Path(path)), str(path))
 
 
+def is_shipped(model: BestModel, missing: Sequence[str]) -> bool:
+    """Whether network and decoder are those that the shipped model has for a log that lacks these sensors."""
+    shipped = load(None).serving(missing)
+    return (model is shipped or model.digest == shipped.digest) and (
+        model.decoder_without(missing) == shipped.decoder_without(missing))
+
+
 @cache
 def _shipped(name: str) -> BestModel:
     """A model that ships, read once."""
@@ -181,11 +188,10 @@ def _recipe(table: Any, source: str) -> Recipe:
 
 
 def _check_metadata(model: BestModel, source: str) -> None:
-    """Raise AirTouchError unless lag and decoder settings are finite numbers."""
-    lag, own = model.metadata.get("lag_s"), model.metadata.get("decoder_without", {})
+    """Raise AirTouchError unless lag and decoder settings are numbers that a decoder can have."""
+    archive.check_metadata({"lag_s": None, **model.metadata}, source)
+    own = model.metadata.get("decoder_without", {})
     if not isinstance(own, dict):
         raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")
-    configs = [model.decoder, *(model.decoder_without((sensor,)) for sensor in own)]
-    settings = [value for config in configs for value in asdict(config).values()]
-    if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in (lag, *settings)):
-        raise AirTouchError(f"{source}: decoder settings or lag are not numbers; {archive.REMEDY}")
+    for config in (model.decoder, *(model.decoder_without((sensor,)) for sensor in own)):
+        archive.check_settings(asdict(config), asdict(DecoderConfig()), source)

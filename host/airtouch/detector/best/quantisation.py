@@ -8,6 +8,7 @@ from airtouch.detector.best.network import Weights, window_logits
 from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
+from airtouch.errors import AirTouchError
 from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
@@ -19,17 +20,18 @@ def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESEN
 
     flights: channels of each flight, [(n, channels), ...]. The windows are evenly spaced over each flight; with fewer
     than FEW windows a flight none is at its ends, where the drone stands on the ground.
+    Raises AirTouchError where no flight is as long as a window.
     """
     length = recipe.receptive_samples
     usable = [x for x in flights if len(x) >= length]
-    each = -(-count // max(len(usable), 1))
+    if not usable:
+        raise AirTouchError(f"training: no flight is as long as what the network reads, {length} samples")
+    each = -(-count // len(usable))
     few = each < FEW
     ends = 0.5 / each if few else 0.0
     windows = [x[s:s + length] for x in usable
                for s in np.linspace(ends * (len(x) - length), (1 - ends) * (len(x) - length), each).astype(int)]
-    if few:
-        windows = [windows[i * len(windows) // count] for i in range(min(count, len(windows)))]
-    return np.stack(windows[:count]).astype(np.float32)
+    return np.stack([windows[i * len(windows) // count] for i in range(min(count, len(windows)))]).astype(np.float32)
 
 
 def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:

@@ -1,4 +1,4 @@
-"""What the shipped `best` loses where a log lacks a sensor, in one line with measured figures."""
+"""What `best` loses where a log lacks a sensor, in one line; with measured figures of the shipped model."""
 
 import json
 from collections.abc import Sequence
@@ -18,10 +18,12 @@ def figures() -> dict[str, dict[str, Any]]:
     return json.loads((resources.files("airtouch") / "models" / FILE).read_text(encoding="utf-8"))
 
 
-def note(missing: Sequence[str]) -> str:
-    """One line on what is lost without these sensors; "" if none is missing."""
+def note(missing: Sequence[str], shipped: bool) -> str:
+    """One line on what is lost without these sensors; "" if none is missing. Only the shipped model was measured."""
     if not missing:
         return ""
+    if not shipped:
+        return f"no {missing[0]} in this log"
     return f"no {missing[0]} in this log: {_text(figures()[missing[0]])}; with all sensors {_text(figures()['all'])}"
 
 

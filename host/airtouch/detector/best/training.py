@@ -2,6 +2,7 @@
 
 import io
 import json
+import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -126,14 +127,22 @@ def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int
 
 
 def _resume(path: Path, state: Sequence, rng: np.random.Generator) -> int:
-    """Set variables and random numbers to the saved state; the next step, 0 without a saved state."""
+    """Set variables and random numbers to the saved state; the next step, 0 without one, with a warning if damaged."""
     if not path.is_file():
         return 0
-    with np.load(path) as saved:
-        for i, variable in enumerate(state):
-            variable.assign(saved[f"v{i}"])
-        rng.bit_generator.state = json.loads(str(saved["rng"]))
-        return int(saved["step"])
+    try:
+        with np.load(path) as saved:
+            values = [saved[f"v{i}"] for i in range(len(state))]
+            if [value.shape for value in values] != [tuple(variable.shape) for variable in state]:
+                raise ValueError("arrays of another shape")
+            step = int(saved["step"])
+            rng.bit_generator.state = json.loads(str(saved["rng"]))
+    except Exception as error:  # a damaged zip or array header raises nearly anything
+        warnings.warn(f"{path}: damaged ({error}); the training starts anew", stacklevel=2)
+        return 0
+    for variable, value in zip(state, values, strict=True):
+        variable.assign(value)
+    return step
 
 
 def _prune(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001

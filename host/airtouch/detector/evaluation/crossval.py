@@ -97,6 +97,7 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settin
     for None. detector: one that is not registered, under `name`. tell: called with a line a fold.
     Raises AirTouchError for an unknown detector, for a filter that it does not have, and for fewer than two folds.
     """
+    own = "" if detector is None else repr(detector)
     detector, settings = detector or get(name), settings or Settings()
     if not settings.physical_filter and not isinstance(detector, Filtered):
         raise AirTouchError(f"{name} has no physical filter to switch off")
@@ -106,7 +107,7 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settin
     scores: list[FlightScore] = []
     done: list[Fold] = []
     for fold, members in folds.items():
-        key = cache_key(name, files, members, settings.seed, settings.hashed())
+        key = cache_key(name, files, members, settings.seed, settings.hashed(), own)
         cache = out / f"{name}{settings.variant()}_fold{fold}_{key}.json"
         entry = read_fold(cache)
         if entry is None:
@@ -179,12 +180,14 @@ def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, 
 
 
 def cache_key(name: str, files: Sequence[FlightFile], test: Sequence[FlightFile], seed: int,
-              options: dict[str, Any]) -> str:
+              options: dict[str, Any], own: str = "") -> str:
     """Twelve hexadecimal digits that change with version, detector, seed, options and the flights' files.
+
+    own: the settings, as text, of a detector that is not registered.
 
     What the code sets by default is not among them: after a change of a recipe delete the folds that were kept.
     """
-    total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}".encode())
+    total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}{own}".encode())
     for file in files:
         stat = os.stat(file.path) if file.path.exists() else None
         content = stat and (stat.st_size, stat.st_mtime_ns)

@@ -112,7 +112,7 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
     xy, measured = track(log, speed_mps, heading_deg)
     period = sample_period(log)
     if not measured and edges:
-        xy = xy - xy[max(round(edges[0].sample - lag_s / period), 0)]
+        xy = xy - xy[int(np.clip(round(edges[0].sample - lag_s / period), 0, len(xy) - 1))]
     points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], period_s=period, sigma_s=sigma_s,
                          lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"

@@ -118,7 +118,7 @@ def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector
                          detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)
-    return Result(log, trace, replace(score, note=note, in_training=trained))
+    return Result(log, trace, replace(score, note=note, in_training=trained, path=str(file.path)))
 
 
 def evaluate(

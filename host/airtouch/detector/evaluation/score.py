@@ -59,7 +59,7 @@ class FlightScore:
     false: samples of unmatched detections, None where the true edges are unknown.
     windows: counts of airborne samples.
     bins: reliability table, (10, 3). airborne_s: seconds in the air. note: what limits the result, one line.
-    in_training: whether the model was trained on this flight.
+    in_training: whether the model was trained on this flight. path: of the log, "" in results of an older version.
     """
 
     file: str
@@ -72,6 +72,12 @@ class FlightScore:
     bins: np.ndarray = field(default_factory=lambda: np.zeros((BINS, 3)))
     note: str = ""
     in_training: bool = False
+    path: str = ""
+
+    @property
+    def flight(self) -> str:
+        """What tells the flight from others: its path, for files in two folders may have the same name."""
+        return self.path or self.file
 
     def balanced_accuracy(self) -> float | None:
         """Mean of sensitivity and specificity of the windows, 0 to 1; None without positives or without negatives."""
@@ -94,6 +100,7 @@ class FlightScore:
             "reliability": self.bins.tolist(),
             "note": self.note,
             "in_training": self.in_training,
+            "path": self.path,
         }
 
     @classmethod
@@ -104,7 +111,7 @@ class FlightScore:
             entry["file"], Condition(**entry["condition"]), tuple(EdgeScore(**e) for e in entry["edges"]),
             None if false is None else tuple(false), entry["detections"], entry["airborne_s"],
             WindowCounts(*entry["windows"]), np.array(entry["reliability"], float), entry["note"],
-            entry.get("in_training", False))
+            entry.get("in_training", False), entry.get("path", ""))
 
 
 def match(true: Sequence[float], detected: Sequence[float], tolerance: float) -> list[tuple[int, int]]:

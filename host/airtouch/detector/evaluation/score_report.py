@@ -98,9 +98,9 @@ def shown_flights(results: Mapping[str, Sequence[evaluate.Result]], most: int) -
     first, *others = results
     ranked = sorted(results[first], key=_badness)
     chosen = [ranked[i * (len(ranked) - 1) // max(most - 1, 1)] for i in range(min(most, len(ranked)))]
-    traces = {name: {r.score.file: r.trace for r in results[name]} for name in others}
+    traces = {name: {r.score.flight: r.trace for r in results[name]} for name in others}
     return [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
-                        {name: of[r.score.file] for name, of in traces.items() if r.score.file in of})
+                        {name: of[r.score.flight] for name, of in traces.items() if r.score.flight in of})
             for r in chosen]
 
 

@@ -47,9 +47,10 @@ def one_a_flight(scores: Iterable[FlightScore]) -> list[FlightScore]:
     """One score a flight, the sum of its scores by several models, so that intervals draw a flight whole."""
     of_flight: dict[str, list[FlightScore]] = {}
     for score in scores:
-        of_flight.setdefault(score.file, []).append(score)
+        of_flight.setdefault(score.flight, []).append(score)
     return [replace(same[0], edges=tuple(e for s in same for e in s.edges),
-                    false=tuple(sample for s in same for sample in s.false or ()),
+                    false=None if all(s.false is None for s in same)
+                    else tuple(sample for s in same for sample in s.false or ()),
                     detections=sum(s.detections for s in same), airborne_s=sum(s.airborne_s for s in same),
                     windows=WindowCounts(*(sum(counts) for counts in zip(*(s.windows for s in same), strict=True))),
                     bins=np.sum([s.bins for s in same], axis=0)) for same in of_flight.values()]
@@ -86,7 +87,7 @@ def by_centimetre(scores: Sequence[FlightScore]) -> dict[str, dict]:
         digits = (score.condition.height or "").removesuffix("mm")
         if not digits.isdigit():
             return score
-        return replace(score, condition=replace(score.condition, height=f"{int(digits) / 10:.0f}"))
+        return replace(score, condition=replace(score.condition, height=f"{(int(digits) + 5) // 10}"))
 
     groups = by_height([rounded(score) for score in scores])
     return {f"{value} cm" if value.isdigit() else value: row for value, row in groups.items()}

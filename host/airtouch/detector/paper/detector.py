@@ -15,14 +15,16 @@ from typing import Any
 import numpy as np
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
 from airtouch.detector.evaluation import tuning
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper.decoding import decode, detections
 from airtouch.detector.paper.decoding import physical_filter as filtered
 from airtouch.detector.paper.features import Features, feature_windows, flight_features, pipeline
 from airtouch.detector.paper.model import Model
+from airtouch.detector.shared import training_set
 from airtouch.detector.trace import Detection, Trace
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, printable
 from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
 from airtouch.kernels.rolling import probability_of_samples
 from airtouch.logs.flight_log import FlightLog
@@ -78,7 +80,15 @@ def _trace(log: FlightLog, model: Model, features: Features, probability: np.nda
     """The trace of a flight whose P(over a platform) is known, (n,), with edges from the C pipeline."""
     settings, physical = decoding_settings(model)
     events = pipeline(log, settings, probability, physical_filter=physical)
-    return Trace(probability, detections(events.edge, probability), signals(features))
+    return Trace(probability, detections(events.edge, probability), signals(features), _vehicle_note(log))
+
+
+def _vehicle_note(log: FlightLog) -> str:
+    """A line where the log names a vehicle of which no file is known: the force is then the default's."""
+    if vehicles.of_log(log.meta)[1] is None:
+        return ""
+    return (f"the log names vehicle {printable(str(log.meta['vehicle']))!r}, of which no file is known; the "
+            f"disturbance force is that of {vehicles.DEFAULT_VEHICLE}")
 
 
 def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any) -> Model:
@@ -95,9 +105,13 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = 
 
 
 def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
-    """The same network with decoding settings and lag chosen again. flights: those of its training."""
-    unseen = set(model.metadata["held_out"])
-    chosen = [log for log in flights if os.path.basename(log.source) in unseen]
+    """The same network with decoding settings and lag chosen again. flights: those of its training.
+
+    A model of an older version holds the names of the held-out flights instead of hashes.
+    """
+    names, hashes = model.metadata["held_out"], model.metadata.get("held_out_hashes")
+    chosen = [log for log in flights if (os.path.basename(log.source) in names if hashes is None
+                                         else training_set.flight_hash(log) in hashes)]
     return tune(model, chosen or flights, physical_filter)
 
 

@@ -44,12 +44,13 @@ def pipeline(log: FlightLog, parameters: Parameters = DEFAULT, probability: np.n
     """Features, force, alerts and edges of one flight of n samples, by the C pipeline.
 
     probability: (n,) P(over a platform) by the network; None before it ran, and then without edges.
-    vehicle: mass and thrust curve for the disturbance force, the flow-deck Crazyflie by default.
+    vehicle: mass and thrust curve for the disturbance force; for None the one that the log
+    names (`vehicle.of_log`).
     physical_filter: drop edges without an FR-CFAR alert.
     Raises AirTouchError that names the columns which the log lacks.
     """
     return kernels.edge_pipeline(
-        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle or vehicles.load(),
+        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle or vehicles.of_log(log.meta)[0],
         vbat_v=log["vbat_V"] if log.has("vbat_V") else None, thrust_axis=thrust_axis(log),
         probability=probability, config=EdgePipelineConfig(parameters, physical_filter=physical_filter))
 

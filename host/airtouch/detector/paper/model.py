@@ -7,7 +7,7 @@ network as a TFLite file, for comparison) and "metadata" (JSON, UTF-8). Nothing 
 """
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from airtouch.detector.shared import archive
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import FloatLayer
 from airtouch.logs.files import write_bytes
+from airtouch.parameters import DEFAULT
 from airtouch.reference.networks.int8_network import Int8Network
 
 FORMAT = 1
@@ -97,6 +98,8 @@ def load(path: str | Path | None = None) -> Model:
 def parse(data: bytes, source: str) -> Model:
     """A model from a file's content; `source` names it in messages. Raises as `load` does."""
     arrays, metadata = archive.parse(data, source)
+    archive.check_metadata(metadata, source)
+    archive.check_settings(metadata.get("parameters", {}), asdict(DEFAULT), source)
     fixed = metadata.get("normalisation") == FIXED
     archive.check_kind(metadata, {"format": FORMAT, "normalisation": FIXED if fixed else WINDOW}, source)
     expected: dict[str, tuple[type, tuple[int, ...]]] = {

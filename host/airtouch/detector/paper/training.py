@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from airtouch.detector.paper.features import Features, feature_windows, flight_f
 from airtouch.detector.paper.losses import edge_loss
 from airtouch.detector.paper.model import Model
 from airtouch.detector.paper.recipe import PaperRecipe
+from airtouch.detector.shared import training_set
 from airtouch.detector.shared.tensorflow import use_tensorflow
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import infer_float, infer_int8
@@ -64,8 +65,13 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
     (`held_out`). recipe: `PaperRecipe()` for None; changes: fields of it, by name. progress: called as the training
     goes; None for silence. command: what the model's metadata names as its origin.
     The decoding settings and the lag are not chosen yet (`detector.tune`).
-    Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
+    Raises AirTouchError without TensorFlow, without a usable window and for settings that are unknown or out of
+    range.
     """
+    known = [field.name for field in fields(PaperRecipe)]
+    absent = changes.keys() - set(known)
+    if absent:
+        raise AirTouchError(f"training: no setting {min(absent)!r}; known: {', '.join(known)}")
     recipe = replace(recipe or PaperRecipe(), **changes)
     use_tensorflow(seed)
     report = progress or (lambda *_: None)
@@ -81,12 +87,14 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
                             "give more flights")
     weights, epochs_run = fit_windows(windows.select(in_training), windows.select(~in_training), recipe, report)
     int8, tflite = quantisation.quantise(weights, windows.x[in_training])
+    hashes = [training_set.flight_hash(log) for log in flights]
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
         "seed": seed, "epochs": recipe.epochs, "epochs_run": epochs_run, "sparsity": recipe.sparsity,
         "block": recipe.block, "lambda": recipe.df_lambda, "conv_sparsity": recipe.conv_sparsity,
-        "flights": [os.path.basename(log.source) for log in flights],
-        "held_out": [os.path.basename(flights[i].source) for i in validation], "data_sha256": data_hash(windows),
+        "flights": [os.path.basename(log.source) for log in flights], "flight_hashes": hashes,
+        "held_out": [os.path.basename(flights[i].source) for i in validation],
+        "held_out_hashes": [hashes[i] for i in validation], "data_sha256": data_hash(windows),
     }, scale)
     score = accuracy(model, windows.select(~in_training & (np.arange(len(in_training)) % WINDOW_STEP == 0)))
     return replace(model, metadata={**model.metadata, "held_out_accuracy": score})

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, printable
 from airtouch.reference.networks.int8_network import Int8Layer
 
 LARGEST = 8 << 20  #: bytes of the file, and of all its arrays together; chosen, far above any model
+MOST = 1e9  #: size of a setting in a model's metadata; chosen, fits the int32 of the kernels
+MOST_S = 10.0  #: s, most lag and timing error of a model; chosen, far above any
 REMEDY = "train it again with `airtouch train`"
 
 Shapes = Mapping[str, tuple[type, tuple[int, ...]]]  #: dtype and shape of each array that must be there
@@ -73,6 +75,34 @@ def check_kind(metadata: dict[str, Any], expected: Mapping[str, Any], source: st
         actual = metadata.pop(key, None)
         if actual != value:
             raise AirTouchError(f"{source}: model {key} {actual!r}, this detector needs {value!r}; {REMEDY}")
+
+
+def check_metadata(metadata: Mapping[str, Any], source: str) -> None:
+    """Raise AirTouchError where lag, timing error or lists of flights, if they are there, are of the wrong kind."""
+    for key, low in (("lag_s", -MOST_S), ("sigma_s", 0.0)):
+        if key in metadata:
+            _check_number(metadata[key], key, source, low, MOST_S)
+    for key in ("flights", "flight_hashes", "held_out", "held_out_hashes"):
+        names = metadata.get(key, [])
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            raise AirTouchError(f"{source}: {key} is not a list of texts; {REMEDY}")
+
+
+def check_settings(table: Any, defaults: Mapping[str, float], source: str) -> None:
+    """Raise AirTouchError where a setting is no number, or no count where its default is one."""
+    if not isinstance(table, dict):
+        raise AirTouchError(f"{source}: settings are not a table; {REMEDY}")
+    for name in table.keys() & defaults.keys():
+        whole = isinstance(defaults[name], int)
+        _check_number(table[name], name, source, 0 if whole else -MOST, MOST, whole)
+
+
+def _check_number(value: object, name: str, source: str, low: float, high: float, whole: bool = False) -> None:
+    """Raise AirTouchError for anything but a number, or a whole one, from low to high."""
+    kind = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+    if not (kind and low <= value <= high):  # type: ignore[operator]
+        raise AirTouchError(f"{source}: {name} is {printable(repr(value))}, not a {'whole ' * whole}number from "
+                            f"{low:g} to {high:g}; {REMEDY}")
 
 
 def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) -> None:

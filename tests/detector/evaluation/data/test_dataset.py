@@ -35,7 +35,10 @@ def test_without_manifest_every_log(tmp_path):
     (HEADER + "a.csv,clean,three,,,,\n", ":2: fold is 'three'"),
     (HEADER + "a.csv,clean,0,,,,fast\n", ":2: speed_mps is 'fast'"),
     (HEADER + "a.csv,clean,0,,,,-1\n", "above 0"),
-    (HEADER + "a.csv,clean,0,,,,nan\n", "above 0"),
+    (HEADER + "a.csv,clean,0,,,,nan\n", "speed_mps is 'nan', a finite number"),
+    (HEADER + "a.csv,clean,0,low,nan,none,0.3\n", ":2: angle_deg is 'nan', a finite number"),
+    (HEADER + "a.csv,clean,0,low,-inf,none,0.3\n", ":2: angle_deg is '-inf', a finite number"),
+    (HEADER + "a.csv,clean,1.5,,,,\n", ":2: fold is '1.5', a whole number"),
     (HEADER + "a.csv,clean,0,,,,1\na.csv,clean,0,,,,1\n", ":3: a.csv is listed twice"),
     (HEADER + ",clean,0,,,,1\n", ":2: empty file name"),
     ("", "no column 'file'"),
@@ -44,6 +47,12 @@ def test_bad_manifest_says_where(tmp_path, text, message):
     with pytest.raises(AirTouchError, match="manifest.csv") as error:
         collect([folder(tmp_path, text)])
     assert message in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_fold_as_pandas_writes_it_is_whole(tmp_path):
+    place = folder(tmp_path, HEADER + "a.csv,clean,1.0,,,,\nb.csv,clean,,,,,\n")
+    folds = [condition.fold for condition in read_manifest(place / "manifest.csv").values()]
+    assert folds == [1, None] and isinstance(folds[0], int)
 
 
 def test_a_manifest_that_is_no_text_is_refused(tmp_path):

@@ -41,3 +41,15 @@ def test_too_few_flights_are_told(monkeypatch, tmp_path):
     monkeypatch.setattr(demo_flights.dataset, "collect", lambda folders, speed: files([0, 1, 2]))
     with pytest.raises(AirTouchError, match="3 flights are too few"):
         demo_flights.choose(tmp_path, tmp_path / "simulated")
+
+
+@pytest.mark.parametrize("every, left", [((1, 1, 2, 3), "test"), ((0, 0, 4, 8), "train")])
+def test_folds_that_leave_none_to_train_or_to_test_are_told(monkeypatch, tmp_path, every, left):
+    monkeypatch.setattr(demo_flights.dataset, "collect", lambda folders, speed: files(every))
+    with pytest.raises(AirTouchError, match=f"no flight is left to {left} on"):
+        demo_flights.choose(tmp_path, tmp_path / "simulated")
+
+
+def test_no_training_flight_is_one_line():
+    with pytest.raises(AirTouchError, match="no flight to train on"):
+        demo_flights.readable([])

@@ -50,3 +50,8 @@ def test_days_are_needed():
         folds.by_day([FlightFile(Path("f.csv"), Condition())])
     with pytest.raises(AirTouchError, match="at least two days"):
         folds.by_day(files("aaa"))
+
+
+def test_a_flight_in_still_air_without_an_angle_has_a_group():
+    file = FlightFile(Path("a.csv"), Condition(day="0126", height="low", wind="none"))
+    assert folds.still_air([file]) == {("0126", "low", "None"): [file]}

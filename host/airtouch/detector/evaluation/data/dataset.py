@@ -1,6 +1,7 @@
 """Which flights, under which conditions: `manifest.csv` beside them."""
 
 import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -139,19 +140,28 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
 
 
 def _condition(row: dict[str, str | None], place: str) -> Condition:
-    """The condition in a manifest's row. Raises AirTouchError, naming the place, for a number that is none."""
+    """The condition in a manifest's row. Raises AirTouchError, naming place and column, for a wrong number."""
     def text(name: str) -> str | None:
         return (row.get(name) or "").strip() or None
 
-    def number(name: str, kind: type = float):
+    def number(name: str) -> float | None:
         value = text(name)
         try:
-            return None if value is None else kind(value)
+            result = None if value is None else float(value)
         except ValueError:
             raise AirTouchError(f"{place}: {name} is {value!r}, a number is needed") from None
+        if result is not None and not math.isfinite(result):
+            raise AirTouchError(f"{place}: {name} is {value!r}, a finite number is needed")
+        return result
+
+    def whole(name: str) -> int | None:
+        value = number(name)  # pandas writes a column with empty cells as 0.0, 1.0, ...
+        if value is not None and not value.is_integer():
+            raise AirTouchError(f"{place}: {name} is {text(name)!r}, a whole number is needed")
+        return None if value is None else int(value)
 
     speed = number("speed_mps")
     if speed is not None and not 0 < speed < MOST_MPS:
         raise AirTouchError(f"{place}: speed_mps is {speed:g}, it must be above 0 and below 100")
-    return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"),
+    return Condition(text("use"), whole("fold"), text("height"), number("angle_deg"), text("wind"),
                      speed, text("day"))

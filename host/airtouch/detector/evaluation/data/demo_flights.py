@@ -33,7 +33,7 @@ def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
 
     speed_mps: speed of flights whose manifest has none. tell: called with a line for each simulated flight that
     diverged. progress: called with the numbers of simulated flights and of all, first with 0.
-    Raises AirTouchError for fewer than FEWEST flights.
+    Raises AirTouchError for fewer than FEWEST flights, and where the folds leave none to train on or none to test.
     """
     if folder is not None:
         files, origin = dataset.collect([folder], speed_mps), f"recorded flights in {folder}"
@@ -43,6 +43,10 @@ def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
         raise AirTouchError(f"{folder or simulated}: {len(files)} flights are too few to train and to test; "
                             f"at least {FEWEST} are needed")
     train, test = split(files)
+    if not train or not test:
+        raise AirTouchError(f"{folder or simulated}: no flight is left to {'test' if train else 'train'} on: the demo "
+                            f"tests on every {HELD_OUT}th fold of the manifest (0, {HELD_OUT}, ...) and trains on the "
+                            "others")
     return DemoFlights(spread(train, TRAIN), spread(test, TEST), origin)
 
 
@@ -84,6 +88,8 @@ def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
 
 def readable(files: Sequence[FlightFile]) -> tuple[list[FlightLog], list[tuple[str, str]]]:
     """The readable logs, and (file, reason) for each other one. Raises AirTouchError if none is readable."""
+    if not files:
+        raise AirTouchError("no flight to train on")
     readable_by_path, left_out = readable_flights(files)
     if not readable_by_path:
         raise AirTouchError(f"no flight to train on; the first was left out because: {left_out[0][1]}")

@@ -55,12 +55,13 @@ def by_day(files: Sequence[FlightFile]) -> Folds:
 
 
 def still_air(files: Sequence[FlightFile]) -> dict[tuple[str, str, str], list[FlightFile]]:
-    """(Day, class of height, angle in degrees) -> the flights in still air that were flown so."""
+    """(Day, class of height, angle in degrees) -> the flights in still air that were flown so; "None" where unknown."""
     groups: dict[tuple[str, str, str], list[FlightFile]] = {}
     for file in files:
         flown = file.condition
         if flown.wind == "none":
-            groups.setdefault((f"{flown.day}", f"{flown.height}", f"{flown.angle_deg:g}"), []).append(file)
+            angle = "None" if flown.angle_deg is None else f"{flown.angle_deg:g}"
+            groups.setdefault((f"{flown.day}", f"{flown.height}", angle), []).append(file)
     return groups
 
 
