@@ -6,17 +6,7 @@ from airtouch import logs
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.simulation.workers import local, store
-
-SHORT = """
-name = "short"
-[[mission.step]]
-do = "take-off"
-height_m = 0.4
-time_s = 1.0
-[[mission.step]]
-do = "hover"
-time_s = 0.5
-"""
+from short_scenario import SHORT
 
 
 def test_two_processes_write_what_one_does(tmp_path, vehicle):

@@ -9,17 +9,8 @@ from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
 from airtouch.simulation.workers import store
+from short_scenario import SHORT
 
-SHORT = """
-name = "short"
-[[mission.step]]
-do = "take-off"
-height_m = 0.4
-time_s = 1.0
-[[mission.step]]
-do = "hover"
-time_s = 0.5
-"""
 REQUEST = {"scenario": "short", "seed": 3}
 
 
