@@ -37,6 +37,14 @@ def test_packets_that_were_held_up_in_a_queue_are_no_restart():
     assert ticks.unwrap(2600, 2.6) == 2600
 
 
+def test_fresh_packets_after_a_silence_and_a_queue_are_no_restart():
+    """Four seconds without the link: what the queue held of their begin arrives first, then the present."""
+    ticks = Ticks()
+    ticks.unwrap(1000, 1.0)
+    assert ticks.unwrap(1010, 5.0) == 1010
+    assert ticks.unwrap(5020, 5.02) == 5020
+
+
 @given(st.sets(st.integers(0, 300), min_size=2), st.integers(-3, 3))
 def test_gaps_are_the_samples_that_are_not_there(numbers, jitter):
     slots = np.array(sorted(numbers))

@@ -18,27 +18,29 @@ class Restarted(Exception):
 class Ticks:
     """Unwraps the time stamps of packets in order of arrival.
 
-    newest_ms: the newest time. newest_arrival_s: when its packet arrived, host's clock.
+    newest_ms: the newest time. least_delay_ms: host's clock at arrival minus the drone's, of the packet that came with
+    the least delay.
     """
 
     newest_ms: int | None = None
-    newest_arrival_s: float = 0.0
+    least_delay_ms: float = 0.0
 
     def unwrap(self, stamp: int, arrival_s: float) -> int:
         """The time of a 24-bit stamp in ms, without wraps. arrival_s: host's clock.
 
-        Raises Restarted if it is over LATEST_MS in the past, or if it goes over LATEST_MS further than the host's
-        clock: from half a wrap of uptime on, a clock that starts again from zero looks like a step forward.
+        Raises Restarted if it is over LATEST_MS in the past, or over LATEST_MS ahead of the host's clock: from half a
+        wrap of uptime on, a clock that starts again from zero looks like a step forward. Packets that waited in a queue
+        are behind that clock, and the fresh ones after them are not ahead of it.
         """
         if self.newest_ms is None:
-            self.newest_ms, self.newest_arrival_s = stamp, arrival_s
+            self.newest_ms, self.least_delay_ms = stamp, 1000.0 * arrival_s - stamp
             return stamp
         step = (stamp - self.newest_ms + WRAP_MS // 2) % WRAP_MS - WRAP_MS // 2
-        if step < -LATEST_MS or step - 1000.0 * (arrival_s - self.newest_arrival_s) > LATEST_MS:
-            raise Restarted
         at = self.newest_ms + step
-        if step > 0:
-            self.newest_ms, self.newest_arrival_s = at, arrival_s
+        delay_ms = 1000.0 * arrival_s - at
+        if step < -LATEST_MS or self.least_delay_ms - delay_ms > LATEST_MS:
+            raise Restarted
+        self.newest_ms, self.least_delay_ms = max(self.newest_ms, at), min(self.least_delay_ms, delay_ms)
         return at
 
 
