@@ -62,7 +62,7 @@ int32_t streamInt8Check(const streamInt8_t *network) {
       return i;
     }
     window += (int64_t)(i == 0 ? 1 : network->stride) * (ringRows(conv) - 1);
-    if (window > UINT16_MAX) {
+    if (window > 65535) {  // what a uint16_t holds
       return i;
     }
     skipped += i >= network->firstSkip ? conv->layer.outChannels : 0;

@@ -71,6 +71,15 @@ def test_a_faster_log_is_as_long_as_it_was(log, hz):
     assert len(as_flight(at_rate(log, hz))) == pytest.approx(len(log), rel=0.011)
 
 
+@pytest.mark.parametrize("jitter_s", [0.0, 1e-3])
+def test_a_log_that_lost_many_rows_is_no_slower_log(log, jitter_s):
+    rng = np.random.default_rng(1)
+    poor = without(log, 50 + np.flatnonzero(rng.random(len(log) - 100) < 0.08))
+    late = FlightLog({**poor.columns, "t_s": poor["t_s"] + rng.normal(0.0, jitter_s, len(poor))}, poor.meta)
+    flight = as_flight(late)
+    assert jitter_s or len(flight) == pytest.approx(len(log), rel=0.01)
+
+
 @pytest.mark.parametrize("with_clock", [True, False])
 def test_a_slower_log_is_refused(log, with_clock):
     slow, reasons = at_rate(log, 50.0), []
