@@ -1,6 +1,5 @@
 """The commands without a drone: what they ask for, and what they refuse in one line."""
 
-import os
 import signal
 import threading
 from unittest.mock import Mock
@@ -66,7 +65,7 @@ def test_ctrl_c_at_the_question_ends_the_program_before_anything_is_armed(tmp_pa
     monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", Mock())
     monkeypatch.setattr(readiness, "make_ready", Mock())
     monkeypatch.setattr(collect, "fly", flown)
-    monkeypatch.setattr("click.confirm", lambda *_, **__: os.kill(os.getpid(), signal.SIGINT))
+    monkeypatch.setattr("click.confirm", lambda *_, **__: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         cli_collect._fly(collect.Plan("x", tmp_path, "hop"), {1: Mock(seconds=1.0)}, tmp_path, ask=True)
     flown.assert_not_called()
