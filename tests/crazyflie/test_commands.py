@@ -12,6 +12,7 @@ from airtouch.cli.drone import collect as cli_collect
 from airtouch.crazyflie import collect, mission, readiness, recorder
 from airtouch.crazyflie.checks import Condition
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import no_empty_folders
 
 
 def run(*arguments):
@@ -46,7 +47,7 @@ def test_without_a_drone_no_empty_folder_stays(tmp_path, monkeypatch):
 
 
 def test_a_folder_that_holds_something_stays(tmp_path):
-    with collect.no_empty_folders(tmp_path / "a" / "b"):
+    with no_empty_folders(tmp_path / "a" / "b"):
         collect.prepare_folder(tmp_path / "a" / "b", print)
         (tmp_path / "a" / "b" / "flight.csv.gz.part").write_text("t_s")
     assert (tmp_path / "a" / "b" / "flight.csv.gz.part").is_file()

@@ -181,10 +181,10 @@ def test_an_error_after_the_landing_sends_no_land_command(tmp_path, monkeypatch)
 @pytest.mark.parametrize("craft", [FakeCraft(), FakeCraft(volts=3.3), FakeCraft(restart_at=9.0)],
                          ids=["planned", "early", "restarted"])
 def test_the_guard_is_told_of_the_air_alone(tmp_path, craft):
-    told = []
-    fly(craft, tmp_path, in_air=lambda flying: told.append((flying, len(craft.heard))))
-    assert told[0] == (False, 0) and (True, 0) in told  # before the take-off is sent
-    assert told[-1][0] is False and craft.heard[told[-1][1] - 1][1].kind in ("stop", "go")
+    calls = []
+    fly(craft, tmp_path, in_air=lambda flying: calls.append((flying, len(craft.heard))))
+    assert calls[0] == (False, 0) and (True, 0) in calls  # before the take-off is sent
+    assert calls[-1][0] is False and craft.heard[calls[-1][1] - 1][1].kind in ("stop", "go")
 
 
 def test_a_closed_terminal_is_no_reason_to_fall(tmp_path):

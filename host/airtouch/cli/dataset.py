@@ -6,9 +6,9 @@ import click
 from rich.progress import Progress
 
 from airtouch.cli import Suggesting
-from airtouch.cli.shared.folders import made_folder
 from airtouch.errors import AirTouchError
 from airtouch.logs import public
+from airtouch.logs.files import no_empty_folders
 
 
 @click.group("dataset", cls=Suggesting)
@@ -30,7 +30,7 @@ def fetch(out: Path, source: Path | None, base_url: str) -> None:
     airtouch dataset fetch --from ~/crazyflie_filter_constant/control/data
     airtouch crossval flights/airtouch
     """
-    with made_folder(out):
+    with no_empty_folders(out):
         _fetch(out, source, base_url)
 
 

@@ -7,8 +7,8 @@ recorder    its file                                        manifest  its row in
 import datetime
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -83,18 +83,6 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
         say(f"{path}: recovered from a flight whose process was killed")
     for line in unreadable:
         say(f"{line}: an unfinished flight that cannot be recovered; repair it or remove it")
-
-
-@contextmanager
-def no_empty_folders(out: Path) -> Iterator[None]:
-    """Remove, at the end of a `with` statement, `out` and the folders above it if it made them and they are empty."""
-    absent = [folder for folder in (out, *out.parents) if not folder.exists()]
-    try:
-        yield
-    finally:
-        for folder in absent:
-            with suppress(OSError):  # it holds something
-                folder.rmdir()
 
 
 def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int, *, stop: Event,

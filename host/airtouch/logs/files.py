@@ -4,6 +4,8 @@ import os
 import secrets
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -137,6 +139,18 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise AirTouchError(f"{folder}: cannot be made: {error.strerror}; choose another") from None
+
+
+@contextmanager
+def no_empty_folders(out: Path) -> Iterator[None]:
+    """Remove, at the end of a `with` statement, `out` and the folders above it if it made them and they are empty."""
+    absent = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        yield
+    finally:
+        for folder in absent:
+            with suppress(OSError):  # it holds something
+                folder.rmdir()
 
 
 def check_free(path: Path | None, force: bool) -> None:

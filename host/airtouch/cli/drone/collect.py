@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import check_free
+from airtouch.logs.files import check_free, no_empty_folders
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     name = name or Path(first.name).name
     plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
                         link_timeout, force)
-    with collect.no_empty_folders(out):
+    with no_empty_folders(out):
         collect.prepare_folder(out, click.echo)
         first_number = number or recorder.next_number(out, name)
         numbers = range(first_number, first_number + flights)

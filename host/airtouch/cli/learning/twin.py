@@ -10,11 +10,10 @@ from typing import Any
 import click
 
 from airtouch.cli.shared.flights import SPEED_MPS
-from airtouch.cli.shared.folders import made_folder
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, no_empty_folders, write_bytes
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 SUMMARY, REPORT = "twin.json", "report.html"
@@ -66,7 +65,8 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
 
     fit_file = out / calibrate.FIT
     _check_free(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
-    with made_folder(out):
+    with no_empty_folders(out):
+        make_folder(out)
         craft = vehicles.load(vehicle)
         recorded = _read(flights, speed, folds)
     if force and not resume:

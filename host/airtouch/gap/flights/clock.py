@@ -38,9 +38,10 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
                                 f"{-np.diff(log['t_s'])[backwards[0]]:.3f} s; cut the log there")
     time = interpolate_missing(log["t_s"]) if log.has("t_s") else np.arange(len(log)) * sample_period(log)
     period = _period(time)
-    slowest = min(period, float(np.median(np.diff(time))))  # lost rows make the mean step longer, not most steps
-    if slowest > (1.0 + PERIOD_TOLERANCE) * PERIOD_S:
-        raise AirTouchError(f"{name}: logged at {1.0 / slowest:.3g} Hz; the diagnosis needs 100 Hz or more: log every "
+    # lost rows lengthen the mean step, not the median
+    least_period = min(period, float(np.median(np.diff(time))))
+    if least_period > (1.0 + PERIOD_TOLERANCE) * PERIOD_S:
+        raise AirTouchError(f"{name}: logged at {1.0 / least_period:.3g} Hz; the diagnosis needs 100 Hz or more: log every "
                             "10 ms")
     return resample(log, 100.0) if period < (1.0 - PERIOD_TOLERANCE) * PERIOD_S else log
 

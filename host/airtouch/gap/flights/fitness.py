@@ -61,9 +61,10 @@ def _stuck_shares(log: FlightLog) -> dict[str, float]:
 
 def _without_impossible_values(log: FlightLog) -> tuple[FlightLog, list[str]]:
     """The log without values that cannot be and without columns that have few others; their names."""
+    limits = {**dict.fromkeys(PWM, PWM_RANGE), "t_s": (-LATEST_S, LATEST_S)}
     columns, unfit = {}, []
     for key, values in log.columns.items():
-        low, high = PWM_RANGE if key in PWM else (-LATEST_S, LATEST_S) if key == "t_s" else (-LARGEST, LARGEST)
+        low, high = limits.get(key, (-LARGEST, LARGEST))
         good = (values >= low) & (values <= high)
         if len(good) and good.mean() < LEAST_GOOD:
             unfit += [key] if key not in RANGES else []
