@@ -41,8 +41,8 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
     # lost rows lengthen the mean step, not the median
     least_period = min(period, float(np.median(np.diff(time))))
     if least_period > (1.0 + PERIOD_TOLERANCE) * PERIOD_S:
-        raise AirTouchError(f"{name}: logged at {1.0 / least_period:.3g} Hz; the diagnosis needs 100 Hz or more: log every "
-                            "10 ms")
+        raise AirTouchError(f"{name}: logged at {1.0 / least_period:.3g} Hz; the diagnosis needs 100 Hz or more: log "
+                            "every 10 ms")
     return resample(log, 100.0) if period < (1.0 - PERIOD_TOLERANCE) * PERIOD_S else log
 
 
