@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import airtouch as at
+from airtouch.gap import diagnosis
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts as passing_bursts
 from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate
 from airtouch.gap.passing.gate_search import ENDS
-from gap_flights import fly
+from airtouch.gap.signals.channels import inside
+from airtouch.logs.flight_log import FlightLog
+from gap_flights import VEHICLE, fly
 
 HERTZ = 25.0  #: of the torque that is put in, in the middle of YAW_BURSTS' band
 
@@ -63,3 +67,24 @@ def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_fligh
 def test_a_flight_that_only_takes_off_says_nothing(study, nominal_flight):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
     assert burst_gate(Data(study, [taking_off]), FORCE_BURSTS) == ((), 0.0)
+
+
+def test_a_burst_in_one_of_two_tables_is_none_in_the_other(monkeypatch):
+    """All tables have one source, by which no gate could tell their flights."""
+    class Selected(Exception):
+        """The data on which candidates would be judged."""
+
+    def stop(data, *_):
+        raise Selected(data)
+
+    logs = [f.log for f in fly(2, 62)]
+    t = logs[0]["t_s"]
+    acts = (t >= 10.0) & (t < 10.5)
+    shaken_log = logs[0].with_columns({"acc_z_mps2": logs[0]["acc_z_mps2"] + 8.0 * acts * np.sin(60.0 * t)})
+    monkeypatch.setattr(diagnosis, "select", stop)
+    with pytest.raises(Selected) as stopped:
+        at.gap.diagnose([FlightLog(log.columns, {"source": "pandas table"}) for log in (shaken_log, logs[1])], VEHICLE)
+    data = stopped.value.args[0]
+    gate, _ = burst_gate(data, FORCE_BURSTS)
+    first, second = (inside(gate, f) for f in data.flights)
+    assert first[1000:1050].all() and not second.any()

@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain, count
 
 import numpy as np
 
@@ -104,12 +105,20 @@ def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
 
 
 def ready_flights(logs: Iterable[FlightLog], vehicle: Vehicle, reasons: list[str]) -> Iterator[Flight]:
-    """Flights made ready, one at a time; the reasons why others cannot be are added to `reasons`."""
+    """Flights made ready, one at a time; the reasons why others cannot be are added to `reasons`.
+
+    Each has a name of its own, as gates tell flights by it: the second of `a.csv` is `a.csv (2)`.
+    """
+    names: set[str] = set()
     for log in logs:
         try:
-            yield ready(log, vehicle)
+            flight = ready(log, vehicle)
         except AirTouchError as error:
             reasons.append(str(error))
+            continue
+        name = next(n for n in chain([flight.name], (f"{flight.name} ({i})" for i in count(2))) if n not in names)
+        names.add(name)
+        yield flight if name == flight.name else replace(flight, name=name)
 
 
 def with_gyro_if_any(flights: Sequence[Flight], reasons: list[str]) -> list[Flight]:
