@@ -22,6 +22,7 @@ UPDATES = 8  #: Newton steps towards the power of highest posterior; chosen. A l
 #: longest of these steps, of the natural logarithm of the power; chosen. A larger number needs fewer steps, and one may
 #: overshoot
 LONGEST_STEP = 1.5
+NODES = 64  #: of Gauss-Laguerre quadrature: more change the moments of a score by less than 1e-8
 SENSOR = sensor_cells()[channel_cells()]  #: (CELLS,) for each cell the number of the first cell of its view and sensor
 ABOVE_MEANS = above_means()  #: (CELLS,) bool
 NO_PRIOR = (np.zeros(CELLS), np.full(CELLS, 1e3))  #: mean and standard deviation of a prior that says nothing
@@ -40,14 +41,20 @@ class Powers(NamedTuple):
     cell: np.ndarray
 
 
-def information(freedom: np.ndarray) -> np.ndarray:
-    """Fisher information of the log variance that a value under Student's law holds, over that under a normal law.
+def score_moments(freedom: np.ndarray, tail_scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Moments (n,) of the score psi of a value's log power: minus its expected slope, and the mean of its square.
 
-    nu / (nu + 3), with nu degrees of freedom (n,), is that of a real value (Lange, Little and Taylor 1989, Robust
-    statistical modeling using the t distribution, J. Am. Stat. Assoc. 84, 881). A complex value whose density falls
-    with the power nu + 1 holds nu / (nu + 2), at 12 degrees of freedom 7 % more.
+    psi = (nu + 1) e / (a + e) - 1, with nu degrees of freedom and the tail's scale a, where the power e over the
+    expected one is exponential, as that of a complex normal value. Both moments are 1 where nu and a are large. A sum
+    of psi that is 0 gives the log power with the variance E[psi^2] / (n E[psi']^2) (White 1982, Maximum likelihood
+    estimation of misspecified models, Econometrica 50, 1): at 12 degrees of freedom 1.02 / n, at 2 it is 1.21 / n.
     """
-    return freedom / (freedom + 3.0)
+    laws, inverse = np.unique(freedom + 1j * tail_scale, return_inverse=True)  # pairs, as numbers that sort fast
+    nu, scale = laws.real[:, None], laws.imag[:, None]
+    e, weight = np.polynomial.laguerre.laggauss(NODES)  # of integrals over an exponential e
+    slope = ((nu + 1.0) * scale * e / (scale + e) ** 2) @ weight
+    square = (((nu + 1.0) * e / (scale + e) - 1.0) ** 2) @ weight
+    return slope[inverse], square[inverse]
 
 
 def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
@@ -67,7 +74,7 @@ def power_factors(powers: Powers, prior_mean: np.ndarray, prior_std: np.ndarray)
     out = prior_mean.copy()
     count = np.bincount(cell, minlength=CELLS)
     precision = 1.0 / np.maximum(prior_std ** 2, LEAST_VARIANCE)
-    known = np.bincount(cell, information(nu), CELLS)
+    known = np.bincount(cell, score_moments(nu, tail_scale)[0], CELLS)
     for _ in range(UPDATES):
         scaled = e * np.exp(-out[cell])
         push = np.bincount(cell, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail_scale + scaled) - 1.0), CELLS)
@@ -129,12 +136,14 @@ def power_floor(flights: Sequence[Powers]) -> np.ndarray:
     log_power, chance = np.zeros((len(flights), CELLS)), np.full((len(flights), CELLS), np.nan)
     for i, powers in enumerate(flights):
         log_power[i] = power_factors(powers, *NO_PRIOR)[0]
-        own = np.bincount(powers.cell, OVERLAP_WEIGHT * information(powers.freedom), CELLS)
-        chance[i, own > 0.0] = 1.0 / own[own > 0.0]
+        slope, square = (np.bincount(powers.cell, OVERLAP_WEIGHT * moment, CELLS)
+                         for moment in score_moments(powers.freedom, powers.tail_scale))
+        chance[i, slope > 0.0] = square[slope > 0.0] / slope[slope > 0.0] ** 2
     known = np.isfinite(chance)
     count = np.maximum(known.sum(axis=0), 1)
     mean = np.where(known, log_power, 0.0).sum(axis=0) / count
-    squares = np.where(known, (log_power - mean) ** 2 - chance, 0.0).sum(axis=0)
+    in_deviations = (1.0 - 1.0 / count) * chance  # the mean of the same flights takes up the rest
+    squares = np.where(known, (log_power - mean) ** 2 - in_deviations, 0.0).sum(axis=0)
     pooled = np.maximum(_of_band(squares) / np.maximum(_of_band(count - 1.0), 1.0), LEAST_SCATTER ** 2)
     own = (np.maximum(squares, 0.0) + POOLED_WEIGHT * pooled) / (count - 1 + POOLED_WEIGHT)
     return np.stack([mean, np.sqrt(own * (1.0 + 1.0 / count))])
