@@ -12,6 +12,7 @@ from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.clock import at_100_hz, with_lost_rows
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.nominal.build_study import declared_study
@@ -44,6 +45,20 @@ def test_two_vehicles_overhead_one_after_another_are_two_intervals():
     low = path(0.0, (0.0, 0.0, 0.5))
     partners = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
     assert np.array(overhead.seconds_overhead(low, partners)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
+
+
+@pytest.mark.parametrize(("period_s", "lost"), [(0.0101, 0), (0.0099, 0), (0.01, 200), (0.005, 0)])
+def test_the_seconds_overhead_are_those_of_the_ready_flights_rows(period_s, lost):
+    """Where a made log holds a mark for each row that is overhead, its ready flight holds it in the same seconds."""
+    time = 3.0 + period_s * np.arange(round(70.0 / period_s))
+    flown = np.delete(np.arange(len(time)), np.arange(1000, 1000 + lost))
+    mark = (time >= 58.0) & (time < 59.0)
+    low = FlightLog({"t_s": time[flown], "vbat_V": mark[flown].astype(float),
+                     **{k: np.full(len(flown), v) for k, v in zip(overhead.POSITION, (0.0, 0.0, 0.5), strict=True)}})
+    ready, _, _ = with_lost_rows(at_100_hz(low, "low"), "low")
+    (begin, end), = overhead.seconds_overhead(low, [path(58.0, (0.0, 0.1, 0.9), 1.0)])
+    marked = np.flatnonzero(ready["vbat_V"] > 0.5) * PERIOD_S
+    assert (begin, end) == pytest.approx((marked[0], marked[-1]), abs=0.03)
 
 
 def test_a_partner_without_a_path_is_refused():

@@ -81,6 +81,18 @@ def with_lost_rows(log: FlightLog, name: str) -> RegularLog:
     return RegularLog(FlightLog(columns, {**log.meta, "sample_period_s": PERIOD_S}), clock, lost)
 
 
+def row_times(log: FlightLog, name: str) -> np.ndarray:
+    """Times (n,), s, by the clock of a log with t_s, of the rows that `with_lost_rows` makes of it `at_100_hz`.
+
+    Raises as these two.
+    """
+    at_rate = at_100_hz(log, name)
+    lost = with_lost_rows(at_rate, name).lost
+    times = np.full(len(lost), np.nan)
+    times[~lost] = interpolate_missing(log["t_s"]) if at_rate is log else log["t_s"][0] + at_rate["t_s"]
+    return interpolate_missing(times)
+
+
 def _off_a_line(time: np.ndarray, place: np.ndarray, sure: int) -> np.ndarray:
     """Distance (sure,), s, of the first times, as many as are sure, from a straight line over their places."""
     return (time - np.polyval(np.polyfit(place[:sure], time[:sure], 1), place))[:sure]

@@ -12,6 +12,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.clock import row_times
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, effect_within
 from airtouch.gap.signatures.scatter import size_of
@@ -51,15 +52,14 @@ def intervals_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
 
 
 def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[float, float], ...]:
-    """Intervals, s from the log's first row, in which one of the partners is overhead.
+    """Intervals, s, in which one of the partners is overhead; a ready flight has a row of the log every PERIOD_S.
 
     All logs hold t_s of one clock and positions in one frame. Raises AirTouchError where one of them has no such.
     """
     for each in (log, *partners):
         if not each.has("t_s", *POSITION):
             raise AirTouchError(f"{each.source}: no {', '.join(('t_s', *POSITION))}; a partner is found by both paths")
-    begin = log["t_s"][0]
-    time = np.arange(begin, log["t_s"][-1], PERIOD_S)
+    time = row_times(log, log.source)
 
     def path(one: FlightLog) -> np.ndarray:
         """Position (n, 3) at the times, m; NaN where the log has none."""
