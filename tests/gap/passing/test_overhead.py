@@ -61,6 +61,18 @@ def test_the_seconds_overhead_are_those_of_the_ready_flights_rows(period_s, lost
     assert (begin, end) == pytest.approx((marked[0], marked[-1]), abs=0.03)
 
 
+@pytest.mark.parametrize(("rate_hz", "gone_s", "passes"), [
+    (100.0, 0.0, 1), (100.0, 0.06, 1), (100.0, 2.0, 0), (10.0, 0.0, 1), (10.0, 2.0, 0)])
+def test_nobody_is_overhead_in_a_hole_of_the_partners_log(rate_hz, gone_s, passes):
+    """A partner that flies over at 0.5 m/s while its rows are lost may have flown round, or waited."""
+    time = np.arange(0.0, 20.0, 1.0 / rate_hz)
+    time = time[np.abs(time - 10.0) >= 0.5 * gone_s]
+    partner = FlightLog({"t_s": time, "x_m": 0.5 * (time - 10.0), "y_m": 0.0 * time, "z_m": 0.9 + 0.0 * time})
+    assert len(overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [partner])) == passes
+    partner = partner.with_columns({"z_m": np.where(np.abs(time - 10.0) < 1.0, np.nan, 0.9)})
+    assert overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [partner]) == ()
+
+
 def test_a_partner_without_a_path_is_refused():
     blind = FlightLog({"t_s": np.arange(10.0)}, {"source": "blind.csv"})
     with pytest.raises(AirTouchError, match="x_m"):

@@ -31,6 +31,9 @@ SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
 # (host/docs/looks.md, 2026-11-25 04:11). The numbers below have no source of their own: all were chosen.
 APART_S = 0.1  #: s, intervals with less between them are one; a larger number joins more of them
 LEAST_S = 0.05  #: s, shorter intervals are none; a larger number leaves out short passes
+#: s, and periods of a log, between two of its rows, from which on nothing is known of its path; larger numbers make up
+#: more of it
+HOLE_S, HOLE_PERIODS = 0.1, 3.0
 #: parts of a flight, by each of which but the last the known seconds are shifted: SHIFTS - 1 other places. A larger
 #: number takes more time, and the median is that of more places
 SHIFTS = 8
@@ -61,11 +64,8 @@ def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tup
             raise AirTouchError(f"{each.source}: no {', '.join(('t_s', *POSITION))}; a partner is found by both paths")
     time = row_times(log, log.source)
 
-    def path(one: FlightLog) -> np.ndarray:
-        """Position (n, 3) at the times, m; NaN where the log has none."""
-        return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in POSITION])
-
-    acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(path(log), path(p)) for p in partners)])
+    own = path_at(time, log)
+    acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(own, path_at(time, p)) for p in partners)])
     out: list[tuple[float, float]] = []
     for first, last in intervals_s(acts):
         if out and first - out[-1][1] < APART_S:
@@ -73,6 +73,23 @@ def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tup
         else:
             out.append((first, last))
     return tuple((a, b) for a, b in out if b - a >= LEAST_S)
+
+
+def path_at(time: np.ndarray, log: FlightLog) -> np.ndarray:
+    """Position (n, 3), m, at times (n,) of the log's clock, s; NaN outside of the log and in its holes.
+
+    A hole is longer than HOLE_S and than HOLE_PERIODS of the log's own: a straight line across it would make up a path.
+    """
+    place = log.stack(POSITION)
+    known = np.isfinite(log["t_s"]) & np.isfinite(place).all(axis=1)
+    at, place = log["t_s"][known], place[known]
+    if len(at) < 2:
+        return np.full((len(time), 3), np.nan)
+    out = np.column_stack([np.interp(time, at, values, np.nan, np.nan) for values in place.T])
+    steps = np.diff(at)
+    step = steps[np.clip(np.searchsorted(at, time, "right") - 1, 0, len(steps) - 1)]
+    out[step > max(HOLE_S, HOLE_PERIODS * float(np.median(steps)))] = np.nan
+    return out
 
 
 def note(study: Study, seconds: Sequence[tuple[float, float]]) -> str:
