@@ -1,11 +1,14 @@
 """The response at an edge against made logs whose steps are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.edges.edge_response import BINS, SHRINKAGE, logged, response, response_covariance
+from airtouch.gap.edges.edge_response import BINS, SHRINKAGE, edges_of, logged, response, response_covariance
 from airtouch.logs.flight_log import PWM, FlightLog
+from gap_flights import fly
 
 VEHICLE = vehicles.load()
 EDGE, N = 50, 200
@@ -46,3 +49,18 @@ def test_edges_widen_the_scatter_of_stretches_without_one():
     assert np.diag(covariance) == pytest.approx([9.0, *np.ones(19)], rel=0.15)
     correlated = rng.normal(size=(4000, 1)) + rng.normal(size=(4000, 20))  # covariance 1 beside a variance of 2
     assert response_covariance(correlated, {})[0, 1] == pytest.approx(1.0 - SHRINKAGE, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "samples", "counts"), [
+    ("usable", 1, False), ("usable", 60, False), ("lost", 10, True), ("lost", 60, False)])
+def test_an_edge_that_is_hit_or_lost_is_no_evidence(name, samples, counts):
+    """usable: touched, for some samples from the edge on; lost: so many rows of the 1.6 s around it."""
+    flight = fly(1, 31)[0]
+    edges = edges_of(flight)
+    at = edges[0].sample + np.arange(samples)
+    usable, lost = flight.usable.copy(), flight.lost.copy()
+    usable[at] = False
+    if name == "lost":
+        lost[at] = True
+    left = edges_of(replace(flight, usable=usable, lost=lost))
+    assert (edges[0] in left) == counts and set(edges[2:]) <= set(left)

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from airtouch.gap.edges import edge_effects, edge_response
 from airtouch.gap.loop.command_spectra import COMMAND_FREEDOM, command_frequencies
 from airtouch.gap.loop.controller import AXES
+from airtouch.gap.signals import command_view
 from airtouch.gap.signals.command_floor_correction import COMMAND_DOUBT, SHAPES, SPREAD, UNCERTAIN_FACTOR
 from airtouch.gap.signals.command_view import CommandElements, CommandView, view_of
 from airtouch.gap.signals.spectra import AIR
@@ -187,3 +188,13 @@ def test_what_effects_add_at_edges_is_taken_off_there_alone(monkeypatch):
     np.testing.assert_array_equal(without[10:10 + count], values[10:10 + count] - added["first"])
     np.testing.assert_array_equal(without[10 + count:], values[10 + count:] - added["second"])
     np.testing.assert_array_equal(view.elements.values, values)  # of none the values stay
+
+
+def test_an_edge_outside_of_every_block_is_judged_with_none(monkeypatch):
+    """The nearest block of 2.56 s begins at sample 300; edges lie in it, before it, and after it."""
+    edges = [SimpleNamespace(sample=at) for at in (100, 320, 540, 600)]
+    monkeypatch.setattr(edge_response, "edges_of", lambda flight: edges)
+    monkeypatch.setattr(command_view, "_of_edge", lambda *_: CommandElements(*np.zeros((6, 0))))
+    loop = SimpleNamespace(edges="nominal", levelled_spectra=lambda flight: ((), ()))
+    view = view_of(loop, [None], [{AIR: np.array([300])}], [(0, AIR, np.array([True]))])
+    assert [e.sample for _, e in view.edges] == [320, 540]

@@ -24,6 +24,7 @@ BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust,
 COUNT = sum(n for _, n in BINS)
 KINDS = ("entry", "exit")
 LEVEL = tuple(PHASES.index(phase) for phase in ("hover", "cruise", "over platform"))  #: phases of level flight
+MOST_BRIDGED = 0.1  #: share of these samples that may bridge lost rows, as of a block's; chosen
 UNSURE = 3  #: samples before an edge that may belong to it already; chosen
 LEAST_MPS = 1e-6  #: speed that a direction is divided by at least
 LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
@@ -68,13 +69,26 @@ class EdgeFloor:
 
 
 def edges_of(flight: Flight) -> list[Edge]:
-    """Edges with enough flight around them, none where there is no down range."""
+    """Edges with enough flight around them, none where there is no down range.
+
+    Nothing touches the vehicle around them, and at most MOST_BRIDGED of the samples are bridged.
+    """
+    def is_evidence(edge: Edge) -> bool:
+        """Whether the samples of the edge's response count."""
+        window = slice(edge.sample - BEFORE, edge.sample + AFTER)
+        bridged = flight.bridged[window]
+        return bool((flight.usable[window] | bridged).all()) and bridged.mean() <= MOST_BRIDGED
+
+    return flight.workspace.cached("edges", (), lambda: [e for e in _edges_in_air(flight) if is_evidence(e)])
+
+
+def _edges_in_air(flight: Flight) -> list[Edge]:
+    """Edges with enough flight around them, whatever happens there."""
     if not flight.log.has("zrange_m"):
         return []
     air = flight.phase != GROUND
-    return flight.workspace.cached("edges", (), lambda: [
-        e for e in true_edges(flight.log, PLATFORM_STEP_M)
-        if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()])
+    return [e for e in true_edges(flight.log, PLATFORM_STEP_M)
+            if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()]
 
 
 def response(log: FlightLog, vehicle: Vehicle, at: int) -> np.ndarray:
@@ -129,10 +143,9 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
     without_edge: list[np.ndarray] = []
     for f in flights:
-        edges = edges_of(f)
-        for e in edges:
+        for e in edges_of(f):
             responses[e.kind].append(response(f.log, vehicle, e.sample))
-        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges)]
+        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, _edges_in_air(f))]
     if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
         return None
     known = np.isfinite(np.concatenate([without_edge, *responses.values()])).all(axis=0)

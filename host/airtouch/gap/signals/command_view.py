@@ -176,7 +176,8 @@ def view_of(loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[
     if loop.edges is not None:
         for i, middle, chosen in in_air:
             for e in edge_response.edges_of(flights[i]):
-                if chosen[_nearest(middle, e.sample)]:
+                nearest = _nearest(middle, e.sample)
+                if chosen[nearest] and abs(middle[nearest] - e.sample) <= LENGTH[AIR] // 2:
                     elements.append(_of_edge(loop.edges, flights[i], i, e))
                     edges.append((flights[i], e))
     return CommandView(loop, _joined(elements), [np.abs(s) ** 2 for _, s in by_flight], edges)
