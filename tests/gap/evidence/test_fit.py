@@ -14,10 +14,39 @@ from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM
 from airtouch.gap.evidence.problem import problem_of, whole_of
 from airtouch.gap.evidence.random_strength import LEAST_STRENGTH, fit_strength, strength_variance
 from airtouch.gap.flights.flight import without_columns
+from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
 from airtouch.gap.signatures import candidates
 from gap_flights import VEHICLE, fly
 from hovers import FLOOR, hover
+
+
+def test_a_turn_whose_offsets_are_far_from_their_prior_is_not_the_highest(monkeypatch):
+    """The second turn scales offsets, of a prior of 0.002 m/s^2, to where the likelihood alone is highest."""
+    study = replace(FLOOR, floor=replace(FLOOR.floor, offset=np.where(np.arange(COUNT) < 3, 0.002, 0.0)))
+    terms = (candidates.terms("mass")[0], *candidates.terms("imu_noise"))
+    data = Data(study, [hover(i, (0.04 * sign, 0.0, -0.5), louder=1.5, length_s=12.0, name=str(i))
+                        for i, sign in ((1, 1.0), (2, -1.0))])
+    problem, turns = problem_of(data, whole_of(data)), []
+
+    def astray(posterior, x, *more):
+        turn = gauss_newton(posterior, x, *more)
+        if turns:
+            at_once = [posterior.at(turns[0].x, by * turns[0].offsets) for by in np.arange(1.0, 9.0, 0.5)]
+            likeliest = max(at_once, key=lambda p: problem.likelihood(p.residual, p.extra_power))
+            turn = turns[0]._replace(offsets=likeliest.offsets, residual=likeliest.residual)
+        turns.append(turn)
+        return turn
+
+    monkeypatch.setattr(fit_module, "gauss_newton", astray)
+    result = fit(data, whole_of(data), terms)
+    assert len(turns) == 2
+    strengths = [fit_strength(problem, terms[1], turn.residual, np.zeros(len(turn.residual))) for turn in turns]
+    levels = [problem.likelihood(turn.residual, problem.random_power([strength]))
+              for turn, strength in zip(turns, strengths, strict=True)]
+    priors = [0.5 * np.sum((turn.offsets / 0.002) ** 2) for turn in turns]
+    assert levels[1] > levels[0] + 1.0 and levels[1] - priors[1] < levels[0] - priors[0] - 1.0
+    assert result.terms[1].values == pytest.approx(strengths[0].values)
 
 
 @pytest.mark.parametrize("start", [0.05, 3.0])

@@ -83,9 +83,9 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
         if not random:
             return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
         random = fit_strengths(problem, random, solution.residual, active)
-        random_power, of_loop = problem.random_power(random), problem.loop_change(active, uncertain_floor=True)
-        level = problem.likelihood(solution.residual, random_power + of_loop.extra_power) - of_loop.cost \
-            - 0.5 * float(np.sum(np.square(x / prior_std)))
+        random_power = problem.random_power(random)
+        reached = Posterior(problem, mean, random_power, prior_std, uncertain_floor=True)
+        level = -reached.at(x, solution.offsets).cost
         settled = not mean or level < highest + LEAST_TURN_GAIN
         if best is None or level > highest:
             best, highest = FittedTerms(_with_values(terms, x, random), x, solution.covariance), level

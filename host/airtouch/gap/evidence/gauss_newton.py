@@ -37,10 +37,11 @@ LOOP_STARTS = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 class MeanFit(NamedTuple):
-    """Scaled parameters x (k,), their covariance (k, k) where the last step began, and the residual (n,) at x."""
+    """Scaled parameters x (k,), their covariance (k, k) where the last step began; offsets (m,), residual (n,) at x."""
 
     x: np.ndarray
     covariance: np.ndarray
+    offsets: np.ndarray
     residual: np.ndarray
 
 
@@ -103,7 +104,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = MOST_STEPS) ->
     bounds = bounds_of(mean)
     x, offsets, covariance = np.clip(x, *bounds), np.zeros(len(problem.offsets)), np.zeros((len(x), len(x)))
     if not mean and not problem.offsets:
-        return MeanFit(x, covariance, problem.elements.residual)
+        return MeanFit(x, covariance, offsets, problem.elements.residual)
     now = posterior.at(x, offsets)
     slopes: SpectraSlopes | None = None
     stuck, damping = False, 0.0
@@ -116,7 +117,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = MOST_STEPS) ->
         if gained_too_little or failed_with_new_slopes:
             break
         stuck = not gained
-    return MeanFit(now.x, covariance, now.residual)
+    return MeanFit(now.x, covariance, now.offsets, now.residual)
 
 
 def _step(posterior: Posterior, slopes: SpectraSlopes, now: _Point, bounds: Bounds, damping: float) -> _Step:
