@@ -28,8 +28,18 @@ def test_a_collision_takes_the_samples_around_it_and_a_flight_full_of_them_has_n
     force, air = NOISE.copy(), np.ones(N, bool)
     force[500] += 100.0
     assert np.flatnonzero(jolts(force, None, air)).tolist() == list(range(500 - AROUND, 501 + AROUND))
-    force[50::100] += 100.0
+    force[50::40] += 100.0
     assert not jolts(force, None, air).any()
+
+
+def test_two_collisions_in_a_short_flight_are_two():
+    """In 4 s in the air, of which the seconds around them are a third; each lasts for 30 ms."""
+    force, air = NOISE[:500].copy(), np.arange(500) >= 100
+    at = [slice(200, 203), slice(400, 403)]
+    for hit in at:
+        force[hit] += 100.0
+    touched = jolts(force, None, air)
+    assert all(touched[hit].all() for hit in at) and touched.sum() == 2 * (3 + 2 * AROUND)
 
 
 def test_legs_may_touch_around_take_off_and_landing_but_not_at_rest_before():

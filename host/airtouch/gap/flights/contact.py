@@ -14,7 +14,9 @@ LEAST_AT_REST_MPS2 = 1e-3  #: standard deviation at rest that an accelerometer h
 JOLT = 40.0
 LEAST_IN_FLIGHT = 1e-6  #: standard deviation in flight, in the channel's unit, that a channel has at least; chosen
 LONG_AGO = 10 ** 6  #: samples, longer than SETTLED_S: before the first command
-MOST_JOLTED = 0.1  #: share of a flight that collisions may take; more is no collision; chosen
+#: share of a flight that collisions may take with the seconds around them, or by themselves, which a few in a short
+#: flight do not reach; more is no collision; chosen
+MOST_JOLTED, MOST_HIT = 0.1, 0.02
 
 
 def within(samples: np.ndarray, seconds: float) -> np.ndarray:
@@ -39,13 +41,14 @@ def jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.nd
 
     force (n, 3): specific force, m/s^2; rates (n, 3): rad/s, whose steps are looked at; air (n,): in flight.
     """
-    out = np.zeros(len(air), bool)
+    hit = np.zeros(len(air), bool)
     turning = np.zeros((len(air), 0)) if rates is None else np.diff(rates, axis=0, prepend=rates[:1])
     for values in (*force.T, *turning.T):
         away = np.abs(values - np.median(values[air]))
-        out |= air & (away > JOLT * max(float(deviation(values[air])), LEAST_IN_FLIGHT))
-    out = within(out, CONTACT_S)
-    return out if out[air].mean() < MOST_JOLTED else np.zeros_like(out)
+        hit |= air & (away > JOLT * max(float(deviation(values[air])), LEAST_IN_FLIGHT))
+    around = within(hit, CONTACT_S)
+    collided = around[air].mean() < MOST_JOLTED or hit[air].mean() < MOST_HIT
+    return around if collided else np.zeros_like(around)
 
 
 def near_ground(ground: np.ndarray, running: np.ndarray) -> np.ndarray:
