@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.loop.controller import firmware_of
 from airtouch.gap.loop.disturbed import disturbed
@@ -12,6 +13,7 @@ from airtouch.gap.signals.spectra import AIR, frequencies, short_time_spectra, s
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
+from airtouch.simulation.firmware import settings
 from airtouch.simulation.flight import prepare
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
@@ -90,3 +92,10 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
     low = (f > 0.5) & (f < 3.0)
     assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
     assert np.all(axes["usual"][f > 40.0] > 0.9)
+
+
+def test_a_yaw_rate_without_a_proportional_gain_is_one_line():
+    row = prepare(VEHICLE, ())[0][0].copy()
+    row["firmware"]["loops"][settings.RATE_YAW]["p"] = 0.0
+    with pytest.raises(AirTouchError, match="proportional gain"):
+        disturbed(firmware_of(row), row, frequencies(AIR))

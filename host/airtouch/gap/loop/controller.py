@@ -87,7 +87,7 @@ def _height(row: PlantRow, slope: float) -> Controller:
     reading = 0.001 * float(release["periods"]["range_ms"])
     return Controller(
         gain=float(climb["p"]) * float(row["thrust_scale"]) * slope, angle=float(height["p"]),
-        integral=_share(climb["i"], climb["p"]), angle_integral=_share(height["i"], height["p"]),
+        integral=share_of_gain(climb["i"], climb["p"]), angle_integral=share_of_gain(height["i"], height["p"]),
         hold_s=_hold_s(row), range_s=reading, acc_hz=float(release["filters"]["acc_hz"]),
         range_gains=_range_gains(reading, float(release["range"]["std_m"]),
                                  float(release["kalman"]["noise_acc_z_mps2"])))
@@ -101,9 +101,9 @@ def _attitude(row: PlantRow, i: int, slope: float) -> Controller:
     period, hold = 0.001 * float(release["periods"]["attitude_ms"]), _hold_s(row)
     return Controller(
         gain=0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope, angle=float(angle["p"]),
-        velocity=float(speed["p"]) / DEGREES, derivative=_share(rate["d"], rate["p"]),
-        integral=_share(rate["i"], rate["p"]), angle_integral=_share(angle["i"], angle["p"]),
-        velocity_integral=_share(speed["i"], speed["p"]), period_s=period, lowpass_hz=float(row["gyro_lowpass"]),
+        velocity=float(speed["p"]) / DEGREES, derivative=share_of_gain(rate["d"], rate["p"]),
+        integral=share_of_gain(rate["i"], rate["p"]), angle_integral=share_of_gain(angle["i"], angle["p"]),
+        velocity_integral=share_of_gain(speed["i"], speed["p"]), period_s=period, lowpass_hz=float(row["gyro_lowpass"]),
         on_error=bool(release["controller"]["derivative_on_error"]),
         kicked=float(row["controller_ahead"]) % hold < 0.5 * period, hold_s=hold,
         chip_hz=float(row["gyro_bandwidth"]))
@@ -130,7 +130,7 @@ def _range_gains(period: float, std: float, acceleration: float) -> tuple[float,
     return float(gains[0]), float(gains[1])
 
 
-def _share(part: float, of: float) -> float:
+def share_of_gain(part: float, of: float) -> float:
     """A gain as a share of another, both as the release's settings have them. Raises AirTouchError for none of it."""
     if not of:
         raise AirTouchError("the firmware has a loop without a proportional gain (p = 0), which the diagnosis cannot "

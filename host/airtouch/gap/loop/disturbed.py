@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, arm_of, axis_plant
-from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command
+from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command, share_of_gain
 from airtouch.gap.loop.loop_model import LOWEST_HZ, factors_of, loop_parts, plant_of, sensed_late
 from airtouch.gap.loop.noise_spectra import kick_of
 from airtouch.simulation.firmware import settings
@@ -40,7 +40,8 @@ def disturbed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -
     """At frequencies f (bins,), Hz. controllers: of AXES.
 
     The vehicle turns by S of an outside acceleration, S = 1 / (1 + P K), and the log has the command -K_log S / s of
-    it. The yaw loop is the firmware's, at the pace of the roll loop.
+    it. The yaw loop is the firmware's, at the pace of the roll loop. Raises AirTouchError where
+    its rate has no proportional gain.
     """
     f = np.maximum(f, LOWEST_HZ)
     _, roll, pitch = controllers
@@ -84,7 +85,7 @@ def _yaw(c: Controller, row: PlantRow, f: np.ndarray) -> AxisTransfers:
     of_rate, of_angle = loops[settings.RATE_YAW], loops[settings.YAW]
     gain = float(of_rate["p"]) * DEGREES * float(row["rate_scale"]) * float(row["rate_gain"]) * newtons_per_command(row)
     filtered = sensed_late(c, roll, f) / factors.lowpass / factors.chip
-    rate = gain * (1.0 + float(of_rate["i"]) / float(of_rate["p"]) / s) * filtered
+    rate = gain * (1.0 + share_of_gain(of_rate["i"], of_rate["p"]) / s) * filtered
 
     def angle(differences: np.ndarray) -> np.ndarray:
         """The path of the angle whose derivative makes these differences, 1/s."""
