@@ -34,6 +34,14 @@ def test_a_row_lost_in_mid_flight_is_lost_and_no_jitter(log):
     assert np.abs(flight.clock_s).max() < 1e-6
 
 
+def test_a_log_of_few_of_its_rows_says_how_many_are_missing(log):
+    """1000 rows 10 ms apart, 4000 s without one, 1000 more: 402,000 with the missing ones."""
+    time = 0.01 * np.arange(2000) + 4000.0 * (np.arange(2000) >= 1000)
+    reasons = []
+    assert not list(ready_flights([FlightLog({**log.slice(0, 2000).columns, "t_s": time}, {})], VEHICLE, reasons))
+    assert "400000 of 402000 samples are missing" in reasons[0]
+
+
 def test_a_row_missing_among_the_last_ones_is_no_jitter(log):
     """Too few rows follow to say whether it was lost or the rest came late: these tell nothing of the clock."""
     n = len(log)

@@ -67,11 +67,12 @@ def with_lost_rows(log: FlightLog, name: str) -> RegularLog:
     place = np.arange(n)  # of each logged row among all
     for hole in lost_samples(time, period):
         place[hole.sample:] += hole.lost
-    if place[-1] > MOST_ROWS_EACH * n + MOST_ROWS_MORE:
-        raise AirTouchError(f"{name}: {place[-1] - n} of {place[-1]} samples are missing; check the clock column")
+    rows = place[-1] + 1
+    if rows > MOST_ROWS_EACH * n + MOST_ROWS_MORE + 1:
+        raise AirTouchError(f"{name}: {rows - n} of {rows} samples are missing; check the clock column")
     sure = n - _rows_in_doubt(time, period)
     clock = _off_a_line(time, place, sure) if sure > 2 else np.zeros(n)
-    lost = np.ones(place[-1] + 1, bool)
+    lost = np.ones(rows, bool)
     lost[place] = False
     columns = {}
     for key, values in log.columns.items():
