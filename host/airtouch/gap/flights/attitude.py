@@ -26,6 +26,12 @@ def attitude(log: FlightLog) -> np.ndarray:
     A multirotor's thrust points along its own z axis, so what it accelerates over ground
     gives the tilt at low frequency; the gyro gives the rest. Without a gyro the tilt is
     that of the specific force in world axes.
+
+    Each rate of the gyro is integrated as if it were that of its own angle, which holds for small angles. What is left
+    out is, for roll, tan(pitch) (q sin(roll) + r cos(roll)), for pitch (cos(roll) - 1) q - r sin(roll), where q and r
+    are the rates about the body's y and z: at a tilt of 20 degrees up to 0.36 of the yaw rate. Of it only what changes
+    faster than CROSSOVER_HZ stays in the tilt. The heading that is not
+    logged is the sum of r, without tilt.
     """
     n = len(log)
     estimate = np.zeros((n, 3))
