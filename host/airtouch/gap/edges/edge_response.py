@@ -29,7 +29,8 @@ UNSURE = 3  #: samples before an edge that may belong to it already; chosen
 LEAST_MPS = 1e-6  #: speed that a direction is divided by at least
 LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter; chosen
 WINDOW_STEP = 20  #: samples from one such stretch to the next; chosen
-#: weight of the diagonal in the scatter's covariance, whose stretches are few (shrinkage, Ledoit and Wolf 2004); chosen
+#: weight of the diagonal in the scatter's covariance, whose stretches are few; chosen. Ledoit and Wolf 2004, whose is
+#: the idea, shrink to a multiple of the identity, by a weight that they estimate from the data
 SHRINKAGE = 0.3
 #: share of the scatter's summed variance that is added to each variance, and that sum at least, so that the covariance
 #: can be inverted; chosen
