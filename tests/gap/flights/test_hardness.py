@@ -49,7 +49,7 @@ def test_slope_is_that_of_the_law_drawn(slope):
 def test_prior_decides_where_all_blocks_are_flown_alike():
     power, _ = draw_swings(0.0, 40)
     slopes = slopes_of(power, np.full(40, 1.3), FREQUENCY)
-    assert slopes.slope == pytest.approx(1.0)  # its mean: errors are a share of what is flown
+    assert slopes.slope == pytest.approx(1.0)  # its mean, which is chosen
     assert slopes.relative_power(np.full(3, 1.3)) == pytest.approx(1.0)
 
 

@@ -15,8 +15,8 @@ from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.flights.flight import Flight
 
 STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer; chosen
-#: mean and standard deviation of slopes before any flight; the mean is that of errors that are a share of what is
-#: flown, the standard deviation is chosen
+#: mean and standard deviation of slopes before any flight; both chosen: half way between 0, of errors that do not go
+#: with what is flown, and 2, of errors that are a share of it, whose power goes with its square
 PRIOR = (1.0, 1.0)
 STEEPEST = 3.0  #: largest slope; chosen
 #: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted; chosen
