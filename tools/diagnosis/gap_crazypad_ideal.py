@@ -24,7 +24,7 @@ from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError, in_one_line
-from airtouch.gap.balance.hover_pattern import hover_pattern, hovers
+from airtouch.gap.balance.hover_pattern import hover_pattern, stretches_in_air
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
@@ -80,7 +80,7 @@ def describe(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
     weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
     thrust, voltage = vehicle.thrust(flight.pwm) / weight, flight.log["vbat_V"]
     levels, spectra = [], []
-    for first, last in hovers(flight):
+    for first, last in stretches_in_air(flight):
         mixed = thrust[first:last] @ MIX.T
         level = np.nanmean(voltage[first:last])
         slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=level), 1)[0]

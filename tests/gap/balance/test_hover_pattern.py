@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.balance.hover_hypotheses import commanded_change
-from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, hovers, mean_pattern
+from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, mean_pattern, stretches_in_air
 from airtouch.gap.balance.hover_posterior import side_is_sure
 from airtouch.logs.flight_log import VELOCITY
 from gap_flights import VEHICLE, flight, noise
@@ -52,7 +52,7 @@ def test_corrections_are_the_steps_of_the_velocity_that_no_acceleration_makes(lo
 @pytest.mark.parametrize(("seconds", "count"), [(3.9, 0), (4.1, 1)])
 def test_a_hover_lasts_four_seconds_without_take_off_and_landing(seconds, count):
     hover = noisy(seconds + 2.0 * SETTLE_S)
-    assert len(hovers(hover)) == count and hover_pattern(hover, VEHICLE).known == bool(count)
+    assert len(stretches_in_air(hover)) == count and hover_pattern(hover, VEHICLE).known == bool(count)
 
 
 def test_a_flight_without_a_hover_takes_no_part_in_the_mean():

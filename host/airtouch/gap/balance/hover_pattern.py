@@ -21,7 +21,7 @@ from airtouch.vehicle import Vehicle
 #: (host/docs/gap-crazypad.md)
 VOLTAGE_EXPONENT = 1.2
 VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
-SETTLE_S = 0.8  #: s after take-off and before landing that are no hover yet; chosen
+SETTLE_S = 0.8  #: s at either end of a stretch in the air that do not count; chosen
 LEAST_S = 4.0  #: s that a hover lasts at least: the spectra need 2.56 s (SPECTRUM_SAMPLES); chosen
 SPECTRUM_SAMPLES = 256  #: of a block of the spectra: bins of 0.4 Hz, three of them in HEAVE_HZ; chosen
 UNSTEADY_HZ = (2.0, 35.0)  #: band of the commands' unsteadiness; chosen
@@ -81,7 +81,7 @@ def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) ->
     """
     mixed, corrections = _mixed_thrust(flight, vehicle, at_one_volt), _corrections(flight)
     stretches = [_stretch(mixed[first:last], flight.acceleration[first:last, 2], corrections[first:last - 1])
-                 for first, last in hovers(flight)]
+                 for first, last in stretches_in_air(flight)]
     if not stretches:
         return NO_HOVER
     samples = [s.samples for s in stretches]
@@ -93,8 +93,12 @@ def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) ->
                         np.log10(np.maximum([x + y, z], 10.0 ** LEAST_POWER)))
 
 
-def hovers(flight: Flight) -> list[tuple[int, int]]:
-    """Stretches in the air without take-off and landing: first sample, and the one after the last."""
+def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
+    """What is taken for a hover: first sample, and the one after the last, of each stretch in the air.
+
+    All that is flown is in it, moves and most of a climb as well, but SETTLE_S at either end. The numbers of a pattern
+    are those of a hover where the flight is mostly one, as those of CrazyPAD are.
+    """
     air = (flight.phase != GROUND) & ~flight.on_ground
     trim = int(SETTLE_S / PERIOD_S)
     trimmed = [(a + trim, b - trim) for a, b in runs(air)]
