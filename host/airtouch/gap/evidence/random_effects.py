@@ -85,7 +85,9 @@ def _power_of_strength_1(data: Data, i: int, term: Term) -> Spectra:
 def _by_running(data: Data, i: int, term: Term) -> Spectra:
     """PSD by state of an effect, estimated by runs with several seeds on the flight's own signals.
 
-    A channel has one shape of the spectrum, scaled by the power of each block.
+    A channel has one shape of the spectrum, scaled by the power of each block. At rest it is 0 whatever the effect is,
+    as the residual has a vehicle at rest as its model there (`channels.residual`): only noise of the IMU is judged at
+    rest, by its closed form.
     """
     flight, study = data.flights[i], data.study
     runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)

@@ -45,6 +45,9 @@ def fit_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray
 def fit_strength(problem: Problem, term: Term, residual: np.ndarray, extra_power: np.ndarray) -> Term:
     """A random effect with its likeliest strength; unchanged where it adds no power.
 
+    All its free parameters have one strength: they grow in the proportions of their natural steps, and its force must
+    go with that strength. An effect of two independent ones is fitted along that line alone.
+
     residual (n,); extra_power (n,): that of the other effects.
     """
     _, high = term.bounds()
