@@ -14,28 +14,26 @@ favours these tests. Intervals resample conditions within families. What the bal
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.errors import AirTouchError, in_one_line
+from airtouch.errors import in_one_line
 from airtouch.gap.balance.hover_pattern import hover_pattern, stretches_in_air
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs import read
 from recordings.crazypad import figures, labels
+from recordings.learners import TREES, discriminant, forest, scikit, standardised
 from recordings.result_store import Result
 
 #: Hz, limits of the bands: those of `hover_pattern` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
 WINDOW = 256  #: samples of a block of the spectra: 2.56 s, which resolves the lowest band
 BALANCE = slice(0, 4)  #: lift, roll, pitch, yaw, the first numbers of a flight
-TREES = 300  #: of a forest; no source: round number, more than scikit-learn's 100
 RIDGE = 10.0  #: penalty of the regression on all (standardised) numbers; no source: round number
 
 
@@ -105,26 +103,10 @@ def relative(rows: list[dict[str, str]], numbers: np.ndarray) -> Table:
     return Table(rows, numbers - np.array([numbers[labels.baseline(rows, i)].mean(axis=0) for i in range(len(rows))]))
 
 
-def scikit(module: str) -> Any:
-    """A module of scikit-learn by its name there. Raises AirTouchError where it is not installed."""
-    try:
-        return import_module(f"sklearn.{module}")
-    except ImportError:
-        raise AirTouchError("the classifiers need scikit-learn: pip install 'airtouch[train]'") from None
-
-
-def discriminant(classes: np.ndarray) -> Any:
-    """A linear discriminant that takes each class as equally likely."""
-    count = len(set(classes))
-    return scikit("discriminant_analysis").LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto",
-                                                                      priors=np.full(count, 1.0 / count))
-
-
 #: name -> classifier, made for the classes (flights,) that it learns
 LEARNERS: dict[str, Callable] = {
     "discriminant on the balance": discriminant, "discriminant on all numbers": discriminant,
-    "forest on all numbers": lambda _: scikit("ensemble").RandomForestClassifier(
-        TREES, class_weight="balanced_subsample", random_state=0),
+    "forest on all numbers": forest,
     "nearest flight, all numbers": lambda _: scikit("neighbors").KNeighborsClassifier(1)}
 #: name -> regression of the millimetres cut
 MEASURES: dict[str, Callable] = {
@@ -132,11 +114,6 @@ MEASURES: dict[str, Callable] = {
     "discriminant on all numbers": lambda: scikit("linear_model").Ridge(RIDGE),
     "forest on all numbers": lambda: scikit("ensemble").RandomForestRegressor(TREES, random_state=0),
     "nearest flight, all numbers": lambda: scikit("neighbors").KNeighborsRegressor(1)}
-
-
-def standardised(model: Any) -> Any:
-    """A classifier or regression on standardised numbers."""
-    return scikit("pipeline").make_pipeline(scikit("preprocessing").StandardScaler(), model)
 
 
 def cross_validate(table: Table, folds: list[np.ndarray], learner: str) -> list[Result]:

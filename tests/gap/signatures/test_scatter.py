@@ -99,6 +99,18 @@ def test_many_baseline_flights_outweigh_the_table():
     np.testing.assert_allclose(ratio, 1.0, rtol=0.25)
 
 
+def test_the_scatter_foretells_a_further_flight_beside_as_many_as_were_calibrated_on():
+    """About the mean of n flights a further one has the variance (n + 1) / n: 13/12 of twelve, nearly 1 of many."""
+    def foretold(together):
+        """Median over draws of the scatter of twelve flights about the mean of as many as they were calibrated with."""
+        rng = np.random.default_rng(7)
+        trims = 8.0 * rng.normal(size=(200, together, 1))
+        around = trims - trims.mean(axis=1, keepdims=True)
+        return np.median([scatter_of([ApparentStrengths({"mass": x}, {"mass": np.zeros(1)}, 0.0) for x in known], True,
+                                     "ns-34g", calibrated_on=together).rms["mass"][0] for known in around[:, :12]])
+    assert foretold(400) / foretold(12) == pytest.approx(1.0 / np.sqrt(13.0 / 12.0), rel=0.04)
+
+
 def test_what_chance_alone_scatters_is_not_counted_as_scatter():
     rng = np.random.default_rng(5)
     flights = [ApparentStrengths({"mass": rng.normal(size=1)}, {"mass": np.ones(1)}, 0.0) for _ in range(200)]

@@ -40,7 +40,8 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
     It is measured in FLIGHTS of them, each held against the study of all.
     """
     return scatter_of(map_on_two_cores(partial(_apparent_in, study, without), evenly_chosen(flights)),
-                      any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights))
+                      any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights),
+                      calibrated_on=len(flights))
 
 
 def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:

@@ -23,11 +23,12 @@ Pair = tuple[float, float]  #: mean and standard deviation
 
 
 def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, vehicle: str = "",
-               one_trim: bool | None = None) -> Scatter:
+               one_trim: bool | None = None, calibrated_on: int = 0) -> Scatter:
     """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
 
-    baseline: flights compared with a vehicle that was calibrated on all of them. Their scatter is widened
-    by (n + 1) / (n - 1): each was among those that it is compared with, another flight will not be.
+    baseline: flights compared with a vehicle that was calibrated on all of them, and on others: on `calibrated_on` = n
+    together, by default on these alone. Their variance is widened by (n + 1) / (n - 1): each was among those that it
+    is compared with, another flight will not be.
     recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
     that was measured on the vehicle of this name leaves no room for other vehicles'. one_trim: whether the baseline's
     trims are alike, which tells the classes of simulated flights apart; None: nobody knows. One flight or none says
@@ -39,7 +40,8 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     if n < 2:
         own, widening, simulated = _widest(list(classes.values())), 1.0, False
     else:
-        widening = (n + 1.0) / (n - 1.0)
+        together = max(n, calibrated_on)
+        widening = (together + 1.0) / (together - 1.0)
         likelihood = {name: _log_likelihood(c, known, widening) for name, c in classes.items()}
         best = max(likelihood, key=likelihood.__getitem__)
         own, simulated = classes[best], best == SIMULATED  # whose flights are all drawn alike

@@ -2,6 +2,7 @@
 
 import sys
 from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +25,9 @@ from .. import cases
 DRAWS = 2000  #: bootstrap samples of flights, for an interval; no source: round number
 
 
-def show_without_seconds(flights: Path) -> None:
-    """Print how well each measure of a wake tells wakes from nominal flights, by vehicle."""
+def wakes_and_nominal(flights: Path) -> Iterator[tuple[cases.Case, Data]]:
+    """The wakes and the nominal flights of days 19 and 20 with their data, each against the baseline of its group."""
     studies: dict[tuple[str, ...], Study] = {}
-    of_truth: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
     nominal = [c for c in cases.nominal(flights, "build") if "neuralswarm" in Path(c.flight).parts]
     for case in [*cases.swarm(flights, "build"), *nominal]:
         if case.truth == "ground_effect":
@@ -36,9 +36,15 @@ def show_without_seconds(flights: Path) -> None:
         if case.baseline not in studies:
             base = [ready(read(b), vehicle) for b in case.baseline]
             studies[case.baseline] = calibrate.calibrated(vehicle, base, scatter=False)[0]
-        data = Data(studies[case.baseline], [ready(read(case.flight), vehicle)])
-        of_truth[vehicle.name, case.truth].append(passing_sizes(data))
+        yield case, Data(studies[case.baseline], [ready(read(case.flight), vehicle)])
         print(f"{Path(case.flight).name}", file=sys.stderr, flush=True)
+
+
+def show_without_seconds(flights: Path) -> None:
+    """Print how well each measure of a wake tells wakes from nominal flights, by vehicle."""
+    of_truth: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
+    for case, data in wakes_and_nominal(flights):
+        of_truth[vehicles.load(case.vehicle).name, case.truth].append(passing_sizes(data))
     print("| vehicle | measure | AUROC, 95 % interval | wakes beyond every nominal flight |\n|---|---|---|---|")
     for vehicle_name in sorted({name for name, _ in of_truth}):
         for measure in (OVERHEAD, UNSTEADY_TORQUE, UNSTEADY_LIFT, DOWNWARD):
