@@ -36,7 +36,10 @@ def test_flights_of_210_s_are_judged_and_no_fewer_than_four(count, seconds, chos
 
 @pytest.mark.parametrize(("alone", "names"), [(0.5, ["downwash"]), (0.2, ["motor_lag", "downwash"])])
 def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_left_out(monkeypatch, alone, names):
-    """With slow motors 0.6 of the gap closes; without them as much as `alone`."""
+    """With slow motors 0.6 of the gap closes; without them as much of it as `alone`.
+
+    Of a gap that is measured in cells of its own the others close another part.
+    """
     def of(*effects):
         steps = [SimpleNamespace(name=n, passing_key=None) for n in effects]
         hypothesis = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
@@ -45,11 +48,15 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
 
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without, *_: of(
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
-    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(closure=SimpleNamespace(
-        before=1.4, shrink=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
+    gaps = {2: SimpleNamespace(closure=SimpleNamespace(before=1.4, shrink=Quantity(0.6))),
+            1: SimpleNamespace(closure=SimpleNamespace(before=1.2, shrink=Quantity(0.8 - alone)))}
+    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: gaps[len(hypothesis.terms)])
+    monkeypatch.setattr(diagnosis, "closure_of", lambda data, halves, hypothesis, gap: SimpleNamespace(
+        shrink=Quantity(alone if gap is gaps[2] else 0.0)))
     loop = SimpleNamespace(changes_loop=lambda active: True)
     data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
-    selection, _ = diagnosis.selection_and_gap(data, ())
+    selection, gap = diagnosis.selection_and_gap(data, ())
+    assert gap is gaps[len(names)]
     assert [s.name for s in selection.named_steps] == names
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"
 

@@ -10,7 +10,7 @@ from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
-from airtouch.gap.answer.shrink import Gap, gap_of
+from airtouch.gap.answer.shrink import Gap, closure_of, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
@@ -207,11 +207,11 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     others = gap_closure.named_beside_the_loop(data, selection)
     if others:
         rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
-        gap_of_rest = gap_of(data, rest.halves, rest.named_hypothesis)
-        if gap_closure.loop_closes_too_little(gap.closure.shrink.value, gap_of_rest.closure.shrink.value):
+        closed_by_rest = closure_of(data, selection.halves, rest.named_hypothesis, gap).shrink.value  # of the same gap
+        if gap_closure.loop_closes_too_little(gap.closure.shrink.value, closed_by_rest):
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
                                 least_nats=selection.least_nats)
-            gap = gap_of_rest
+            gap = gap_of(data, rest.halves, rest.named_hypothesis)
     shrink = gap.closure.shrink.value
     if gap_closure.closes_too_little(data, selection, gap.closure.before, shrink):
         selection = gap_closure.with_names_withdrawn(data, selection, shrink)
