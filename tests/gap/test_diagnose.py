@@ -61,6 +61,28 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"
 
 
+def test_effects_left_out_stay_left_out_without_those_of_the_loop(monkeypatch):
+    """They are no passing effects either, which `select` looks for beside its candidates."""
+    searched_without = []
+
+    def chosen(data, candidates, say, without, *_):
+        searched_without.append(set(without))
+        effects = [n for n in ("motor_lag", "mass") if n in candidates]
+        return PartOfSelection([SimpleNamespace(name=n, passing_key=None) for n in effects],
+                               SimpleNamespace(terms=tuple(terms(n)[0] for n in effects)), {}, {})
+
+    closes = SimpleNamespace(before=1.4, shrink=Quantity(0.6))
+    monkeypatch.setattr(diagnosis, "select", chosen)
+    monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(closure=closes))
+    monkeypatch.setattr(diagnosis, "closure_of", lambda *_: closes)
+    loop = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "motor_lag" for a in active))
+    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
+    diagnosis.selection_and_gap(data, ("downwash", "wind"))
+    first, second = searched_without
+    assert first == {"downwash", "wind"}
+    assert {"downwash", "wind", "motor_lag"} <= second and "mass" not in second
+
+
 @pytest.mark.parametrize(("nominal", "a_candidate"), [(0, False), (1, True), (4, True)])
 def test_a_wake_is_no_candidate_without_nominal_flights(monkeypatch, nominal, a_candidate):
     """As a vehicle that shakes by itself looks like one in a wake that fills the flight."""

@@ -206,7 +206,8 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)
     if others:
-        rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
+        left_out = [*without, *(n for n in variants if n not in others)]
+        rest = select(data, {n: variants[n] for n in others}, say, left_out)
         closed_by_rest = closure_of(data, selection.halves, rest.named_hypothesis, gap).shrink.value  # of the same gap
         if gap_closure.loop_closes_too_little(gap.closure.shrink.value, closed_by_rest):
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
