@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
 from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import terms
+from hovers import FLOOR, hover
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,17 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
     assert gap is gaps[len(names)]
     assert [s.name for s in selection.named_steps] == names
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"
+
+
+@pytest.mark.parametrize(("lengths", "enough"), [
+    ((3.9,), True), ((3.7,), False), ((2.6, 2.6, 2.6, 2.6), True), ((2.6, 2.6, 2.6), False)])
+def test_flights_are_too_short_where_the_error_says_so(lengths, enough):
+    flights = [hover(k, length_s=s) for k, s in enumerate(lengths)]
+    if enough:
+        assert diagnosis._data(FLOOR, flights).flights == flights
+        return
+    with pytest.raises(AirTouchError, match=r"3\.84 s of a flight .* or 2\.56 s of each of 4 flights"):
+        diagnosis._data(FLOOR, flights)
 
 
 def test_effects_left_out_stay_left_out_without_those_of_the_loop(monkeypatch):

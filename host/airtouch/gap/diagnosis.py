@@ -18,7 +18,7 @@ from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
-from airtouch.gap.naming.judging import halves
+from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
@@ -26,7 +26,7 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
 from airtouch.gap.passing import overhead
 from airtouch.gap.result import Diagnosis
-from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
@@ -36,6 +36,8 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
+BLOCK_S = LENGTH[AIR] * PERIOD_S  #: length of a block in the air, the least that is judged
+LEAST_IN_ONE_S = 1.5 * BLOCK_S  #: two blocks, which overlap by half: one for either half of the data
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared. Torque is judged in its mean alone, as logged "
                "commands of a fast loop are aliased. No wake is judged, as a vehicle that shakes by itself looks like "
@@ -174,6 +176,10 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     if len(comparison.judged) < len(comparison.usable):
         notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
                      "chosen")
+    without_block = [f.name for f in comparison.judged if not len(starts(f, AIR))]
+    if without_block:
+        notes.append(f"too short to be judged, without {BLOCK_S:g} s in the air that have no hole: "
+                     + ", ".join(without_block))
     return tuple(dict.fromkeys(notes))
 
 
@@ -188,8 +194,10 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
     """The flights with their spectra. Raises AirTouchError where they are too short for two halves."""
     data = Data(study, flights)
     if any(not sum(chosen.sum() for _, state, chosen in p.pieces if state == AIR) for p in halves(data)):
-        raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
-                            "5 s in the air without a hole are needed")
+        which = flights[0].name if len(flights) == 1 else f"{len(flights)} flights"
+        raise AirTouchError(f"{which}: too short to be judged on other data than it is fitted on; {LEAST_IN_ONE_S:g} s "
+                            f"of a flight in the air without a hole are needed, or {BLOCK_S:g} s of each of "
+                            f"{HALVED_BY_FLIGHT} flights")
     return data
 
 
