@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import short_flights
 from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
 from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signatures.candidates import terms
+from gap_flights import VEHICLE
 from hovers import FLOOR, hover
 
 
@@ -72,6 +74,38 @@ def test_flights_are_too_short_where_the_error_says_so(lengths, enough):
         return
     with pytest.raises(AirTouchError, match=r"3\.84 s of a flight .* or 2\.56 s of each of 4 flights"):
         diagnosis._data(FLOOR, flights)
+
+
+@pytest.mark.parametrize(("changes", "refused"), [
+    ({}, False), ({"vehicle": replace(VEHICLE, mass_kg=0.04)}, True), ({"baseline": ("b",)}, True),
+    ({"without": ("mass",)}, True)])
+def test_a_calibration_is_used_again_for_the_same_vehicle_baseline_and_effects_alone(monkeypatch, changes, refused):
+    """Each call is made for one calibration: a second one of other inputs would be an answer to another question."""
+    logs = {name: replace(log, meta={**log.meta, "source": name}) for name, log in zip("ab", short_flights.fly(2),
+                                                                                       strict=True)}
+    calibrations = []
+
+    def calibrated(vehicle, nominal, without):
+        calibrations.append(nominal)
+        return FLOOR, None
+
+    empty = SimpleNamespace(effects=())
+    monkeypatch.setattr(diagnosis, "_calibrated", calibrated)
+    monkeypatch.setattr(diagnosis, "selection_and_gap", lambda *_: (None, None))
+    monkeypatch.setattr(diagnosis, "signs_not_shown", lambda _: [])
+    monkeypatch.setattr(diagnosis, "_answer", lambda *_: empty)
+    monkeypatch.setattr(diagnosis, "_explained", lambda *_: Diagnosis("none", (), (), (), (), {}, None, None))
+
+    def diagnose(vehicle=VEHICLE, baseline=("a",), without=("wind",), before=None):
+        return diagnosis.diagnose([logs["a"]], vehicle, [logs[n] for n in baseline], without=without, before=before)
+
+    first = diagnose()
+    if refused:
+        with pytest.raises(AirTouchError, match="another vehicle, baseline or effects left out"):
+            diagnose(**changes, before=first)
+    else:
+        diagnose(**changes, before=first)
+    assert len(calibrations) == 1
 
 
 def test_effects_left_out_stay_left_out_without_those_of_the_loop(monkeypatch):

@@ -76,8 +76,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
     diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
     other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
-    these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, or for a partner of several
-    flights.
+    these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
+    flights, or where `before` has another vehicle, baseline or effects left out.
     """
     say, without = progress or (lambda _: None), tuple(without)
     if partner and len(flights) != 1:
@@ -92,8 +92,14 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
-    known = None if before is None else before.calibrated
-    calibrated = known or _calibrated(vehicle, nominal, without)
+    calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
+    if before is not None and before.calibrated is not None:
+        if before.calibrated_with != calibrated_with:
+            raise AirTouchError("the diagnosis before has another vehicle, baseline or effects left out: its "
+                                "calibration does not hold here")
+        calibrated = before.calibrated
+    else:
+        calibrated = _calibrated(vehicle, nominal, without)
     study, calibration = calibrated
     if partner:
         study = overhead.with_overhead(study, usable[0], seconds)
@@ -107,7 +113,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     result = _answer(data, selection, gap)
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
-                   calibrated=calibrated)
+                   calibrated=calibrated, calibrated_with=calibrated_with)
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),

@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # which import this module
     from airtouch.gap.answer.pictures import Pictures
     from airtouch.gap.nominal.calibrate import Calibration
     from airtouch.gap.study import Study
+    from airtouch.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,10 @@ class Diagnosis:
     pictures: "Pictures | None" = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
     calibrated: "tuple[Study, Calibration | None] | None" = field(default=None, repr=False, compare=False)
+    #: of that calibration the vehicle, the names of the baseline flights, those left out included, and of the effects
+    #: left out
+    calibrated_with: "tuple[Vehicle, tuple[str, ...], tuple[str, ...]] | None" = field(default=None, repr=False,
+                                                                                      compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""
