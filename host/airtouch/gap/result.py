@@ -48,6 +48,8 @@ class Closure:
 class OverallGap(TypedDict, total=False):
     """Gap of the whole flights on held-out data: rms over the floor's, without unit; empty where it is not known.
 
+    Where one passing effect alone is named, the data are those that it was fitted to: it may act in one half only.
+
     before, after: without the named effects in the model and with them, equal where none is named; floor: 1.
     """
 
