@@ -38,6 +38,13 @@ def test_flights_of_210_s_are_judged_and_no_fewer_than_four(count, seconds, chos
     assert sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS or len(judged) <= 4
 
 
+def test_of_flights_that_differ_in_length_no_more_than_210_s_are_judged():
+    """Two of 60 s and 18 of 10 s, 300 s in all."""
+    long_first = [np.zeros(6000)] * 2 + [np.zeros(1000)] * 18
+    judged = flights_to_judge(long_first)
+    assert 4 < len(judged) < 20 and sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS
+
+
 @pytest.mark.parametrize(("alone", "names"), [(0.5, ["downwash"]), (0.2, ["motor_lag", "downwash"])])
 def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_left_out(monkeypatch, alone, names):
     """With slow motors 0.6 of the gap closes; without them as much of it as `alone`.

@@ -190,9 +190,13 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
 
 
 def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
-    """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
-    seconds = sum(len(f) for f in flights) * PERIOD_S
-    keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
+    """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more.
+
+    Of flights that differ in length there are as many as do not exceed MOST_SECONDS.
+    """
+    keep = len(flights)
+    while keep > LEAST_FLIGHTS and sum(len(f) for f in evenly_spaced(flights, keep)) * PERIOD_S > MOST_SECONDS:
+        keep -= 1
     return evenly_spaced(flights, keep)
 
 
