@@ -6,10 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import short_flights
+from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
 from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signatures.candidates import terms
+from gap_flights import VEHICLE
+from hovers import FLOOR, hover
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,19 @@ def test_flights_of_210_s_are_judged_and_no_fewer_than_four(count, seconds, chos
     assert sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS or len(judged) <= 4
 
 
+def test_of_flights_that_differ_in_length_no_more_than_210_s_are_judged():
+    """Two of 60 s and 18 of 10 s, 300 s in all."""
+    long_first = [np.zeros(6000)] * 2 + [np.zeros(1000)] * 18
+    judged = flights_to_judge(long_first)
+    assert 4 < len(judged) < 20 and sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS
+
+
 @pytest.mark.parametrize(("alone", "names"), [(0.5, ["downwash"]), (0.2, ["motor_lag", "downwash"])])
 def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_left_out(monkeypatch, alone, names):
-    """With slow motors 0.6 of the gap closes; without them as much as `alone`."""
+    """With slow motors 0.6 of the gap closes; without them as much of it as `alone`.
+
+    Of a gap that is measured in cells of its own the others close another part.
+    """
     def of(*effects):
         steps = [SimpleNamespace(name=n, passing_key=None) for n in effects]
         hypothesis = SimpleNamespace(terms=tuple(replace(terms(n)[0], gate=((0, 1),) if n == "downwash" else ())
@@ -45,13 +59,82 @@ def test_a_loop_effect_beside_others_closes_a_quarter_of_a_recorded_gap_or_is_le
 
     monkeypatch.setattr(diagnosis, "select", lambda data, candidates, say, without, *_: of(
         *(n for n in ("motor_lag", "downwash") if n in candidates)))
-    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: SimpleNamespace(closure=SimpleNamespace(
-        before=1.4, shrink=Quantity(0.6 if len(hypothesis.terms) == 2 else alone))))
+    gaps = {2: SimpleNamespace(closure=SimpleNamespace(before=1.4, shrink=Quantity(0.6))),
+            1: SimpleNamespace(closure=SimpleNamespace(before=1.2, shrink=Quantity(0.8 - alone)))}
+    monkeypatch.setattr(diagnosis, "gap_of", lambda data, halves, hypothesis: gaps[len(hypothesis.terms)])
+    monkeypatch.setattr(diagnosis, "closure_of", lambda data, halves, hypothesis, gap: SimpleNamespace(
+        shrink=Quantity(alone if gap is gaps[2] else 0.0)))
     loop = SimpleNamespace(changes_loop=lambda active: True)
     data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
-    selection, _ = diagnosis.selection_and_gap(data, ())
+    selection, gap = diagnosis.selection_and_gap(data, ())
+    assert gap is gaps[len(names)]
     assert [s.name for s in selection.named_steps] == names
     assert "motor_lag" in selection.single_effects and "motor_lag" in selection.least_nats, "it is in the ranking"
+
+
+@pytest.mark.parametrize(("lengths", "enough"), [
+    ((3.9,), True), ((3.7,), False), ((2.6, 2.6, 2.6, 2.6), True), ((2.6, 2.6, 2.6), False)])
+def test_flights_are_too_short_where_the_error_says_so(lengths, enough):
+    flights = [hover(k, length_s=s) for k, s in enumerate(lengths)]
+    if enough:
+        assert diagnosis._data(FLOOR, flights).flights == flights
+        return
+    with pytest.raises(AirTouchError, match=r"3\.84 s of a flight .* or 2\.56 s of each of 4 flights"):
+        diagnosis._data(FLOOR, flights)
+
+
+@pytest.mark.parametrize(("changes", "refused"), [
+    ({}, False), ({"vehicle": replace(VEHICLE, mass_kg=0.04)}, True), ({"baseline": ("b",)}, True),
+    ({"without": ("mass",)}, True)])
+def test_a_calibration_is_used_again_for_the_same_vehicle_baseline_and_effects_alone(monkeypatch, changes, refused):
+    """Each call is made for one calibration: a second one of other inputs would be an answer to another question."""
+    logs = {name: replace(log, meta={**log.meta, "source": name}) for name, log in zip("ab", short_flights.fly(2),
+                                                                                       strict=True)}
+    calibrations = []
+
+    def calibrated(vehicle, nominal, without):
+        calibrations.append(nominal)
+        return FLOOR, None
+
+    empty = SimpleNamespace(effects=())
+    monkeypatch.setattr(diagnosis, "_calibrated", calibrated)
+    monkeypatch.setattr(diagnosis, "selection_and_gap", lambda *_: (None, None))
+    monkeypatch.setattr(diagnosis, "signs_not_shown", lambda _: [])
+    monkeypatch.setattr(diagnosis, "_answer", lambda *_: empty)
+    monkeypatch.setattr(diagnosis, "_explained", lambda *_: Diagnosis("none", (), (), (), (), {}, None, None))
+
+    def diagnose(vehicle=VEHICLE, baseline=("a",), without=("wind",), before=None):
+        return diagnosis.diagnose([logs["a"]], vehicle, [logs[n] for n in baseline], without=without, before=before)
+
+    first = diagnose()
+    if refused:
+        with pytest.raises(AirTouchError, match="another vehicle, baseline or effects left out"):
+            diagnose(**changes, before=first)
+    else:
+        diagnose(**changes, before=first)
+    assert len(calibrations) == 1
+
+
+def test_effects_left_out_stay_left_out_without_those_of_the_loop(monkeypatch):
+    """They are no passing effects either, which `select` looks for beside its candidates."""
+    searched_without = []
+
+    def chosen(data, candidates, say, without, *_):
+        searched_without.append(set(without))
+        effects = [n for n in ("motor_lag", "mass") if n in candidates]
+        return PartOfSelection([SimpleNamespace(name=n, passing_key=None) for n in effects],
+                               SimpleNamespace(terms=tuple(terms(n)[0] for n in effects)), {}, {})
+
+    closes = SimpleNamespace(before=1.4, shrink=Quantity(0.6))
+    monkeypatch.setattr(diagnosis, "select", chosen)
+    monkeypatch.setattr(diagnosis, "gap_of", lambda *_: SimpleNamespace(closure=closes))
+    monkeypatch.setattr(diagnosis, "closure_of", lambda *_: closes)
+    loop = SimpleNamespace(changes_loop=lambda active: any(a.effect.name == "motor_lag" for a in active))
+    data = SimpleNamespace(study=SimpleNamespace(simulated=False, loop=loop, nominal_count=4))
+    diagnosis.selection_and_gap(data, ("downwash", "wind"))
+    first, second = searched_without
+    assert first == {"downwash", "wind"}
+    assert {"downwash", "wind", "motor_lag"} <= second and "mass" not in second
 
 
 @pytest.mark.parametrize(("nominal", "a_candidate"), [(0, False), (1, True), (4, True)])

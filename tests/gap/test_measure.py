@@ -8,8 +8,9 @@ import pytest
 
 import short_flights
 from airtouch import logs, vehicle
+from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measurement import Measurement, measure
+from airtouch.gap.measurement import Measurement, measure, pictures_of_measurement
 from airtouch.gap.where.cell import BASELINE, GapMap
 from airtouch.gap.where.rotor_speeds import RotorSpeed
 from airtouch.gap.where.summary import significant
@@ -47,6 +48,29 @@ def test_json_holds_the_largest_cells_and_the_whole_map(sweeps):
         assert {"channel", "band_hz", "phase", "gap", "floor", "unit", "low", "high", "words"} <= set(row)
         assert row["low"] <= row["gap"] <= row["high"] and row["floor"] > 0.0
     assert table["gap"]["before"] > 1.0
+
+
+def louder(log, seed):
+    """The log with white noise of 1 m/s^2 more along x: at 100 Hz that is 1/50 (m/s^2)^2/Hz."""
+    return log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + np.random.default_rng(seed).standard_normal(len(log))})
+
+
+def test_spectra_show_the_floor_of_the_baseline(sweeps):
+    """A force is pushed over the platform; nominal flights have the noise alone."""
+    nominal = [louder(log, k) for k, log in enumerate(sweeps)]
+    real = [pushed(louder(log, 10 + k), 3.0, "over platform") for k, log in enumerate(sweeps)]
+    gap = measure(real, VEHICLE, nominal, calibrated=False)
+    pictures = pictures_of_measurement(gap, real, VEHICLE)
+    (force,) = [s for s in pictures.spectra if s.channel == "force_x"]
+    high = pictures.frequency_hz > 10.0
+    assert np.median(force.floor[high]) == pytest.approx(1.0 / 50.0, rel=0.3)
+
+
+def test_error_without_a_flight_is_that_of_the_flight_not_of_the_baseline(sweeps):
+    bad, bad_nominal = (FlightLog({"t_s": sweeps[0]["t_s"][:20]}, {"source": name}) for name in ("real", "nominal"))
+    with pytest.raises(AirTouchError, match="real") as error:
+        measure([bad], VEHICLE, [bad_nominal])
+    assert "nominal" not in str(error.value)
 
 
 def test_a_push_over_the_platform_is_found_there(sweeps):

@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import sys
+import threading
+import time
 
 import pytest
 
@@ -44,6 +46,21 @@ def test_what_a_dead_process_owes_is_done_here():
         return _slow(x)[0]
 
     assert map_on_two_cores(dies_elsewhere, range(8)) == list(range(8))
+
+
+@forks
+def test_what_a_process_owes_that_dies_while_it_sends_is_done_here():
+    """A message larger than a pipe holds: the other process waits for a reader when it is ended."""
+    parent = os.getpid()
+
+    def large(x):
+        if os.getpid() != parent:
+            threading.Timer(0.5, os._exit, (1,)).start()
+            return bytes(4_000_000)
+        time.sleep(2.0)
+        return b"here"
+
+    assert map_on_two_cores(large, range(2)) == [b"here"] * 2
 
 
 @forks

@@ -10,7 +10,7 @@ from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
-from airtouch.gap.answer.shrink import Gap, gap_of
+from airtouch.gap.answer.shrink import Gap, closure_of, gap_of
 from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
@@ -18,7 +18,7 @@ from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
-from airtouch.gap.naming.judging import halves
+from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
@@ -26,7 +26,7 @@ from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
 from airtouch.gap.passing import overhead
 from airtouch.gap.result import Diagnosis
-from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
@@ -36,6 +36,8 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
+BLOCK_S = LENGTH[AIR] * PERIOD_S  #: length of a block in the air, the least that is judged
+LEAST_IN_ONE_S = 1.5 * BLOCK_S  #: two blocks, which overlap by half: one for either half of the data
 LEAST_FLIGHTS = 4  #: flights that are judged however long they are; chosen
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared. Torque is judged in its mean alone, as logged "
                "commands of a fast loop are aliased. No wake is judged, as a vehicle that shakes by itself looks like "
@@ -74,8 +76,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
     diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
     other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
-    these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, or for a partner of several
-    flights.
+    these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
+    flights, or where `before` has another vehicle, baseline or effects left out.
     """
     say, without = progress or (lambda _: None), tuple(without)
     if partner and len(flights) != 1:
@@ -90,8 +92,14 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
     say("calibration")
-    known = None if before is None else before.calibrated
-    calibrated = known or _calibrated(vehicle, nominal, without)
+    calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
+    if before is not None and before.calibrated is not None:
+        if before.calibrated_with != calibrated_with:
+            raise AirTouchError("the diagnosis before has another vehicle, baseline or effects left out: its "
+                                "calibration does not hold here")
+        calibrated = before.calibrated
+    else:
+        calibrated = _calibrated(vehicle, nominal, without)
     study, calibration = calibrated
     if partner:
         study = overhead.with_overhead(study, usable[0], seconds)
@@ -105,7 +113,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     result = _answer(data, selection, gap)
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
-                   calibrated=calibrated)
+                   calibrated=calibrated, calibrated_with=calibrated_with)
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
@@ -174,13 +182,21 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     if len(comparison.judged) < len(comparison.usable):
         notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
                      "chosen")
+    without_block = [f.name for f in comparison.judged if not len(starts(f, AIR))]
+    if without_block:
+        notes.append(f"too short to be judged, without {BLOCK_S:g} s in the air that have no hole: "
+                     + ", ".join(without_block))
     return tuple(dict.fromkeys(notes))
 
 
 def flights_to_judge(flights: Sequence[Flight]) -> list[Flight]:
-    """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more."""
-    seconds = sum(len(f) for f in flights) * PERIOD_S
-    keep = max(int(len(flights) * min(MOST_SECONDS / seconds, 1.0)), min(len(flights), LEAST_FLIGHTS))
+    """Evenly chosen flights of MOST_SECONDS together, but no fewer than LEAST_FLIGHTS; all where there are no more.
+
+    Of flights that differ in length there are as many as do not exceed MOST_SECONDS.
+    """
+    keep = len(flights)
+    while keep > LEAST_FLIGHTS and sum(len(f) for f in evenly_spaced(flights, keep)) * PERIOD_S > MOST_SECONDS:
+        keep -= 1
     return evenly_spaced(flights, keep)
 
 
@@ -188,8 +204,10 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
     """The flights with their spectra. Raises AirTouchError where they are too short for two halves."""
     data = Data(study, flights)
     if any(not sum(chosen.sum() for _, state, chosen in p.pieces if state == AIR) for p in halves(data)):
-        raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
-                            "5 s in the air without a hole are needed")
+        which = flights[0].name if len(flights) == 1 else f"{len(flights)} flights"
+        raise AirTouchError(f"{which}: too short to be judged on other data than it is fitted on; {LEAST_IN_ONE_S:g} s "
+                            f"of a flight in the air without a hole are needed, or {BLOCK_S:g} s of each of "
+                            f"{HALVED_BY_FLIGHT} flights")
     return data
 
 
@@ -206,12 +224,13 @@ def selection_and_gap(data: Data, without: Sequence[str], say: Callable[[str], N
     gap = gap_of(data, selection.halves, selection.named_hypothesis)
     others = gap_closure.named_beside_the_loop(data, selection)
     if others:
-        rest = select(data, {n: variants[n] for n in others}, say, [n for n in variants if n not in others])
-        gap_of_rest = gap_of(data, rest.halves, rest.named_hypothesis)
-        if gap_closure.loop_closes_too_little(gap.closure.shrink.value, gap_of_rest.closure.shrink.value):
+        left_out = [*without, *(n for n in variants if n not in others)]
+        rest = select(data, {n: variants[n] for n in others}, say, left_out)
+        closed_by_rest = closure_of(data, selection.halves, rest.named_hypothesis, gap).shrink.value  # of the same gap
+        if gap_closure.loop_closes_too_little(gap.closure.shrink.value, closed_by_rest):
             selection = replace(rest, single_effects={**selection.single_effects, **rest.single_effects},
                                 least_nats=selection.least_nats)
-            gap = gap_of_rest
+            gap = gap_of(data, rest.halves, rest.named_hypothesis)
     shrink = gap.closure.shrink.value
     if gap_closure.closes_too_little(data, selection, gap.closure.before, shrink):
         selection = gap_closure.with_names_withdrawn(data, selection, shrink)

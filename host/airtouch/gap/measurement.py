@@ -34,7 +34,7 @@ class Measurement:
     gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
     calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
     flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
-    flights were not used.
+    flights were not used; study: what the map holds them against, whose floor the pictures show.
     """
 
     vehicle: str
@@ -49,6 +49,7 @@ class Measurement:
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    study: Study | None = field(default=None, compare=False, repr=False)
 
     @property
     def headline(self) -> Cell | None:
@@ -104,8 +105,9 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     calibrated: whether the vehicle is also calibrated on the baseline, for the second arm;
     mapper: what maps a function over flights, in place of `map`, to spread the work.
     """
+    of_baseline: list[str] = []
     left_out: list[str] = []
-    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, left_out)), left_out)
+    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, of_baseline)), of_baseline)
     fitted = None
     if nominal and calibrated:
         progress("calibration")
@@ -129,7 +131,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         calibration=fitted.parameters if fitted else {},
         spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
         rotors=speeds_over_flights([m.speeds for m in measured]), notes=tuple(notes),
-        cannot=cannot_of([m.cannot for m in measured]), left_out=tuple(left_out))
+        cannot=cannot_of([m.cannot for m in measured]), left_out=(*of_baseline, *left_out), study=studies[0])
 
 
 def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], mapper: Callable, progress: Callable[[str], None],
@@ -166,5 +168,5 @@ def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog],
     flights = list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = pictures_of(declared_study(vehicle, ()), flights, [], [], measurement.where)
+    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where)
     return replace(curves, commands=measurement.spectra)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # which import this module
     from airtouch.gap.answer.pictures import Pictures
     from airtouch.gap.nominal.calibrate import Calibration
     from airtouch.gap.study import Study
+    from airtouch.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Closure:
 
 class OverallGap(TypedDict, total=False):
     """Gap of the whole flights on held-out data: rms over the floor's, without unit; empty where it is not known.
+
+    Where one passing effect alone is named, the data are those that it was fitted to: it may act in one half only.
 
     before, after: without the named effects in the model and with them, equal where none is named; floor: 1.
     """
@@ -204,6 +207,10 @@ class Diagnosis:
     pictures: "Pictures | None" = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
     calibrated: "tuple[Study, Calibration | None] | None" = field(default=None, repr=False, compare=False)
+    #: of that calibration the vehicle, the names of the baseline flights, those left out included, and of the effects
+    #: left out
+    calibrated_with: "tuple[Vehicle, tuple[str, ...], tuple[str, ...]] | None" = field(default=None, repr=False,
+                                                                                      compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""

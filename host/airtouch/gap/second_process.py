@@ -70,7 +70,7 @@ def _received(results: Connection) -> dict[int, Any]:
     """The items that the other process did; none if it died."""
     try:
         return _Unpickler(io.BytesIO(results.recv_bytes())).load()
-    except EOFError:
+    except (EOFError, OSError):  # the latter where it died in the middle of a message
         return {}
 
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.stats import spearmanr
 
-from airtouch.gap.answer.followed_signals import followed_signals
+from airtouch.gap.answer.followed_signals import followed_signals, rank_correlation
 from airtouch.gap.signals.spectra import AIR, starts
 from airtouch.simulation import signals as at
 from gap_flights import flight
@@ -16,6 +18,28 @@ def test_signal_that_the_power_follows_is_named():
     assert followed_signals(STUDY, [(growing, ratio_of(growing))]) == ["time"]
     steady = hover(1.0)
     assert not followed_signals(STUDY, [(steady, ratio_of(steady))])
+
+
+def test_signals_that_vary_slowly_are_seldom_followed_by_chance():
+    """40 blocks of two independent processes whose neighbours correlate by 0.8: one in a hundred is to pass p < 0.01.
+
+    Taken for independent, far more pass. Of flights of 8 blocks each neighbours are those of a flight.
+    """
+    random = np.random.default_rng(0)
+    x, y = lfilter([1.0], [1.0, -0.8], random.standard_normal((2, 400, 140)))[:, :, 100:]
+    one, five = np.ones(39, bool), np.arange(1, 40) % 8 != 0
+    rates = [np.mean([rank_correlation(a, b, where)[1] < 0.01 for a, b in zip(x, y, strict=True)])
+             for where in (one, five)]
+    naive = np.mean([spearmanr(a, b).pvalue < 0.01 for a, b in zip(x, y, strict=True)])
+    assert max(rates) < 0.03 and naive > 0.1
+
+
+def test_a_true_relation_of_values_that_are_independent_is_found_as_without_the_correction():
+    random = np.random.default_rng(1)
+    x = random.standard_normal((300, 40))
+    y = 0.6 * x + random.standard_normal((300, 40))
+    found = np.mean([rank_correlation(a, b, np.ones(39, bool))[1] < 0.01 for a, b in zip(x, y, strict=True)])
+    assert found == pytest.approx(np.mean([spearmanr(a, b).pvalue < 0.01 for a, b in zip(x, y, strict=True)]), abs=0.1)
 
 
 def test_a_signal_that_one_flight_lacks_is_not_named():

@@ -109,7 +109,20 @@ def test_effects_are_alike_by_what_each_gains_alone(named):
     """Of two that are named the first is weighed by its own gain, not by that of both."""
     near = gaining(gust=200.0 - 0.9 * LEAST_DIFFERENCE, mass=200.0, wind=200.0 - 1.1 * LEAST_DIFFERENCE)
     steps = tuple(replace(s, leave_one_out_gain=near[s.name].gain) for s in selection(named).steps)
-    assert alike_of(replace(selection(named), single_effects=near, steps=steps)) == (("gust", "mass"),)
+    of = replace(selection(named), single_effects=near, steps=steps, least_nats=dict.fromkeys(near, 8.0))
+    assert alike_of(of) == (("gust", "mass"),)
+
+
+@pytest.mark.parametrize(("evidence", "alike"), [(8.1, (("gust", "mass"),)), (7.9, ())])
+def test_an_effect_with_too_little_evidence_is_not_as_good_as_the_one_named(evidence, alike):
+    """It needs 8 nats: as strong as in nominal flights it explains nothing, though it gains as much."""
+    near = gaining(mass=200.0, gust=199.0)
+    near["gust"] = replace(near["gust"], evidence=evidence)
+    of = selection()
+    of = replace(of, single_effects=near, least_nats={"mass": 8.0, "gust": 8.0})
+    groups = alike_of(of)
+    assert any("gust" in g for g in groups) == bool(alike)
+    assert not alike or groups == alike
 
 
 def test_names_of_one_thing_are_alike_whatever_they_gain():

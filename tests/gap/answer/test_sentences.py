@@ -26,6 +26,15 @@ def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
     assert where.startswith(begin) and which.startswith("Its cause is ground effect")
 
 
+@pytest.mark.parametrize(("seconds", "others", "data"), [
+    ((("one.csv", 1.0, 2.0),), 0, "that it was fitted to"), ((), 0, "held out"),
+    ((("one.csv", 1.0, 2.0),), 1, "held out")])
+def test_a_passing_effect_alone_is_measured_on_what_it_was_fitted_to(seconds, others, data):
+    effects = (NamedEffect("downwash", {}, seconds), *[NamedEffect("mass", {})] * others)
+    how_far = sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1)], effects=effects))[2]
+    assert f"of the gap above the floor on data {data}, from 4 to" in how_far
+
+
 def test_no_cause_is_given_without_a_headline_cell():
     where, which, _ = sentences(diagnosis([cell("force_z", "hover", 0.05)]))
     assert where == "In no cell of the map does the gap stand out from its floor."

@@ -50,6 +50,14 @@ def test_the_worst_interval_ends_where_the_gap_is_half_way_to_its_median():
     assert worst_interval(np.array([2.0, 2.0, 2.0])) == (0, 2)
 
 
+def test_the_worst_interval_does_not_reach_over_a_hole():
+    """Blocks that begin each 1.28 s, with 10 s between the second and the third."""
+    begin = np.array([0, 128, 1128, 1256, 1384, 1512, 1640])
+    assert worst_interval(np.array([5.0, 4.9, 5.1, 1.0, 1.0, 1.0, 1.0]), begin) == (2, 2)
+    assert worst_interval(np.array([5.0, 5.1, 4.9, 1.0, 1.0, 1.0, 1.0]), begin) == (0, 1)
+    assert worst_interval(np.array([5.0, 5.1, 4.9, 1.0, 1.0, 1.0, 1.0]), 128 * np.arange(7)) == (0, 2)
+
+
 def test_open_cell_has_flight_and_seconds_of_the_largest_gap():
     strength = np.where((np.arange(4000) >= 2000) & (np.arange(4000) < 2800), 3.0, 0.1)
     flights = [hover(0.1, name="calm.csv"), hover(strength, name="windy.csv")]

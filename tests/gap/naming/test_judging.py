@@ -41,6 +41,17 @@ def test_halves_share_no_block_and_leave_none_out():
     assert {r for _, r, _ in judging.halves(three)[0].pieces} == {AIR}
 
 
+@pytest.mark.parametrize(("broken", "by_flight"), [((1, 3, 5, 7), True), ((0, 2), True), ((0, 1, 2, 3, 4), False)])
+def test_flights_without_a_block_leave_no_half_empty(broken, by_flight):
+    """Rows lost each 2 s, so that no block of 2.56 s is whole; the others have 10 s, in turns for either half."""
+    holes = np.arange(1000) % 200 < 40
+    flights = [hover(k, length_s=10.0, **({"lost": holes} if k in broken else {})) for k in range(8)]
+    whole = [k for k in range(8) if k not in broken]
+    first, second = judging.halves(Data(FLOOR, flights))
+    in_first, in_second = ([i for i, state, chosen in half.pieces if state == AIR] for half in (first, second))
+    assert (in_first, in_second) == ((whole[::2], whole[1::2]) if by_flight else (whole, whole))
+
+
 def test_covariance_of_a_parameter_that_is_not_free_is_infinite():
     _, *variants = all_candidates()["controller_gain"]
     (attitude,) = next(t for t in variants if t[0].free == ("attitude",))

@@ -77,13 +77,18 @@ def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer:
 
 
 def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
-    """Sets of names that these logs cannot tell apart: names of one thing, and candidates as good as the best."""
+    """Sets of names that these logs cannot tell apart: names of one thing, and candidates as good as the best.
+
+    A candidate with too little evidence to be named is not as good, whatever it gains.
+    """
     if not selection.named_steps:
         return ()
     groups = []
     first = selection.single_effects[selection.named_steps[0].name]
-    as_good = [n for n, h in selection.single_effects.items() if (h.full or selection.inference is not None)
-               and selection.gain(first) - selection.gain(h) < LEAST_DIFFERENCE]
+    as_good = [n for n, h in selection.single_effects.items()
+               if selection.gain(first) - selection.gain(h) < LEAST_DIFFERENCE
+               and (h is first or selection.inference is not None
+                    or (h.full and h.evidence >= selection.least_nats[n]))]
     if len(as_good) > 1:
         groups.append(tuple(sorted(as_good)))
     for step in selection.named_steps:

@@ -84,8 +84,14 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
-            f"floor on data held out, from {short(before)} to {short(after)} times the floor"
+            f"floor on data {_judged_on(diagnosis)}, from {short(before)} to {short(after)} times the floor"
             f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}.")
+
+
+def _judged_on(diagnosis: Diagnosis) -> str:
+    """On what data the gap is measured: those of a passing effect alone are those that it was fitted to."""
+    passes_alone = len(diagnosis.effects) == 1 and bool(diagnosis.effects[0].seconds)
+    return "that it was fitted to" if passes_alone else "held out"
 
 
 def _cells_in_words(cells: Sequence[Cell]) -> str:

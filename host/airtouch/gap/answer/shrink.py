@@ -78,8 +78,8 @@ def gap_of(data: Data, halves: Sequence[BlockSet], hypothesis: Hypothesis | None
     return Gap(cells, deficit, before, closure)
 
 
-def closure_of(data: Data, halves: Sequence[BlockSet], hypothesis: Hypothesis, gap: Gap) -> Closure:
-    """How far another hypothesis than the effects named closes the gap of two halves."""
+def closure_of(data: Data, halves: Sequence[BlockSet], hypothesis: Hypothesis | None, gap: Gap) -> Closure:
+    """How far another hypothesis than the effects named closes the gap of two halves; None closes nothing."""
     if is_only_jitter(hypothesis):
         return closure_of_jitter(data)
     return _closure(gap.ratios_before, gap.deficit + _ratios(data, halves, _terms_of_halves(hypothesis), gap.cells))

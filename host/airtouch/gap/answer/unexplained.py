@@ -50,8 +50,8 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
         if not ratios:
             continue
         flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
-        first, last = worst_interval(ratio)
         begin = starts(flight, AIR)
+        first, last = worst_interval(ratio, begin)
         out.append(OpenCell(
             cell.channel, cell.band_hz, cell.phase, flight.name, from_s=float(begin[first] * PERIOD_S),
             to_s=float((begin[last] + LENGTH[AIR]) * PERIOD_S), over_floor=float(ratio[first:last + 1].max()),
@@ -104,16 +104,19 @@ def _commonest_phase(flight: Flight) -> np.ndarray:
     return (phase[:, :, None] == np.arange(len(KINDS))).sum(axis=1).argmax(axis=1)
 
 
-def worst_interval(ratio: np.ndarray) -> tuple[int, int]:
+def worst_interval(ratio: np.ndarray, begin: np.ndarray | None = None) -> tuple[int, int]:
     """First and last block around the largest ratio (blocks,) that stay above the middle between it and the median.
 
-    A block of NaN counts in neither and ends the interval.
+    A block of NaN counts in neither and ends the interval. begin (blocks,): first samples of blocks in the air; where
+    one begins more than half a block after the one before, as after lost rows or a landing, the interval ends. None:
+    the blocks follow one another.
     """
+    follows = np.ones(len(ratio), bool) if begin is None else np.diff(begin, prepend=begin[:1]) <= LENGTH[AIR] // 2
     peak = int(np.nanargmax(ratio))
     limit = 0.5 * (ratio[peak] + float(np.nanmedian(ratio)))
     first = last = peak
-    while first > 0 and ratio[first - 1] >= limit:
+    while first > 0 and follows[first] and ratio[first - 1] >= limit:
         first -= 1
-    while last + 1 < len(ratio) and ratio[last + 1] >= limit:
+    while last + 1 < len(ratio) and follows[last + 1] and ratio[last + 1] >= limit:
         last += 1
     return first, last

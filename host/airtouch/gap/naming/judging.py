@@ -67,13 +67,18 @@ def trial_of(data: Data) -> Trial:
 
 
 def halves(data: Data) -> tuple[BlockSet, BlockSet]:
-    """Two halves: by flight where there are HALVED_BY_FLIGHT or more, else alternating groups of blocks."""
-    by_flight = len(data.flights) >= HALVED_BY_FLIGHT
+    """Two halves: by flight where HALVED_BY_FLIGHT or more have a block in the air, else alternating groups of blocks.
+
+    By flight, those with a block in the air are taken in turns, so that both halves have some.
+    """
+    flown = [i for i, f in enumerate(data.block_starts) if len(f[AIR])]
+    turn = {flight: k % 2 for k, flight in enumerate(flown)}
+    by_flight = len(flown) >= HALVED_BY_FLIGHT
     pieces: tuple[list, list] = ([], [])
     counts = [(i, state, len(f[state])) for i, f in enumerate(data.block_starts) for state in (AIR, REST)]
     for i, state, n in counts:
         if n and by_flight:
-            pieces[i % 2].append((i, state, np.ones(n, bool)))
+            pieces[turn.get(i, 0)].append((i, state, np.ones(n, bool)))
         elif n:
             even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
             pieces[0].append((i, state, even))

@@ -7,8 +7,9 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import judged_blocks
+from airtouch.gap.evidence.problem import problem_of, whole_of
 from airtouch.gap.naming.judging import trial_of
-from airtouch.gap.naming.screening.first_order import judge_means, judge_random
+from airtouch.gap.naming.screening.first_order import column, judge_means, judge_random
 from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signatures.candidates import terms
 from hovers import DOWN, FLOOR, hover, own_gain
@@ -51,3 +52,16 @@ def test_noise_gains_as_much_as_its_fit(louder):
     # twice the declared power is the floor, and the declared one itself is no part of what is added
     factor = noise.at(strength)["factor"]
     assert factor == pytest.approx(np.sqrt(max(2.0 * louder ** 2 - 1.0, 1.0)), rel=0.03)
+
+
+@pytest.mark.parametrize("always_first", [True, False])
+def test_a_passing_effect_changes_the_spectra_of_its_own_seconds_alone(always_first):
+    """Whichever is screened first: of 20 s the passing one has 5, and so no change in the blocks outside them."""
+    data = Data(FLOOR, [hover(40, length_s=20.0)])
+    always = terms("mass")[0]
+    passing = replace(always, gate=((data.flights[0].name, 10.0, 15.0),))
+    problem = problem_of(data, whole_of(data))
+    changes = {}
+    for term in (always, passing) if always_first else (passing, always):
+        changes[bool(term.gate)] = np.sum(np.abs(column(data, problem, term, 0)) ** 2)
+    assert 0.15 < changes[True] / changes[False] < 0.35

@@ -122,7 +122,7 @@ def _change(data: Data, term: Term, i: int) -> list[dict[str, np.ndarray]]:
                 for a, b in zip(after, before, strict=True)]
 
     variant = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
-    return data.workspace.cached("change", (term.name, term.free[i], variant), make)
+    return data.workspace.cached("change", (term.name, term.free[i], variant, term.gate), make)
 
 
 def _bounds(mean: Sequence[Term], others: int) -> Bounds:
