@@ -16,7 +16,7 @@ from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.connection.drone import drain
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample
-from airtouch.crazyflie.connection.ticks import Restarted
+from airtouch.crazyflie.connection.ticks import Restarted, host_clock_s
 from airtouch.crazyflie.recorder import Recorder
 from airtouch.errors import AirTouchError
 
@@ -77,7 +77,7 @@ class Flight:
     link_timeout_s: float = LINK_TIMEOUT_S
     show: Callable[["Flight"], None] = lambda _: None
     say: Callable[[str], None] = lambda _: None
-    clock: Callable[[], float] = field(default_factory=lambda: time.monotonic)
+    clock: Callable[[], float] = field(default_factory=lambda: host_clock_s)
     sleep: Callable[[float], None] = field(default_factory=lambda: time.sleep)
     in_air: Callable[[bool], None] = lambda _: None
     silences: list[float] = field(default_factory=list)
