@@ -26,8 +26,8 @@ def read(data: bytes, source: str) -> FlightLog:
     """The flight log of a ULog file, at 100 Hz.
 
     Motors are those of `actuator_motors` (0 to 1) or, without that topic, of `actuator_outputs` (1000 to 2000 us),
-    scaled to 0..65535. The down range is that of the first distance sensor that looks down. Raises AirTouchError without
-    the extra 'ulog' and for a file without an IMU.
+    scaled to 0..65535. The down range is that of the first distance sensor that looks down. Raises AirTouchError
+    without the extra 'ulog' and for a file without an IMU.
     """
     need("ulog", f"{source}: reading PX4 logs")
     from pyulog import ULog
